@@ -1,0 +1,116 @@
+"""The camera: OpenCV's pinhole with distortion, and where it stands in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import Array, inverse, rigid, transform
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A calibrated camera. Axes follow OpenCV: x right, y down, z forward; pixel centres are at integers.
+
+    Raises `CalibrationError`, naming the camera and the field, where a value cannot be a camera's.
+    """
+
+    name: str
+    size: tuple[int, int]
+    """Width and height, pixels."""
+    matrix: Array
+    """Intrinsics, of shape (3, 3), pixels."""
+    distortion: Array = field(default_factory=lambda: np.zeros(4))
+    """k1 k2 p1 p2 [k3 [k4 k5 k6]] of OpenCV's model; k1..k4 of its fisheye model."""
+    T_camera_world: Array = field(default_factory=lambda: np.eye(4))
+    """World to camera, of shape (4, 4), metres: X_camera = R X_world + t."""
+    fisheye: bool = False
+    oriented: bool = True
+    """Whether `T_camera_world` was measured; False when only a field of view is known (`from_fov`)."""
+
+    def __post_init__(self) -> None:
+        width, height = (int(v) for v in self.size)
+        matrix, T = np.array(self.matrix, float), np.array(self.T_camera_world, float)
+        distortion = np.array(self.distortion, float).ravel()
+        allowed = (4,) if self.fisheye else (0, 4, 5, 8)
+
+        def check(good: bool, what: str, found: object, expected: str) -> None:
+            if not good:
+                raise CalibrationError(f"camera {self.name!r}: {what}: found {found}, expected {expected}")
+
+        check(width > 0 and height > 0, "size", [width, height], "two positive numbers of pixels")
+        check(matrix.shape == (3, 3) and bool(np.isfinite(matrix).all()), "matrix", matrix.tolist(), "3 x 3 finite numbers")
+        check(matrix[0, 0] > 0 and matrix[1, 1] > 0, "matrix", np.diag(matrix)[:2].tolist(), "positive focal lengths")
+        check(bool(np.allclose(matrix[2], [0, 0, 1])), "matrix", matrix[2].tolist(), "a last row of 0 0 1")
+        check(distortion.size in allowed, "distortions", f"{distortion.size} numbers", f"{allowed} of them")
+        check(bool(np.isfinite(distortion).all()), "distortions", distortion.tolist(), "finite numbers")
+        check(T.shape == (4, 4) and bool(np.isfinite(T).all()), "rotation and translation", T.tolist(), "finite numbers")
+        R = T[:3, :3]
+        check(bool(np.allclose(R @ R.T, np.eye(3), atol=1e-4)) and np.linalg.det(R) > 0, "rotation",
+              np.round(R, 4).tolist(), "an orthonormal, right-handed matrix")
+        if not self.fisheye and distortion.size < 8:
+            distortion = np.concatenate([distortion, np.zeros(8 - distortion.size)])
+        for name, value in dict(size=(width, height), matrix=matrix, distortion=distortion, T_camera_world=T).items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam") -> Camera:
+        """A level camera of which only the horizontal field of view (radians) is known, at the world's origin.
+
+        The world is then the camera's own: x to its right, y along the optical axis, z up.
+        """
+        if not 0 < fov < np.pi:
+            raise CalibrationError(f"camera {name!r}: fov: found {np.degrees(fov):g} degrees, expected between 0 and 180")
+        focal = size[0] / (2 * np.tan(fov / 2))
+        matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
+        level = rigid([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.zeros(3))
+        return cls(name, size, matrix, T_camera_world=level, oriented=False)
+
+    @property
+    def centre(self) -> Array:
+        """The camera's place in the world, of shape (3,), metres."""
+        return inverse(self.T_camera_world)[:3, 3]
+
+    def project(self, points_world: ArrayLike) -> Array:
+        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera."""
+        import cv2
+
+        points = transform(self.T_camera_world, points_world)
+        flat = points.reshape(-1, 1, 3)
+        if not flat.size:
+            return np.zeros((*points.shape[:-1], 2))
+        still = np.zeros(3)
+        if self.fisheye:
+            pixels = cv2.fisheye.projectPoints(flat, still, still, self.matrix, self.distortion)[0]
+        else:
+            pixels = cv2.projectPoints(flat, still, still, self.matrix, self.distortion)[0]
+        pixels = np.asarray(pixels, float).reshape(-1, 2)
+        pixels[flat[:, 0, 2] <= 1e-9] = np.nan
+        return pixels.reshape(*points.shape[:-1], 2)
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Directions in the camera's frame (..., 3), z = 1, of pixels (..., 2): the inverse of `project` up to depth."""
+        import cv2
+
+        pixels = np.asarray(pixels, float)
+        flat = pixels.reshape(-1, 1, 2)
+        if self.fisheye:
+            xy = cv2.fisheye.undistortPoints(flat, self.matrix, self.distortion)
+        else:
+            stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 100, 1e-12)
+            xy = cv2.undistortPoints(flat, self.matrix, self.distortion, criteria=stop)
+        xy = np.asarray(xy, float).reshape(-1, 2)
+        return np.concatenate([xy, np.ones((len(xy), 1))], 1).reshape(*pixels.shape[:-1], 3)
+
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """The same camera for pictures scaled to `size`. Pixel centres stay at integers, so the principal point moves by halves."""
+        sx, sy = size[0] / self.size[0], size[1] / self.size[1]
+        matrix = self.matrix.copy()
+        matrix[0] *= sx
+        matrix[1] *= sy
+        matrix[0, 2] += (sx - 1) / 2
+        matrix[1, 2] += (sy - 1) / 2
+        return replace(self, size=(int(size[0]), int(size[1])), matrix=matrix)

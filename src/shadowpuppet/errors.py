@@ -1,0 +1,45 @@
+"""The one error family of the package."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class ShadowPuppetError(Exception):
+    """A user's mistake or bad input, told in one sentence: where, what was found, what is possible.
+
+    The command line prints it without a traceback and exits with code 2.
+    """
+
+
+class CalibrationError(ShadowPuppetError):
+    """A calibration that cannot be used."""
+
+
+class VideoError(ShadowPuppetError):
+    """A film, picture or camera that cannot be read or written."""
+
+
+class RecordingError(ShadowPuppetError):
+    """A recording folder, or a file in it, that cannot be used."""
+
+
+class SilhouetteError(ShadowPuppetError):
+    """No usable silhouette can be made."""
+
+
+class TrackingError(ShadowPuppetError):
+    """Tracking cannot start or go on."""
+
+
+class FormatError(ShadowPuppetError):
+    """A data file that is not what its name says."""
+
+
+class SettingsError(ShadowPuppetError):
+    """A setting with an unknown name or an impossible value."""
+
+
+def choices(names: Iterable[str]) -> str:
+    """Valid names as they are listed in messages: `a, b, c`."""
+    return ", ".join(sorted(names)) or "none"
