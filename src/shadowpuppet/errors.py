@@ -43,3 +43,7 @@ class SettingsError(ShadowPuppetError):
 def choices(names: Iterable[str]) -> str:
     """Valid names as they are listed in messages: `a, b, c`."""
     return ", ".join(sorted(names)) or "none"
+
+
+class ShadowPuppetWarning(UserWarning):
+    """Something that does not stop the work but that the user should know."""
