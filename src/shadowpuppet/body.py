@@ -1,0 +1,270 @@
+"""Bodies: flat shapes on a skeleton, made from named sizes.
+
+`cardbox` is Liu 2011's model (III-A): two or three crossed rectangles a part. `boxes` is the volumetric model that the paper compares
+it with (Fig. 1): a closed box a part, on the same skeleton, with the same sizes. Both are quads fixed to joints, so that one
+rasterizer draws either.
+
+The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the left of a person who faces the camera), Z up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.geometry import Array
+from shadowpuppet.skeleton import Dof, Joint, Skeleton
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class CardboxSizes:
+    """The 18 sizes a1..a18 of Liu 2011, Fig. 2, metres; left and right share values."""
+
+    head_width: float
+    head_height: float
+    neck_gap: float
+    shoulder_width: float
+    """Width of the torso's top."""
+    torso_bottom_width: float
+    torso_height: float
+    waist_width: float
+    waist_height: float
+    head_depth: float
+    torso_top_depth: float
+    torso_bottom_depth: float
+    waist_depth: float
+    upper_arm_length: float
+    upper_arm_width: float
+    forearm_length: float
+    """From the elbow to the end of the fist (or of the fingers, where the hands are open)."""
+    elbow_width: float
+    """Width of the forearm at the elbow."""
+    hand_width: float
+    """Width of the forearm at the hand."""
+    shoulder_inset: float
+    """From the torso's edge inward to the shoulder joint."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            least = -0.2 if field.name in ("neck_gap", "shoulder_inset") else 0.005
+            if not least <= value <= 2.0:
+                raise ShadowPuppetError(f"size {field.name}: found {value!r}, expected {least} to 2.0 metres")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """The 18 names, in the paper's order a1..a18."""
+        return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, float], source: str = "sizes") -> CardboxSizes:
+        """Sizes from named values. Raises `ShadowPuppetError` for names missing or unknown."""
+        unknown, missing = set(values) - set(cls.names()), set(cls.names()) - set(values)
+        if unknown or missing:
+            what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
+            raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
+        for name, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ShadowPuppetError(f"{source}: {name}: found {value!r}, expected a number of metres")
+        return cls(**{name: float(value) for name, value in values.items()})
+
+    @classmethod
+    def from_array(cls, values: ArrayLike) -> CardboxSizes:
+        """Sizes from an array (18,) in the paper's order."""
+        return cls(*(float(v) for v in np.asarray(values)))
+
+    def to_array(self) -> Array:
+        """The sizes as an array (18,) in the paper's order."""
+        return np.array([getattr(self, name) for name in self.names()])
+
+    def with_values(self, **values: float) -> CardboxSizes:
+        """A copy with some sizes replaced."""
+        return replace(self, **values)
+
+
+SUBSETS = {"O1": CardboxSizes.names()[:8], "O2": CardboxSizes.names()[8:12], "O3": CardboxSizes.names()[12:]}
+"""The three groups in which Algorithm 1 estimates the sizes: front view, side view, arms."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Quads fixed to the joints of a skeleton, and named points on it."""
+
+    name: str
+    skeleton: Skeleton
+    quads: Array
+    """Corners in their joint's frame, of shape (Q, 4, 3), metres; each quad is flat and convex."""
+    quad_joints: NDArray[np.int64]
+    """Joint that each quad is fixed to, of shape (Q,)."""
+    quad_parts: tuple[str, ...]
+    """Body part that each quad belongs to, Q names."""
+    landmarks: Mapping[str, tuple[str, tuple[float, float, float]]]
+    """Points that a motion reports: name to joint and place in its frame, metres."""
+
+    @cached_property
+    def landmark_names(self) -> tuple[str, ...]:
+        """Names of the landmarks, L of them."""
+        return tuple(self.landmarks)
+
+    def quads_of(self, *parts: str) -> NDArray[np.int64]:
+        """Indices of the quads of some parts. Raises `ShadowPuppetError` for a part that the body lacks."""
+        unknown = set(parts) - set(self.quad_parts)
+        if unknown:
+            raise ShadowPuppetError(f"body {self.name!r}: unknown part {choices(unknown)}; there are: {choices(set(self.quad_parts))}")
+        return np.array([i for i, part in enumerate(self.quad_parts) if part in parts], np.int64)
+
+    def points(self, poses: ArrayLike, root: ArrayLike | None = None) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to."""
+        transforms = self.skeleton.forward(poses, root)
+        joints = [self.skeleton.joint_index(joint) for joint, _ in self.landmarks.values()]
+        local = np.array([place for _, place in self.landmarks.values()], float)
+        T = transforms[:, joints]
+        return np.einsum("nlij,lj->nli", T[..., :3], local) + T[..., 3]
+
+
+def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
+    """Joints and DOF of an arm that hangs straight down, thumb forward, when all its angles are zero.
+
+    Abduction turns the arm in the frontal plane, forward swings it out of that plane toward the front: every direction is reachable,
+    and the one singular direction is straight ahead, not hanging or level, where people begin. Roll turns the elbow's hinge about
+    the upper arm: 0 bends the forearm forward, +90 degrees bends it up when the arm is level to the side.
+    """
+    out, turn = ("x", "z") if side == "left" else ("-x", "-z")
+    y = (sizes.shoulder_width / 2 - sizes.shoulder_inset) * (1 if side == "left" else -1)
+    z = sizes.torso_height - sizes.upper_arm_width / 2  # a level arm's upper edge lies on the torso's
+    shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
+    joints = [Joint(shoulder, "torso", (0.0, y, z)), Joint(elbow, shoulder, (0.0, 0.0, -sizes.upper_arm_length))]
+    dofs = [
+        Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190])),
+        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-50, 100])),
+        Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-100, 110])),
+        Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150])),
+    ]
+    return joints, dofs
+
+
+def upper_body_skeleton(sizes: CardboxSizes) -> Skeleton:
+    """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm.
+
+    The pelvis shifts along Y and twists; the torso stands on it and turns about the middle of its lower edge.
+    """
+    joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
+    dofs = [
+        Dof("torso_y", "pelvis", "y", kind="translation"),
+        Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90])),
+        Dof("torso_bow", "torso", "y", *np.radians([-30, 90])),
+        Dof("torso_bend", "torso", "x", *np.radians([-50, 50])),
+    ]
+    for side in SIDES:
+        arm_joints, arm_dofs = _arm(side, sizes)
+        joints += arm_joints
+        dofs += arm_dofs
+    return Skeleton(tuple(joints), tuple(dofs))
+
+
+WRIST_SHARE = 0.146 / (0.146 + 0.108)
+"""Where the wrist lies between the elbow and the finger tips: forearm and hand are 0.146 and 0.108 of the stature (Drillis & Contini
+1966, as given by Winter, Biomechanics and Motor Control of Human Movement, 2009, Fig. 4.1)."""
+HAND_SHARE = WRIST_SHARE + 0.019 / (0.146 + 0.108)
+"""Where the base of the fingers lies: CMU's mocap skeletons have it (the end of `lhand`) 0.019 of the stature past the wrist."""
+
+
+def _landmarks(sizes: CardboxSizes) -> dict[str, tuple[str, tuple[float, float, float]]]:
+    top = sizes.torso_height
+    points = {
+        "pelvis": ("pelvis", (0.0, 0.0, 0.0)),
+        "neck": ("torso", (0.0, 0.0, top)),
+        "head": ("torso", (0.0, 0.0, top + sizes.neck_gap)),
+    }
+    for side in SIDES:
+        points[f"{side}_shoulder"] = (f"{side}_shoulder", (0.0, 0.0, 0.0))
+        points[f"{side}_elbow"] = (f"{side}_elbow", (0.0, 0.0, 0.0))
+        points[f"{side}_wrist"] = (f"{side}_elbow", (0.0, 0.0, -WRIST_SHARE * sizes.forearm_length))
+        points[f"{side}_hand"] = (f"{side}_elbow", (0.0, 0.0, -HAND_SHARE * sizes.forearm_length))
+        points[f"{side}_fist"] = (f"{side}_elbow", (0.0, 0.0, -sizes.forearm_length))
+    return points
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A body part as a frustum along Z: half widths (Y) and half depths (X) at its top and bottom."""
+
+    name: str
+    joint: str
+    top: float
+    bottom: float
+    width: tuple[float, float]
+    depth: tuple[float, float]
+
+    def corner(self, x: int, y: int, end: int) -> tuple[float, float, float]:
+        z = (self.top, self.bottom)[end]
+        return x * self.depth[end] / 2, y * self.width[end] / 2, z
+
+    def front_card(self) -> list[tuple[float, float, float]]:
+        return [self.corner(0, y, end) for y, end in ((-1, 0), (1, 0), (1, 1), (-1, 1))]
+
+    def side_card(self) -> list[tuple[float, float, float]]:
+        return [self.corner(x, 0, end) for x, end in ((-1, 0), (1, 0), (1, 1), (-1, 1))]
+
+    def level_card(self, share: float = 0.5) -> list[tuple[float, float, float]]:
+        """Across the part, `share` of the way down."""
+        x, y = ((1 - share) * a + share * b for a, b in (self.depth, self.width))
+        z = (1 - share) * self.top + share * self.bottom
+        return [(i * x / 2, j * y / 2, z) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+
+    def faces(self) -> list[list[tuple[float, float, float]]]:
+        """The six faces of the closed box."""
+        sides = [[self.corner(x, y, 0), self.corner(u, v, 0), self.corner(u, v, 1), self.corner(x, y, 1)]
+                 for x, y, u, v in ((-1, -1, 1, -1), (1, -1, 1, 1), (1, 1, -1, 1), (-1, 1, -1, -1))]
+        return [*sides, self.level_card(0.0), self.level_card(1.0)]
+
+
+def _parts(sizes: CardboxSizes) -> list[_Part]:
+    s, neck = sizes, sizes.torso_height + sizes.neck_gap
+    parts = [
+        _Part("head", "torso", neck + s.head_height, neck, (s.head_width,) * 2, (s.head_depth,) * 2),
+        _Part("torso", "torso", s.torso_height, 0.0, (s.shoulder_width, s.torso_bottom_width), (s.torso_top_depth, s.torso_bottom_depth)),
+        _Part("waist", "pelvis", 0.0, -s.waist_height, (s.waist_width,) * 2, (s.waist_depth,) * 2),
+    ]
+    upper, lower = (s.upper_arm_width,) * 2, (s.elbow_width, s.hand_width)
+    for side in SIDES:
+        parts += [_Part(f"{side}_upper_arm", f"{side}_shoulder", 0.0, -s.upper_arm_length, upper, upper),
+                  _Part(f"{side}_forearm", f"{side}_elbow", 0.0, -s.forearm_length, lower, lower)]
+    return parts
+
+
+def _body(name: str, sizes: CardboxSizes, shapes: Mapping[str, list]) -> Body:
+    skeleton = upper_body_skeleton(sizes)
+    joint_of = {part.name: part.joint for part in _parts(sizes)}
+    quads = [(part, quad) for part, part_quads in shapes.items() for quad in part_quads]
+    joints = np.array([skeleton.joint_index(joint_of[part]) for part, _ in quads], np.int64)
+    corners = np.array([quad for _, quad in quads], float)
+    return Body(name, skeleton, corners, joints, tuple(part for part, _ in quads), _landmarks(sizes))
+
+
+def cardbox(sizes: CardboxSizes) -> Body:
+    """Liu 2011's cardbox model: 15 cards (III-A). The torso's third card lies across it at mid-height."""
+    shapes = {p.name: [p.front_card(), p.side_card()] + ([p.level_card()] if p.name == "torso" else []) for p in _parts(sizes)}
+    return _body("cardbox", sizes, shapes)
+
+
+def boxes(sizes: CardboxSizes) -> Body:
+    """The volumetric model of Liu 2011, Fig. 1, for comparison: a closed box of six faces for each of the same seven parts."""
+    return _body("boxes", sizes, {part.name: part.faces() for part in _parts(sizes)})
+
+
+BODIES = {"cardbox": cardbox, "boxes": boxes}
+
+
+def make_body(name: str, sizes: CardboxSizes) -> Body:
+    """A body by name. Raises `ShadowPuppetError` with the names there are."""
+    if name not in BODIES:
+        raise ShadowPuppetError(f"unknown body {name!r}; there are: {choices(BODIES)}")
+    return BODIES[name](sizes)

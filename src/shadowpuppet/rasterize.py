@@ -1,0 +1,255 @@
+"""Drawing a body as a silhouette, and counting the pixels in which drawings differ from one, for many poses at once.
+
+Masks are packed as bits `[word_column][row]`, 64 pixels of a row in a 64-bit word, so that the inner loops run over rows and are
+vectorised. A pixel belongs to a polygon if its centre, at integer coordinates, does (half open: left and top edges count).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.body import Body
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array
+
+Bits = NDArray[np.uint64]
+NEAR = 0.05
+"""What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
+
+
+def pack(mask: ArrayLike) -> Bits:
+    """Mask (H, W) to bits (ceil(W / 64), H)."""
+    mask = np.asarray(mask, bool)
+    height, width = mask.shape
+    padded = np.zeros((height, -(-width // 64) * 64), bool)
+    padded[:, :width] = mask
+    words = np.packbits(padded, axis=1, bitorder="little").view("<u8")
+    return np.ascontiguousarray(words.T, np.uint64)
+
+
+def unpack(bits: Bits, width: int) -> NDArray[np.bool_]:
+    """Bits (C, H) to the mask (H, W)."""
+    rows = np.ascontiguousarray(bits.T).astype("<u8").view(np.uint8)
+    return np.unpackbits(rows, axis=1, bitorder="little")[:, :width].astype(bool)
+
+
+def count(bits: Bits) -> int:
+    """Number of pixels set."""
+    return int(np.bitwise_count(bits).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """How a camera sees a body: the body, the camera, and the body's frame in the camera's."""
+
+    body: Body
+    camera: Camera
+    T_camera_base: Array
+    """The body's frame in the camera's, of shape (4, 4), metres."""
+
+    def transforms(self, poses: Array) -> Array:
+        """Joint transforms (N, J, 3, 4) into the camera's frame, of poses (N, D)."""
+        return self.body.skeleton.forward(poses, self.T_camera_base)
+
+    def polygons(self, transforms: Array, quads: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+        """Pictures of some quads: corners (N, Q, 5, 2) in pixels and their number (N, Q), 0 where all is behind the camera."""
+        camera, corners = self.camera, np.empty((len(transforms), len(quads), 5, 2))
+        counts = np.empty((len(transforms), len(quads)), np.int64)
+        _project(transforms, self.body.quads, self.body.quad_joints, quads, camera.matrix, camera.distortion, camera.fisheye, NEAR,
+                 corners, counts)
+        return corners, counts
+
+    def empty(self) -> Bits:
+        """An empty mask's bits."""
+        width, height = self.camera.size
+        return np.zeros((-(-width // 64), height), np.uint64)
+
+    def draw(self, pose: ArrayLike, quads: NDArray[np.int64] | None = None) -> Bits:
+        """The silhouette of one pose (D,) as bits; of all quads, or of some."""
+        poses = np.ascontiguousarray(np.asarray(pose, float)[None])
+        quads = np.arange(len(self.body.quads)) if quads is None else quads
+        bits = self.empty()
+        corners, counts = self.polygons(self.transforms(poses), quads)
+        _draw(corners[0], counts[0], self.camera.size[0], bits)
+        return bits
+
+    def mask(self, pose: ArrayLike) -> NDArray[np.bool_]:
+        """The silhouette of one pose (D,), of shape (H, W): h(x, y, d) of Liu 2011, eq. 2."""
+        return unpack(self.draw(pose), self.camera.size[0])
+
+    def added(self, transforms: Array, quads: NDArray[np.int64], silhouette: Bits, fixed: Bits) -> NDArray[np.int64]:
+        """What drawing some quads adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
+        corners, counts = self.polygons(transforms, quads)
+        out = np.empty((len(transforms), 2), np.int64)
+        _added(corners, counts, self.camera.size[0], silhouette, fixed, out)
+        return out
+
+
+def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """One convex polygon (K <= 5 corners, (K, 2) pixels) drawn into an empty mask (H, W)."""
+    corners = np.asarray(corners, float)
+    padded = np.zeros((1, 5, 2))
+    padded[0, : len(corners)] = corners
+    bits = np.zeros((-(-size[0] // 64), size[1]), np.uint64)
+    _draw(padded, np.array([len(corners)]), size[0], bits)
+    return unpack(bits, size[0])
+
+
+@intrinsic
+def _popcount(typingctx, word):  # pragma: no cover
+    """Number of bits set in a 64-bit word: LLVM's ctpop, which vectorises."""
+
+    def codegen(context, builder, signature, args):
+        return builder.ctpop(args[0])
+
+    return types.uint64(types.uint64), codegen
+
+
+@numba.njit(cache=True)
+def _project(transforms, all_quads, joints, quads, K, k, fisheye, near, corners, counts):  # pragma: no cover
+    """Quads into the camera's frame, cut at the near plane, projected."""
+    P = np.empty((4, 3))
+    bent = k.any()
+    for n in range(transforms.shape[0]):
+        for i in range(quads.size):
+            q = quads[i]
+            T = transforms[n, joints[q]]
+            for v in range(4):
+                x, y, z = all_quads[q, v, 0], all_quads[q, v, 1], all_quads[q, v, 2]
+                P[v, 0] = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
+                P[v, 1] = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
+                P[v, 2] = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
+            out = corners[n, i]
+            m = 0
+            if min(P[0, 2], P[1, 2], P[2, 2], P[3, 2]) >= near:
+                for m in range(4):
+                    out[m, 0], out[m, 1] = P[m, 0] / P[m, 2], P[m, 1] / P[m, 2]
+                m = 4
+            else:
+                m = _clip(P, near, out)
+            for v in range(m):
+                x, y = out[v, 0], out[v, 1]
+                if bent:
+                    x, y = _bend(x, y, k, fisheye)
+                out[v, 0], out[v, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
+            counts[n, i] = m
+
+
+@numba.njit(cache=True)
+def _clip(P, near, out):  # pragma: no cover
+    """Cut a quad (4, 3) at the near plane; x / z and y / z of the up to five corners left; returns their number."""
+    m = 0
+    for v in range(4):
+        w = (v + 1) & 3
+        if P[v, 2] >= near:
+            out[m, 0], out[m, 1] = P[v, 0] / P[v, 2], P[v, 1] / P[v, 2]
+            m += 1
+        if (P[v, 2] >= near) != (P[w, 2] >= near):
+            s = (near - P[v, 2]) / (P[w, 2] - P[v, 2])
+            for a in range(2):
+                out[m, a] = (P[v, a] + s * (P[w, a] - P[v, a])) / near
+            m += 1
+    return m
+
+
+@numba.njit(cache=True)
+def _bend(x, y, k, fisheye):  # pragma: no cover
+    """OpenCV's distortion. Straight edges between distorted corners stay straight: a card is small beside the lens's bend."""
+    if fisheye:
+        r = np.sqrt(x * x + y * y)
+        a = np.arctan(r)
+        b = a * a
+        s = a * (1 + b * (k[0] + b * (k[1] + b * (k[2] + b * k[3])))) / r if r > 1e-9 else 1.0
+        return s * x, s * y
+    r = x * x + y * y
+    s = (1 + r * (k[0] + r * (k[1] + r * k[4]))) / (1 + r * (k[5] + r * (k[6] + r * k[7])))
+    return x * s + 2 * k[2] * x * y + k[3] * (r + 2 * x * x), y * s + k[2] * (r + 2 * y * y) + 2 * k[3] * x * y
+
+
+@numba.njit(cache=True)
+def _spans(P, m, width, height, left, right):  # pragma: no cover
+    """First pixel and end of a convex polygon's span on every row it covers; returns its box (row, row end, word, word end).
+
+    The span of a row is where it lies inside the half planes of all edges, so the edges' lines may be followed past their ends.
+    """
+    top, bottom, west, east, area = P[0, 1], P[0, 1], P[0, 0], P[0, 0], 0.0
+    for v in range(m):
+        w = v + 1 if v + 1 < m else 0
+        area += P[v, 0] * P[w, 1] - P[w, 0] * P[v, 1]
+        top, bottom = min(top, P[v, 1]), max(bottom, P[v, 1])
+        west, east = min(west, P[v, 0]), max(east, P[v, 0])
+    if m < 3 or abs(area) < 1e-9 or bottom < 0 or top >= height or east < 0 or west >= width:
+        return 0, 0, 0, 0
+    r0, r1 = int(np.ceil(max(top, 0.0))), int(np.ceil(min(bottom, float(height))))
+    rows = max(r1 - r0, 0)
+    for r in range(rows):
+        left[r], right[r] = 0.0, width
+    for v in range(m):
+        w = v + 1 if v + 1 < m else 0
+        dy = P[w, 1] - P[v, 1]
+        if dy == 0:
+            continue
+        slope = (P[w, 0] - P[v, 0]) / dy
+        x = P[v, 0] + (r0 - P[v, 1]) * slope
+        if (dy > 0) != (area > 0):
+            for r in range(rows):
+                left[r] = max(left[r], x + r * slope)
+        else:
+            for r in range(rows):
+                right[r] = min(right[r], x + r * slope)
+    c0, c1 = int(max(west, 0.0)) >> 6, (int(min(np.ceil(east), float(width))) + 63) >> 6
+    return r0, r1, c0, c1
+
+
+@numba.njit(cache=True)
+def _fill(left, right, r0, r1, c0, c1, bits):  # pragma: no cover
+    """Set the bits of the spans, word column by word column, without a branch."""
+    one, full = np.uint64(1), np.uint64(0xFFFFFFFFFFFFFFFF)
+    for c in range(c0, c1):
+        column = bits[c, r0:r1]
+        for r in range(column.size):
+            a = min(max(np.int64(np.ceil(left[r])) - 64 * c, 0), 64)
+            b = min(max(np.int64(np.ceil(right[r])) - 64 * c, 0), 64)
+            before = (one << np.uint64(a & 63)) - one if a < 64 else full
+            until = (one << np.uint64(b & 63)) - one if b < 64 else full
+            column[r] |= until & ~before
+
+
+@numba.njit(cache=True)
+def _draw(corners, counts, width, bits):  # pragma: no cover
+    """Draw polygons (Q, 5, 2) into bits."""
+    height = bits.shape[1]
+    left, right = np.empty(height), np.empty(height)
+    for i in range(counts.size):
+        r0, r1, c0, c1 = _spans(corners[i], counts[i], width, height, left, right)
+        _fill(left, right, r0, r1, c0, c1, bits)
+
+
+@numba.njit(cache=True)
+def _added(corners, counts, width, silhouette, fixed, out):  # pragma: no cover
+    """For each pose, the pixels that its polygons add to `fixed`, and how many of these lie in the silhouette."""
+    height = silhouette.shape[1]
+    left, right = np.empty(height), np.empty(height)
+    scratch = np.zeros_like(silhouette)
+    for n in range(corners.shape[0]):
+        R0, R1, C0, C1 = height, 0, silhouette.shape[0], 0
+        for i in range(counts.shape[1]):
+            r0, r1, c0, c1 = _spans(corners[n, i], counts[n, i], width, height, left, right)
+            if r1 > r0:
+                R0, R1, C0, C1 = min(R0, r0), max(R1, r1), min(C0, c0), max(C1, c1)
+                _fill(left, right, r0, r1, c0, c1, scratch)
+        total, inside = np.uint64(0), np.uint64(0)
+        for c in range(C0, C1):
+            drawn, kept, seen = scratch[c, R0:R1], fixed[c, R0:R1], silhouette[c, R0:R1]
+            for r in range(drawn.size):
+                v = drawn[r] & ~kept[r]
+                total += _popcount(v)
+                inside += _popcount(v & seen[r])
+            drawn[:] = 0
+        out[n, 0], out[n, 1] = total, inside

@@ -1,0 +1,155 @@
+"""A jointed skeleton: a tree of joints, named degrees of freedom with limits, forward kinematics of many poses at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.geometry import Array
+
+AXES = {"x": (0, 1.0), "y": (1, 1.0), "z": (2, 1.0), "-x": (0, -1.0), "-y": (1, -1.0), "-z": (2, -1.0)}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the tree; its frame has its parent's axes when all its angles are zero."""
+
+    name: str
+    parent: str | None
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Place in the parent's frame, metres."""
+
+
+@dataclass(frozen=True)
+class Dof:
+    """One degree of freedom: a rotation about, or a shift along, an axis of its joint's frame."""
+
+    name: str
+    joint: str
+    axis: Literal["x", "y", "z", "-x", "-y", "-z"]
+    low: float = -np.inf
+    """Limits, radians or metres."""
+    high: float = np.inf
+    kind: Literal["rotation", "translation"] = "rotation"
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints, parents before children, and degrees of freedom, grouped by joint in the order in which they act.
+
+    The transform of a joint is its parent's, times its offset, times its DOF one after another.
+    A pose is an array (D,) in the order of `dofs`; functions take arrays of poses (N, D).
+    """
+
+    joints: tuple[Joint, ...]
+    dofs: tuple[Dof, ...]
+
+    def __post_init__(self) -> None:
+        seen: set[str] = set()
+        for joint in self.joints:
+            if joint.parent is not None and joint.parent not in seen:
+                raise ShadowPuppetError(f"joint {joint.name!r}: its parent {joint.parent!r} must stand before it")
+            seen.add(joint.name)
+        order = [self.joint_index(dof.joint) for dof in self.dofs]
+        if order != sorted(order):
+            raise ShadowPuppetError("degrees of freedom must be grouped by joint, in the joints' order")
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, J of them."""
+        return tuple(joint.name for joint in self.joints)
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom, D of them."""
+        return tuple(dof.name for dof in self.dofs)
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Least and greatest value of every DOF, two arrays (D,)."""
+        return np.array([dof.low for dof in self.dofs]), np.array([dof.high for dof in self.dofs])
+
+    @cached_property
+    def _tree(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], NDArray[np.int64], Array, NDArray[np.bool_]]:
+        """What the kernel needs: parents (J,), offsets (J, 3), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,)."""
+        parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
+        offsets = np.array([j.offset for j in self.joints], float)
+        owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
+        first = np.searchsorted(owners, np.arange(len(self.joints) + 1))
+        axes = np.array([AXES[dof.axis][0] for dof in self.dofs], np.int64)
+        signs = np.array([AXES[dof.axis][1] for dof in self.dofs], float)
+        turns = np.array([dof.kind == "rotation" for dof in self.dofs], bool)
+        return parents, offsets, first, axes, signs, turns
+
+    def joint_index(self, name: str) -> int:
+        """Index of a joint. Raises `ShadowPuppetError` with the names there are."""
+        for i, joint in enumerate(self.joints):
+            if joint.name == name:
+                return i
+        raise ShadowPuppetError(f"unknown joint {name!r}; there are: {choices(j.name for j in self.joints)}")
+
+    def dof_indices(self, names: Iterable[str]) -> NDArray[np.int64]:
+        """Indices of DOF by name. Raises `ShadowPuppetError` with the names there are."""
+        names = tuple(names)
+        unknown = [name for name in names if name not in self.dof_names]
+        if unknown:
+            raise ShadowPuppetError(f"unknown degree of freedom {unknown[0]!r}; there are: {choices(self.dof_names)}")
+        return np.array([self.dof_names.index(name) for name in names], np.int64)
+
+    def pose(self, **angles: float) -> Array:
+        """One pose (D,) from named values, zero elsewhere."""
+        pose = np.zeros(len(self.dofs))
+        pose[self.dof_indices(angles)] = list(angles.values())
+        return pose
+
+    def clamp(self, poses: ArrayLike) -> Array:
+        """Poses (N, D) with every DOF within its limits."""
+        return np.clip(np.asarray(poses, float), *self.limits)
+
+    def forward(self, poses: ArrayLike, root: ArrayLike | None = None) -> Array:
+        """Forward kinematics: transforms (N, J, 3, 4) of every joint, of poses (N, D), with the root's parent frame at `root` (4, 4)."""
+        poses = np.ascontiguousarray(poses, float)
+        if poses.ndim != 2 or poses.shape[1] != len(self.dofs):
+            raise ShadowPuppetError(f"poses have shape {poses.shape}, expected (N, {len(self.dofs)})")
+        out = np.empty((len(poses), len(self.joints), 3, 4))
+        self.forward_some(poses, np.arange(len(self.joints)), out, np.eye(4) if root is None else np.asarray(root, float))
+        return out
+
+    def forward_some(self, poses: Array, joints: NDArray[np.int64], transforms: Array, root: Array) -> None:
+        """Recompute, in place, only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are taken as they stand."""
+        _forward(poses, joints, *self._tree, np.ascontiguousarray(root[:3]), transforms)
+
+
+@numba.njit(cache=True)
+def _forward(poses, joints, parents, offsets, first, axes, signs, turns, root, out):  # pragma: no cover
+    """Each joint: the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns."""
+    T = np.empty((3, 4))
+    for n in range(poses.shape[0]):
+        for j in joints:
+            parent = parents[j]
+            for r in range(3):
+                for c in range(4):
+                    T[r, c] = root[r, c] if parent < 0 else out[n, parent, r, c]
+                T[r, 3] += T[r, 0] * offsets[j, 0] + T[r, 1] * offsets[j, 1] + T[r, 2] * offsets[j, 2]
+            for d in range(first[j], first[j + 1]):
+                axis, value = axes[d], signs[d] * poses[n, d]
+                if turns[d]:
+                    a, b = (axis + 1) % 3, (axis + 2) % 3
+                    cos, sin = np.cos(value), np.sin(value)
+                    for r in range(3):
+                        u, v = T[r, a], T[r, b]
+                        T[r, a] = cos * u + sin * v
+                        T[r, b] = cos * v - sin * u
+                else:
+                    for r in range(3):
+                        T[r, 3] += T[r, axis] * value
+            for r in range(3):
+                for c in range(4):
+                    out[n, j, r, c] = T[r, c]
