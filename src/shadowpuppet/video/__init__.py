@@ -1,0 +1,68 @@
+"""Frames from films, folders of pictures and live cameras, and films and pictures written; never a whole film in memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shadowpuppet.errors import VideoError
+from shadowpuppet.video.film import open_film
+from shadowpuppet.video.frames import Frame, FrameSource, Image, Size
+from shadowpuppet.video.live import open_camera
+from shadowpuppet.video.pictures import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
+from shadowpuppet.video.writer import FrameWriter, write_frames
+
+__all__ = ["IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "open_frames", "read_image",
+           "write_frames", "write_image"]
+
+
+def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | None = None,
+                rate: float | None = None) -> FrameSource:
+    """Open a film, a picture, a folder of pictures (in natural order), or a live camera (its number or `camera:N`).
+
+    `grey`: (H, W) frames; a film's are its own luma over 0..255, taken without decoding colours. `size`: frames are scaled to it.
+    `rate` (frames/s) replaces the times that the source tells; a folder tells them in `timestamps.txt` or `.csv` (seconds, one
+    a picture). Raises `VideoError` where nothing can be read. A film that breaks off or is damaged gives the frames before the
+    break, then a `ShadowPuppetWarning`.
+    """
+    if rate is not None and not (math.isfinite(rate) and rate > 0):
+        raise VideoError(f"{source}: rate: found {rate}, expected a positive number of frames/s")
+    if size is not None and min(size) < 1:
+        raise VideoError(f"{source}: size: found {size}, expected two positive numbers of pixels")
+    number, path = camera_number(source), Path(str(source))
+    if number is not None:
+        frames = open_camera(number, grey, rate)
+    elif not path.exists():
+        raise VideoError(f"{path}: no such film, picture or folder")
+    elif path.is_dir():
+        frames = open_folder(path, grey, rate)
+    elif path.suffix.lower() in IMAGE_SUFFIXES:
+        frames = open_picture(path, grey)
+    else:
+        frames = open_film(path, grey, rate)
+    return frames if size in (None, frames.size) else _scaled(frames, size)
+
+
+def camera_number(source: str | Path | int) -> int | None:
+    """The number of a live camera, given as it is or as `camera:N`; None for anything else."""
+    if isinstance(source, int):
+        return source
+    number = str(source).removeprefix("camera:")
+    return int(number) if number != str(source) and number.isdecimal() else None
+
+
+def _scaled(frames: FrameSource, size: Size) -> FrameSource:
+    import cv2
+
+    smaller = size[0] <= frames.size[0] and size[1] <= frames.size[1]
+    how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+
+    def read() -> Iterator[Frame]:
+        for time, image in frames:
+            yield Frame(time, np.asarray(cv2.resize(image, size, interpolation=how), np.uint8))
+
+    return replace(frames, size=size, read=read)

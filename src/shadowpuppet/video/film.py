@@ -1,0 +1,203 @@
+"""Films through PyAV: frames with their exact times, of a damaged film those before the break."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, reason, size_of
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+PLAIN_LUMA = re.compile(r"yuvj?4\d\dp|nv12|nv16|nv21|gray")
+"""Pixel formats whose first plane is the 8-bit luma."""
+FULL_RANGE = 2
+"""FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
+STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
+"""Video's usual luma range, 16..235, stretched to 0..255."""
+
+
+def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
+    """A film's frames; its first one is decoded to learn the size. Raises `VideoError`."""
+    with _opened(path) as (container, stream):
+        try:
+            first = next(_decoded(container, stream), None)
+        except _Break:
+            first = None
+        if first is None:
+            raise VideoError(f"{path}: no frame of it can be decoded ({stream.codec_context.name})")
+        size = size_of(_converter(grey)(first))
+        timed = first.pts is not None or first.dts is not None
+        told = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
+        duration, mean_rate = _declared_duration(container, stream), float(told or math.nan)
+        false = abs(stream.frames - duration * mean_rate) > 1 + 0.01 * stream.frames  # of an .mp4 whose writer was interrupted
+        count = None if false else stream.frames or None
+
+    def read() -> Iterator[Frame]:
+        return _frames(path, film, grey, rate)
+
+    film = FrameSource(str(path), size, rate or mean_rate, count, duration, read)
+    return film
+
+
+def _frames(path: Path, film: FrameSource, grey: bool, rate: float | None) -> Iterator[Frame]:
+    step = 1 / (film.rate if math.isfinite(film.rate) else ASSUMED_RATE)
+    clock, convert, n, time, broken = _Clock(path, step), _converter(grey), 0, -step, ""
+    with _opened(path) as (container, stream):
+        try:
+            for frame in _decoded(container, stream):
+                time, image = n / rate if rate else clock(frame), convert(frame)
+                check_size(path, n, time, image, film.size)
+                yield Frame(time, image)
+                n += 1
+        except _Break as cause:
+            broken = str(cause)
+    missing = film.duration - time - step > step / 2  # False where the duration is not a number
+    if not broken and missing and not rate and n != film.count:
+        broken = f"the file ends, {film.duration:.3f} s were announced"
+    if broken:
+        of = f" of {film.count}" if film.count else ""
+        warnings.warn(f"{path}: broken off at frame {n}{of} ({time + step:.3f} s): {broken}; the {n} frames before it are given",
+                      ShadowPuppetWarning, stacklevel=2)
+
+
+def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
+    if stream.duration is not None and stream.time_base is not None:
+        return float(stream.duration * stream.time_base)
+    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska's, for each stream
+    if tag:
+        return int(tag[1]) * 3600 + int(tag[2]) * 60 + float(tag[3])
+    alone = len(container.streams) == 1  # the container's own is that of its longest stream, maybe of sound
+    return container.duration / 1e6 if alone and container.duration else math.nan
+
+
+# Decoding
+
+
+class _Break(Exception):
+    """A film cannot be decoded beyond this point."""
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
+    import av
+    import av.error
+
+    try:
+        # "file:" and the white list: a name with a colon is no protocol, and a play list fetches nothing from elsewhere.
+        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
+    except (OSError, av.error.FFmpegError) as error:
+        raise VideoError(f"{path}: no film that can be read ({reason(error)}); an .mp4 that was cut off while being written "
+                         "lacks its index and cannot be played") from None
+    with container:
+        streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
+        if not streams or container.format.name == "tty":  # FFmpeg draws text files as pictures
+            raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
+        streams[0].thread_type = "AUTO"
+        yield container, streams[0]
+
+
+def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
+    """Frames in order of presentation; raises `_Break` after the last whole one where the film is damaged."""
+    import av.error
+
+    packets, broken = container.demux(stream), ""
+    while not broken:
+        try:
+            if (packet := next(packets, None)) is None:
+                return
+            frames = packet.decode()
+        except (OSError, av.error.FFmpegError) as error:
+            frames, broken = [], reason(error)
+            with contextlib.suppress(av.error.FFmpegError):
+                frames = stream.codec_context.decode(None)  # decoder threads still hold frames from before the break
+        for frame in frames:
+            if frame.is_corrupt:
+                raise _Break("a damaged picture")
+            yield frame
+    raise _Break(broken)
+
+
+class _Clock:
+    """Seconds after the first frame, increasing: the container's where they can be used, else filled in, with a warning."""
+
+    def __init__(self, path: Path, step: float) -> None:
+        self.path, self.step, self.told = path, step, False
+        self.zero, self.last, self.shift = None, -step, 0.0
+        self.last_dts, self.bad_pts, self.bad_dts = -math.inf, 0, 0
+
+    def __call__(self, frame: VideoFrame) -> float:
+        stamp, base = self._stamp(frame), frame.time_base
+        if stamp is None or base is None:
+            self._tell(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s")
+            self.last += self.step
+        else:
+            self.zero = stamp if self.zero is None else self.zero
+            self.last = self._increased((stamp - self.zero) * base.numerator / base.denominator + self.shift)
+        return self.last
+
+    def _stamp(self, frame: VideoFrame) -> int | None:
+        # As FFmpeg's "best effort": presentation times that went back more often than decoding times lose their credit.
+        if frame.dts is not None:
+            self.bad_dts += frame.dts <= self.last_dts
+            self.last_dts = frame.dts
+        usable = frame.pts is not None and (frame.dts is None or self.bad_pts <= self.bad_dts)
+        return frame.pts if usable else frame.dts
+
+    def _increased(self, time: float) -> float:
+        if time > self.last:
+            return time
+        self.bad_pts += 1
+        self._tell(self.last, "is followed by one that is not later; times are moved so that they increase")
+        if self.last - time < self.step:  # a stutter: the times after it are right again
+            return self.last + self.step / 2
+        self.shift += self.last + self.step - time  # a new start
+        return self.last + self.step
+
+    def _tell(self, time: float, what: str) -> None:
+        if not self.told:
+            warnings.warn(f"{self.path}: the frame at {time:.3f} s {what}", ShadowPuppetWarning, stacklevel=4)
+        self.told = True
+
+
+# Pixels
+
+
+def _converter(grey: bool) -> Callable[[VideoFrame], Image]:
+    """A function from decoded frames to upright (H, W, 3) or (H, W) arrays."""
+    import cv2
+    from av.video.reformatter import VideoReformatter
+
+    reformat = VideoReformatter().reformat  # one for the film: it keeps its tables from frame to frame
+
+    def convert(frame: VideoFrame) -> Image:
+        if grey and PLAIN_LUMA.fullmatch(frame.format.name):
+            image = _luma(frame)
+        else:
+            image = reformat(frame, format="bgr24").to_ndarray()
+            image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if grey else image
+        quarters = round(frame.rotation / 90) % 4  # counter-clockwise, as the camera was held
+        return np.ascontiguousarray(np.rot90(image, quarters) if quarters else image, np.uint8)
+
+    return convert
+
+
+def _luma(frame: VideoFrame) -> Image:
+    """The luma plane alone, (H, W), over 0..255: grey frames need no colour conversion."""
+    import cv2
+
+    plane = frame.planes[0]
+    luma = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)[:, : frame.width]  # rows are padded
+    full = frame.color_range == FULL_RANGE or frame.format.name.startswith(("yuvj", "gray"))
+    return luma.copy() if full else np.asarray(cv2.LUT(luma, STUDIO_TO_FULL), np.uint8)

@@ -1,0 +1,66 @@
+"""What a frame and a source of frames are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import VideoError
+
+Image = NDArray[np.uint8]
+"""A picture, of shape (H, W, 3), blue green red, or (H, W) grey, 0..255."""
+Size = tuple[int, int]
+"""Width and height, pixels."""
+
+ASSUMED_RATE = 30.0
+"""Frames/s where neither the source nor the caller says anything of time."""
+
+
+class Frame(NamedTuple):
+    """One picture and when it is shown."""
+
+    time: float
+    """Seconds after the source's first frame."""
+    image: Image
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """Frames in order of time; iterate as often as needed: each time from the start, a live camera from now."""
+
+    name: str
+    size: Size
+    """Width and height of the frames that it gives, pixels."""
+    rate: float
+    """Frames/s on average; not a number where unknown."""
+    count: int | None
+    """Number of frames where the container says it."""
+    duration: float
+    """Seconds where the container says it, else not a number."""
+    read: Callable[[], Iterator[Frame]] = field(repr=False)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read from the start."""
+        return self.read()
+
+
+def size_of(image: Image) -> Size:
+    """Width and height of a picture (H, W) or (H, W, 3)."""
+    return image.shape[1], image.shape[0]
+
+
+def check_size(name: object, n: int, time: float, image: Image, size: Size) -> None:
+    """Raise `VideoError` where frame `n` has another size than those before it."""
+    found = size_of(image)
+    if found != size:
+        raise VideoError(f"{name}: frame {n} ({time:.3f} s) is {found[0]} x {found[1]} pixels, those before it "
+                         f"{size[0]} x {size[1]}; all frames must have one size")
+
+
+def reason(error: BaseException) -> str:
+    """What an error of the system or a codec says, without its numbers and paths."""
+    return (getattr(error, "strerror", None) or str(error)).lower()

@@ -1,0 +1,65 @@
+"""Live cameras through OpenCV."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.video.frames import Frame, FrameSource, Image, check_size, size_of
+
+if TYPE_CHECKING:
+    from cv2 import VideoCapture
+
+
+def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
+    """A camera's frames as they come, timed by a monotonic clock; `rate` is asked of the camera. Raises `VideoError`."""
+    import cv2
+
+    capture, first = _opened(number, rate)
+    told = capture.get(cv2.CAP_PROP_FPS)
+    ready, size = [capture], size_of(first)  # opening takes a second: the first reader takes over what learnt the size
+
+    def read() -> Iterator[Frame]:
+        return _frames(ready.pop() if ready else _opened(number, rate)[0], number, grey, size)
+
+    return FrameSource(f"camera:{number}", size, told if told > 0 else math.nan, None, math.nan, read)
+
+
+def _opened(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
+    import cv2
+
+    capture = cv2.VideoCapture(number)
+    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # pictures that waited would be stamped late
+    if rate:
+        capture.set(cv2.CAP_PROP_FPS, rate)
+    good, image = capture.read() if capture.isOpened() else (False, None)
+    if not good or image is None:
+        capture.release()
+        raise VideoError(f"camera {number}: gives no picture; is it connected, and not in use by another program?")
+    return capture, np.asarray(image, np.uint8)
+
+
+def _frames(capture: VideoCapture, number: int, grey: bool, size: tuple[int, int]) -> Iterator[Frame]:
+    import cv2
+
+    start, n = math.nan, 0
+    try:
+        while capture.grab():
+            now = time.monotonic()  # before decoding, which takes its time
+            start = now if n == 0 else start
+            good, image = capture.retrieve()
+            if not good:
+                break
+            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if grey and image.ndim == 3 else image, np.uint8)
+            check_size(f"camera {number}", n, now - start, image, size)
+            yield Frame(now - start, image)
+            n += 1
+    finally:
+        capture.release()
+    warnings.warn(f"camera {number}: gave no more pictures after {n}", ShadowPuppetWarning, stacklevel=2)

@@ -1,0 +1,109 @@
+"""Picture files, alone and in folders."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import re
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, choices
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, reason, size_of
+
+IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
+
+
+def read_image(path: str | Path, grey: bool = False) -> Image:
+    """A picture file, (H, W, 3) blue green red or (H, W) grey, 8 bit, upright as its EXIF data say. Raises `VideoError`."""
+    import cv2
+
+    try:
+        data = np.frombuffer(Path(path).read_bytes(), np.uint8)  # cv2.imread cannot open every name on every system
+        image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) if data.size else None
+    except OSError as error:
+        raise VideoError(f"{path}: the picture cannot be read ({reason(error)})") from None
+    except cv2.error:
+        image = None
+    if image is None:
+        raise VideoError(f"{path}: not a picture that can be read (damaged, or none of {choices(IMAGE_SUFFIXES)})")
+    return np.asarray(image, np.uint8)
+
+
+def write_image(path: str | Path, image: Image) -> None:
+    """Write a picture (H, W, 3) blue green red or (H, W) grey, 8 bit; the name's ending says the format. Raises `VideoError`."""
+    import cv2
+
+    path = Path(path)
+    if path.suffix.lower() not in IMAGE_SUFFIXES:
+        raise VideoError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(IMAGE_SUFFIXES)}")
+    check_image(path, image)
+    part = path.with_name(f"{path.stem}.part{path.suffix}")  # a picture is whole or not there
+    try:
+        part.write_bytes(cv2.imencode(path.suffix.lower(), image)[1].tobytes())
+        os.replace(part, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise VideoError(f"{path}: the picture cannot be written ({reason(error)})") from None
+
+
+def check_image(path: Path, image: Image) -> None:
+    """Raise `VideoError` where an array is no picture that can be written."""
+    found = np.asarray(image)
+    if found.dtype != np.uint8 or found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] != 3) or not found.size:
+        raise VideoError(f"{path}: found a picture of {found.dtype}, shape {found.shape}; expected uint8, (H, W, 3) or (H, W)")
+
+
+def open_picture(path: Path, grey: bool) -> FrameSource:
+    """One picture as a source of one frame."""
+    size = size_of(read_image(path, grey))
+    return FrameSource(str(path), size, math.nan, 1, math.nan, lambda: iter([Frame(0.0, read_image(path, grey))]))
+
+
+def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
+    """A folder's pictures in natural order. Raises `VideoError`."""
+    paths = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES and p.name[0] != "."), key=_natural)
+    if not paths:
+        raise VideoError(f"{folder}: no pictures in this folder (endings looked for: {choices(IMAGE_SUFFIXES)})")
+    size, n = size_of(read_image(paths[0], grey)), len(paths)
+    stamps = None if rate else next((p for p in (folder / "timestamps.txt", folder / "timestamps.csv") if p.exists()), None)
+    times = np.arange(n) / (rate or ASSUMED_RATE) if stamps is None else _read_times(stamps, n)
+    mean_rate = float((n - 1) / times[-1]) if n > 1 else math.nan
+    assumed = stamps is None and rate is None and n > 1
+
+    def read() -> Iterator[Frame]:
+        if assumed:
+            warnings.warn(f"{folder}: no timestamps.txt in it and no rate given: {ASSUMED_RATE:g} frames/s are assumed",
+                          ShadowPuppetWarning, stacklevel=2)
+        for i, (time, path) in enumerate(zip(times.tolist(), paths)):
+            image = read_image(path, grey)
+            check_size(path, i, time, image, size)
+            yield Frame(time, image)
+
+    return FrameSource(str(folder), size, mean_rate, n, n / mean_rate, read)
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sort key that puts 2 before 10."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())]
+
+
+def _read_times(path: Path, count: int) -> NDArray[np.float64]:
+    """Times (count,), seconds after the first: a number a line, or the first column of a table; a heading may stand above."""
+    try:
+        lines = [line.strip() for line in path.read_text("utf-8-sig").splitlines() if line.strip()]
+        cells = [re.split(r"[,;\s]", line)[0] for line in lines]
+        times = np.array(cells[1:] if cells and not re.match(r"[-+.\d]", cells[0]) else cells, float)
+    except (OSError, ValueError) as error:
+        raise VideoError(f"{path}: expected one time in seconds a line ({error})") from None
+    if len(times) != count:
+        raise VideoError(f"{path}: found {len(times)} times for {count} pictures, expected one for each")
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise VideoError(f"{path}: found times that are not finite or not later than the one before, expected increasing seconds")
+    return times - times[0]

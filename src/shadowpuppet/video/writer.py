@@ -1,0 +1,143 @@
+"""Films written so that an interrupted one can be played."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from shadowpuppet.errors import VideoError
+from shadowpuppet.video.frames import Image, Size, reason, size_of
+from shadowpuppet.video.pictures import check_image
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+
+BT601, STUDIO_RANGE = 6, 1
+"""FFmpeg's AVCOL_SPC_SMPTE170M and AVCOL_RANGE_MPEG: how colours are turned to video, said so that players need not guess."""
+
+
+def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False) -> FrameWriter:
+    """Write a film of `rate` frames/s: `with write_frames("film.mp4", 25) as film: film.write(image)`.
+
+    H.264 (.mp4, .mov, .mkv; odd sizes get their last row or column twice), or with `lossless` FFV1 (.mkv; grey or in colour as
+    the first picture is). The film grows under the name `<name>.part.<ending>` and gets its own when all went well; what an
+    interrupted one has can be played from there. Raises `VideoError` where it cannot be written (no such folder, disk full, no
+    frames).
+    """
+    path, endings = Path(path), [".mkv"] if lossless else [".mkv", ".mov", ".mp4"]
+    if path.suffix not in endings:
+        kind = "lossless film" if lossless else "film"
+        raise VideoError(f"{path}: found the ending {path.suffix!r}, a {kind} is written to {' or '.join(endings)}")
+    if not 0.01 <= rate <= 10_000:
+        raise VideoError(f"{path}: rate: found {rate}, expected 0.01 to 10000 frames/s")
+    return FrameWriter(path, rate, size, lossless)
+
+
+class FrameWriter:
+    """A film being written: a context manager with `write`. Made by `write_frames`."""
+
+    def __init__(self, path: Path, rate: float, size: Size | None, lossless: bool) -> None:
+        """Nothing is written before the first picture."""
+        self.path, self.partial = path, path.with_name(f"{path.stem}.part{path.suffix}")
+        self.rate, self.size, self.lossless = Fraction(rate).limit_denominator(1001), size, lossless
+        self.count = 0
+        self._shape: tuple[int, ...] = ()
+        self._container: Any = None
+        self._stream: Any = None
+        self._sound = False
+
+    def __enter__(self) -> Self:
+        """Use it in a `with` block."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Finish the film; after an error what there is stays under its partial name, and the error goes on."""
+        if kind is not None:
+            with contextlib.suppress(VideoError), self._told():
+                self._close()
+            return
+        if self._container is None:
+            raise VideoError(f"{self.path}: no frame was given, so no film was written")
+        with self._told():
+            self._close()
+            os.replace(self.partial, self.path)
+
+    def write(self, image: Image) -> None:
+        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, of the first one's shape; it is scaled to `size`."""
+        check_image(self.path, image)
+        image = self._fitted(image)
+        with self._told():
+            if self._container is None:
+                self._open(image)
+            self._encode(self._frame(image))
+        self.count += 1
+
+    def _fitted(self, image: Image) -> Image:
+        import cv2
+
+        if self.size is not None and size_of(image) != self.size:
+            image = np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), np.uint8)
+        self._shape = self._shape or image.shape
+        if image.shape != self._shape:
+            raise VideoError(f"{self.path}: picture {self.count} has the shape {image.shape}, those before it {self._shape}")
+        if not self.lossless:  # H.264 with halved colours knows even sizes only
+            image = np.pad(image, [(0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)][: image.ndim], "edge")
+        return np.ascontiguousarray(image)
+
+    def _frame(self, image: Image) -> VideoFrame:
+        import av
+
+        frame = av.VideoFrame.from_ndarray(image, format="gray" if image.ndim == 2 else "bgr24")
+        frame.pts, frame.time_base = self.count, 1 / self.rate
+        return frame
+
+    def _open(self, image: Image) -> None:
+        import av
+
+        # What is written so far can be read at any time, even after a kill: short fragments or clusters, flushed.
+        options = {"cluster_time_limit": "1000"} if self.path.suffix == ".mkv" else {"movflags": "hybrid_fragmented"}
+        self._container = container = av.open(f"file:{self.partial}", "w", options={**options, "flush_packets": "1"})
+        if self.lossless:
+            codec, settings = "ffv1", {"level": "3", "slicecrc": "1", "g": "1"}
+        else:
+            codec, settings = "libx264", {"preset": "veryfast", "crf": "18", "bf": "0", "g": str(max(1, round(self.rate)))}
+        stream: Any = container.add_stream(codec, rate=self.rate, options=settings)
+        stream.width, stream.height = size_of(image)
+        stream.pix_fmt = "yuv420p" if not self.lossless else "gray" if image.ndim == 2 else "bgr0"
+        stream.codec_context.time_base = 1 / self.rate
+        if not self.lossless:
+            stream.codec_context.colorspace, stream.codec_context.color_range = BT601, STUDIO_RANGE
+        self._stream = stream
+        container.start_encoding()  # creates the file: what stands in its way shows now, not many pictures later
+
+    def _encode(self, frame: VideoFrame | None) -> None:
+        self._sound = False  # FFmpeg crashes where more is written to a film after a failure
+        self._container.mux(self._stream.encode(frame))
+        self._sound = True
+
+    def _close(self) -> None:
+        if self._container is None:
+            return
+        try:
+            if self._sound:
+                self._encode(None)
+        finally:
+            self._container.close()
+            self._container = None
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        import av.error
+        from av.codec.codec import UnknownCodecError
+
+        try:
+            yield
+        except (OSError, av.error.FFmpegError, UnknownCodecError) as error:
+            kept = f"; what was written so far is in {self.partial.name}" if self.count else ""
+            raise VideoError(f"{self.path}: the film cannot be written ({reason(error)}){kept}") from None
