@@ -1,0 +1,141 @@
+"""From postures to joints and segment frames: the mannequin's own kinematics, ball joints turned by rotation vectors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.mannequin import JOINTS, Mannequin
+
+ARM = ("side", "front", "roll", "elbow", "supination", "wrist_flex", "wrist_side", "shrug", "protract", "curl")
+CHANNELS = ("turn", "sway_x", "sway_y", "pelvis_bow", "pelvis_side", "pelvis_twist", "spine_bow", "spine_side", "spine_twist",
+            "head_nod", "head_tilt", "head_turn", *(f"{side}_{name}" for side in ("left", "right") for name in ARM))
+"""Columns of a posture array, rad (sway: m; curl: 0 open, 1 fist).
+
+`*_bow`, `*_side`, `*_twist` are components of a joint's rotation vector: forward, to the person's left, turning left. An upper arm
+starts hanging; (`front`, `side`) is its swing as a rotation vector, `roll` turns it about itself (positive outward),
+`elbow` bends it, `supination` turns the palm up. `turn` turns the whole figure to its left.
+"""
+SEGMENTS = ("pelvis", "abdomen", "thorax", "neck", "head", *(f"{side}_{name}" for side in ("left", "right") for name in
+            ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")))
+MIRROR = np.array([1.0, -1.0, -1.0])
+HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
+
+
+class Figure(NamedTuple):
+    """A mannequin in T postures."""
+
+    joints: Array
+    """Joint centres in the order of `JOINTS`, of shape (T, 17, 3), metres, world."""
+    rotation: Array
+    """Segment frames in the order of `SEGMENTS`, of shape (T, S, 3, 3), segment to world; identity in the T-pose."""
+    origin: Array
+    """Where each segment's proximal joint lies, of shape (T, S, 3), metres, world."""
+    curl: Array
+    """How far the fingers of the left and right hand are bent, of shape (T, 2), 0 to 1."""
+
+
+def turns(*vector: Array) -> Array:
+    """Rotation matrices (T, 3, 3) of rotation vectors given by their components (T,)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(np.stack(np.broadcast_arrays(*vector), -1)).as_matrix()
+
+
+def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
+    """The figure of `body` in `postures` (T, `CHANNELS`), its feet planted about the world's origin.
+
+    stance: half the distance between the ankles, as a fraction of the leg's length. Feet stay where they are: the pelvis sinks
+    as far as both legs need, and hips and knees follow from its place.
+    """
+    q = dict(zip(CHANNELS, np.asarray(postures, float).T))
+    rest = body.rest()
+    joint: dict[str, Array] = {}
+    frame: dict[str, tuple[Array, Array]] = {}
+    yaw = turns(0 * q["turn"], 0 * q["turn"], q["turn"])
+    pelvis = yaw @ turns(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
+    joint["pelvis"] = _legs(body, q, yaw, pelvis, stance, joint, frame)
+    frame["pelvis"] = pelvis, joint["pelvis"]
+    half = turns(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
+    abdomen, thorax = pelvis @ half, pelvis @ half @ half
+    lumbar = joint["pelvis"] + pelvis @ (rest["lumbar"] - rest["pelvis"])
+    thoracic = lumbar + abdomen @ (rest["thoracic"] - rest["lumbar"])
+    joint["neck"] = thoracic + thorax @ (rest["neck"] - rest["thoracic"])
+    nod = turns(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
+    neck, head = thorax @ nod, thorax @ nod @ nod
+    joint["head"] = joint["neck"] + neck @ (rest["head"] - rest["neck"])
+    frame |= dict(abdomen=(abdomen, lumbar), thorax=(thorax, thoracic), neck=(neck, joint["neck"]), head=(head, joint["head"]))
+    for side in ("left", "right"):
+        _arm(rest, q, side, thorax, thoracic, joint, frame)
+    return Figure(np.stack([joint[name] for name in JOINTS], 1), np.stack([frame[name][0] for name in SEGMENTS], 1),
+                  np.stack([frame[name][1] for name in SEGMENTS], 1), np.stack([q["left_curl"], q["right_curl"]], 1))
+
+
+def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
+    """Clavicle, upper arm, forearm and hand of one side.
+
+    The clavicle rises by 0.13 of what the arm is raised beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig
+    et al. 2009): shoulders are not fixed to the chest.
+    """
+    mirror = np.ones(3) if side == "left" else MIRROR
+
+    def about(x: Array | float, y: Array | float, z: Array | float) -> Array:
+        return turns(*(m * np.asarray(v) + 0 * q["turn"] for m, v in zip(mirror, (x, y, z))))
+
+    arm = {name: q[f"{side}_{name}"] for name in ARM}
+    at = {name: rest[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
+    raised = np.hypot(arm["side"], arm["front"])
+    soft = 0.15 * np.logaddexp(0, (raised - 0.44) / 0.15)
+    clavicle = thorax @ about(0, -(0.13 * soft + arm["shrug"]), -(0.12 * np.maximum(arm["front"], 0) + arm["protract"]))
+    hanging = HANGING if side == "left" else HANGING.T
+    upper = thorax @ about(-arm["front"], -arm["side"], 0) @ hanging @ about(-arm["roll"], 0, 0)
+    fore = upper @ about(0, 0, -arm["elbow"])
+    half, full = (fore @ about(-arm["supination"] * share, 0, 0) for share in (0.5, 1.0))
+    hand = full @ about(0, arm["wrist_flex"], 0) @ about(0, 0, -arm["wrist_side"])
+    sternum = thoracic + thorax @ (at["clavicle"] - rest["thoracic"])
+    shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
+    elbow = shoulder + upper @ (at["elbow"] - at["shoulder"])
+    wrist = elbow + fore @ (at["wrist"] - at["elbow"])
+    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist,
+              f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"])}
+    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (half, elbow),
+              f"{side}_hand": (hand, wrist)}
+
+
+def _legs(body: Mannequin, q: dict, yaw: Array, pelvis: Array, stance: float, joint: dict, frame: dict) -> Array:
+    """The pelvis' centre (T, 3) over planted feet; fills in both legs by two-bone inverse kinematics, knees forward."""
+    thigh, shank = body.length("thigh"), body.length("shank")
+    rest = body.rest()
+    ankles, hips = {}, {}
+    for side, sign in (("left", 1), ("right", -1)):
+        ankles[side] = yaw @ np.array([sign * stance * (thigh + shank), 0, rest[f"{side}_ankle"][2]])
+        hips[side] = pelvis @ (rest[f"{side}_hip"] - rest["pelvis"])
+    sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
+    span = 0.997 * (thigh + shank)
+    heights = [ankles[s][:, 2] - hips[s][:, 2] + np.sqrt(span**2 - ((sway + hips[s] - ankles[s])[:, :2] ** 2).sum(1)) for s in hips]
+    centre = sway + np.minimum(*heights)[:, None] * [0, 0, 1]
+    for side in ("left", "right"):
+        hip, ankle = centre + hips[side], ankles[side]
+        down = ankle - hip
+        reach = np.linalg.norm(down, axis=1, keepdims=True)
+        down /= reach
+        ahead = yaw @ np.array([0.0, -1.0, 0.0])
+        ahead -= (ahead * down).sum(1, keepdims=True) * down
+        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+        cosine = np.clip((thigh**2 + reach**2 - shank**2) / (2 * thigh * reach), -1, 1)
+        knee = hip + thigh * (cosine * down + np.sqrt(1 - cosine**2) * ahead)
+        joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
+        frame |= {f"{side}_thigh": (_upright(hip - knee, ahead), hip), f"{side}_shank": (_upright(knee - ankle, ahead), knee),
+                  f"{side}_foot": (yaw @ turns(*np.zeros((2, 1)), np.array([0.12 if side == "left" else -0.12])), ankle)}
+    return centre
+
+
+def _upright(up: Array, ahead: Array) -> Array:
+    """Frames (T, 3, 3) whose z points along `up` and whose -y looks `ahead`, both (T, 3)."""
+    z = up / np.linalg.norm(up, axis=1, keepdims=True)
+    x = np.cross(-ahead, z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], -1)

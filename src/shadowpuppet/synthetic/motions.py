@@ -1,0 +1,218 @@
+"""Motions as data: key postures over time, joined smoothly, with what no person can suppress on top.
+
+A gesture is a function of its length (s) and a generator that returns key postures `(time, {channel: value})`; channels it
+does not name rest. All time is continuous: the same spec at another frame rate is the same motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.kinematics import ARM, CHANNELS
+
+Posture = dict[str, float]
+Keys = list[tuple[float, Posture]]
+
+LEAD, TAIL = 0.8, 0.8
+"""Seconds of standing before the first gesture and for lowering the arms after the last."""
+
+
+def both(**degrees: float) -> Posture:
+    """The same arm channels on both sides, degrees."""
+    return left(**degrees) | right(**degrees)
+
+
+def left(**degrees: float) -> Posture:
+    """Channels of the left arm, degrees."""
+    return {f"left_{name}": float(np.radians(value)) for name, value in degrees.items()}
+
+
+def right(**degrees: float) -> Posture:
+    """Channels of the right arm, degrees."""
+    return {f"right_{name}": float(np.radians(value)) for name, value in degrees.items()}
+
+
+def trunk(**degrees: float) -> Posture:
+    """Channels of pelvis, spine and head, degrees."""
+    return {name: float(np.radians(value)) for name, value in degrees.items()}
+
+
+STANDING = both(side=9, front=2, elbow=14, supination=8, wrist_flex=4, curl=20)
+LEVEL = both(side=90)
+T_POSE = both(side=90, elbow=3, curl=3)
+HANGING_ARMS = both(side=7, elbow=5, curl=12)
+
+
+def stand(seconds: float, rng: np.random.Generator) -> Keys:
+    """Standing with the arms hanging."""
+    return [(seconds / 2, {})]
+
+
+def wave_hands(seconds: float, rng: np.random.Generator) -> Keys:
+    """'Wave hands' of Liu 2011, Fig. 10: upper arms level, forearms up, waving to the sides in the frontal plane."""
+    period, keys = rng.uniform(0.95, 1.25), [(0.9, both(side=84, roll=84, elbow=86))]
+    phase = rng.uniform(0.2, 0.5)
+    for n, t in enumerate(np.arange(0.9 + period / 2, seconds - 0.3, period / 2)):
+        out, back = rng.uniform(35, 52), rng.uniform(92, 112)
+        bends = (out, back) if n % 2 else (back, out)
+        keys.append((float(t), left(side=rng.uniform(80, 96), roll=rng.uniform(76, 92), elbow=bends[0])
+                     | right(side=rng.uniform(80, 96), roll=rng.uniform(76, 92), elbow=bends[1] * (1 - phase) + bends[0] * phase)))
+    return keys
+
+
+def _swings(seconds: float, rng: np.random.Generator, ends: Sequence[Posture], between: Posture, period: float) -> Keys:
+    """From one end to the other and back through `between`, as often as the time allows."""
+    keys = [(0.8, between)]
+    count = max(1, round((seconds - 1.2) / period)) * len(ends)
+    each = (seconds - 1.2) / count
+    for n in range(count):
+        vary = rng.uniform(0.85, 1.1)
+        end = {name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()}
+        keys.append((0.8 + (n + rng.uniform(0.45, 0.6)) * each, between | end))
+    return [*keys, (seconds - 0.3, between)]
+
+
+def bend_aside(seconds: float, rng: np.random.Generator) -> Keys:
+    """'Bend aside' of Liu 2011, Fig. 11: arms level, the trunk bends to one side and the other."""
+    ends = [trunk(spine_side=sign * 26, pelvis_side=sign * 5, head_tilt=sign * 4) | {"sway_x": -0.03 * sign} for sign in (1, -1)]
+    return _swings(seconds, rng, ends, T_POSE, 3.2)
+
+
+def bow_forward(seconds: float, rng: np.random.Generator) -> Keys:
+    """'Bow forward' of Liu 2011, Fig. 12: arms level, the trunk bows toward the camera."""
+    return _swings(seconds, rng, [trunk(spine_bow=30, pelvis_bow=24, head_nod=10) | {"sway_y": 0.06}], T_POSE, 3.0)
+
+
+def twist(seconds: float, rng: np.random.Generator) -> Keys:
+    """Arms level, the trunk turns to the left and the right."""
+    ends = [trunk(spine_twist=sign * 32, pelvis_twist=sign * 14, head_turn=sign * 6) for sign in (1, -1)]
+    return _swings(seconds, rng, ends, T_POSE, 3.2)
+
+
+def reach(seconds: float, rng: np.random.Generator) -> Keys:
+    """The left hand toward the camera, then the right, then both."""
+    third, keys = seconds / 3, []
+    for n, arms in enumerate((left, right, both)):
+        aim = arms(front=rng.uniform(74, 90), side=rng.uniform(-4, 14), elbow=rng.uniform(4, 22), supination=rng.uniform(0, 40), curl=15)
+        turn = trunk(spine_twist=(-8, 8, 0)[n], spine_bow=3)
+        keys += [(third * (n + 0.42), aim | turn), (third * (n + 0.66), {**aim, **turn}), (third * (n + 0.98), {})]
+    return keys
+
+
+def forearms_up(seconds: float, rng: np.random.Generator) -> Keys:
+    """Elbows beside the body, forearms raised and lowered, hands toward the shoulders."""
+    up, down = both(side=18, front=12, elbow=120, supination=60), both(side=14, front=14, elbow=70, supination=50)
+    return _swings(seconds, rng, [up], down, 1.8)
+
+
+def overhead(seconds: float, rng: np.random.Generator) -> Keys:
+    """Arms raised over the sides above the head and lowered again."""
+    return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
+
+
+LIMITS = {"spine_bow": (-6, 28), "spine_side": (-20, 20), "spine_twist": (-28, 28), "pelvis_bow": (-2, 14), "pelvis_twist": (-10, 10),
+          "head_nod": (-15, 22), "head_tilt": (-12, 12), "head_turn": (-40, 40), "side": (2, 135), "front": (-18, 100), "roll": (-25, 75),
+          "elbow": (6, 125), "supination": (-30, 70), "wrist_flex": (-30, 35), "wrist_side": (-12, 15), "curl": (0, 40)}
+"""Ranges of `random` motion, degrees: inside what healthy adults reach (Boone & Azen 1979)."""
+
+
+def random(seconds: float, rng: np.random.Generator) -> Keys:
+    """Smooth random motion of the upper body within `LIMITS`, below about 0.6 Hz, with pauses."""
+    step = 0.16
+    t = np.arange(0.7, max(seconds - 0.3, 0.9), step)
+    pace = np.clip(1.4 + 1.6 * band_noise(t, 0.25, rng), 0.0, 1.6)
+    own = np.cumsum(pace) * step
+    columns = {}
+    for name, (low, high) in LIMITS.items():
+        for channel in (f"left_{name}", f"right_{name}") if name in ARM else (name,):
+            share = 0.5 + 0.5 * np.tanh(1.1 * band_noise(own, 0.45, rng))
+            columns[channel] = np.radians(low + (high - low) * share)
+    for side in ("left", "right"):
+        _bounded_swing(columns, side)
+    return [(float(when), {name: float(values[n]) for name, values in columns.items()}) for n, when in enumerate(t)]
+
+
+def _bounded_swing(columns: dict[str, Array], side: str) -> None:
+    """Keep the arm's swing under 140 degrees, and a bent forearm from being turned into the chest."""
+    lateral, forward = columns[f"{side}_side"], columns[f"{side}_front"]
+    size = np.hypot(lateral, forward)
+    shrink = np.minimum(1, np.radians(140) / np.maximum(size, 1e-6))
+    columns[f"{side}_side"], columns[f"{side}_front"] = lateral * shrink, forward * shrink
+    bent, low = columns[f"{side}_elbow"] / np.radians(125), np.clip(1 - size / np.radians(70), 0, 1)
+    columns[f"{side}_roll"] = columns[f"{side}_roll"] + bent * low * np.radians(40)
+
+
+MOTIONS: dict[str, Callable[[float, np.random.Generator], Keys]] = {
+    f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)}
+"""All gestures by name."""
+
+RESTLESS = {"sway_x": (0.006, 0.35), "sway_y": (0.006, 0.35), "spine_bow": (0.8, 0.4), "spine_side": (0.8, 0.4), "spine_twist": (1.0, 0.4),
+            "head_nod": (2.5, 0.4), "head_tilt": (2.0, 0.4), "head_turn": (4.0, 0.35), "side": (1.2, 0.7), "front": (1.2, 0.7), "roll": (1.5, 0.7),
+            "elbow": (1.8, 0.7), "supination": (4.0, 0.5), "wrist_flex": (4.0, 0.6), "wrist_side": (2.0, 0.6), "shrug": (1.0, 0.3),
+            "protract": (1.5, 0.3), "curl": (5.0, 0.4)}
+"""Size (degrees; sway in metres) and highest frequency (Hz) of involuntary motion by channel."""
+TREMOR = {"side": 0.25, "front": 0.25, "elbow": 0.35, "wrist_flex": 0.5, "head_nod": 0.15, "spine_side": 0.08}
+"""Size, degrees, of the faster part, up to 5 Hz."""
+
+
+def band_noise(t: Array, highest: float, rng: np.random.Generator, terms: int = 14) -> Array:
+    """Smooth noise of unit variance at times `t` (s) with frequencies up to `highest` (Hz): a random Fourier series."""
+    frequency, phase = rng.uniform(0.12, 1, terms) * highest, rng.uniform(0, 2 * np.pi, terms)
+    return np.sqrt(2 / terms) * np.cos(2 * np.pi * np.multiply.outer(t, frequency) + phase).sum(-1)
+
+
+def involuntary(t: Array, rng: np.random.Generator) -> Array:
+    """Sway, breathing, restlessness and tremor at times `t` (T,), of shape (T, `CHANNELS`)."""
+    total = np.zeros((len(t), len(CHANNELS)))
+    for column, channel in enumerate(CHANNELS):
+        name = channel.split("_", 1)[1] if channel.startswith(("left_", "right_")) else channel
+        size, highest = RESTLESS.get(name, (0.0, 1.0))
+        size = size if name.startswith("sway") else np.radians(size)
+        total[:, column] = size * band_noise(t, highest, rng) + np.radians(TREMOR.get(name, 0.0)) * band_noise(t, 5.0, rng)
+        total[:, column] += np.radians(0.4) * np.sin(2 * np.pi * 0.25 * t) if name in ("shrug", "spine_bow") else 0.0
+    return total
+
+
+def compose(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
+    """Postures (T, `CHANNELS`) at times `t` (s) of gestures `(name, seconds)` one after another.
+
+    Key postures are joined by shape-preserving cubics and rounded over 0.1 s; the first stands `LEAD` seconds, and the arms are
+    lowered `TAIL` seconds after the last. still: factor on the involuntary part (0: a robot).
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    begin, keys = LEAD, [(0.0, {}), (0.5 * LEAD, {})]
+    for name, seconds in gestures:
+        keys += [(begin + when, posture) for when, posture in MOTIONS[name](seconds, rng)]
+        begin += seconds
+    keys += [(begin + TAIL, {}), (begin + TAIL + 1, {})]
+    table = np.zeros((len(keys), len(CHANNELS)))
+    for row, (_, posture) in zip(table, keys):
+        for name, value in (STANDING | posture).items():
+            row[CHANNELS.index(name)] = value
+    path = PchipInterpolator([when for when, _ in keys], table)
+    window = np.linspace(-1, 1, 9)
+    weight = np.exp(-2 * window**2) / np.exp(-2 * window**2).sum()
+    smooth = sum(w * path(np.clip(t + 0.16 * x, 0, None)) for w, x in zip(weight, window))
+    postures = smooth + still * involuntary(t, rng)
+    for side in ("left", "right"):
+        for name, (low, high) in {"curl": (0.0, 1.5), "elbow": (0.02, 2.5)}.items():
+            column = CHANNELS.index(f"{side}_{name}")
+            postures[:, column] = np.clip(postures[:, column], low, high)
+    return postures
+
+
+def duration(gestures: Sequence[tuple[str, float]]) -> float:
+    """Seconds from the first to the last picture of gestures `(name, seconds)`."""
+    return LEAD + sum(seconds for _, seconds in gestures) + TAIL
+
+
+def posture(**named: float) -> Array:
+    """One posture (1, `CHANNELS`) of named channels, rad; all others 0: the reference postures hold still."""
+    q = np.zeros((1, len(CHANNELS)))
+    for name, value in named.items():
+        q[0, CHANNELS.index(name)] = value
+    return q

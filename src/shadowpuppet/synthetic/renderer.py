@@ -1,0 +1,89 @@
+"""Pictures of the mannequin: exact silhouettes and shaded, anti-aliased images by sphere tracing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.synthetic.kinematics import Figure
+from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.surface import GROUPS, MATERIALS, Clothes, Surface
+
+OFFSETS = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
+"""Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
+
+
+class Shot(NamedTuple):
+    """What the camera sees of the person alone."""
+
+    mask: np.ndarray
+    """Exact silhouette at pixel centres, of shape (H, W), uint8, 0 or 255."""
+    picture: Array
+    """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
+    alpha: Array
+    """Share of each pixel that the person covers, of shape (H, W)."""
+
+
+class Renderer:
+    """Draws one person with one camera: rays and tiles are prepared once."""
+
+    def __init__(self, camera: Camera, surface: Surface, clothes: Clothes, lights: Array) -> None:
+        """lights: (3, 4), unit directions toward the two lamps and their strength; the third row's strength is the ambient light."""
+        from shadowpuppet.synthetic._tracing import TILE
+
+        width, height = camera.size
+        R = inverse(camera.T_camera_world)[:3, :3]
+        self.camera, self.surface, self.lights = camera, surface, lights
+        self.colours = np.array([clothes.colours.get(name, (0.5, 0.5, 0.5)) for name in MATERIALS])
+        self.stripes = clothes.stripes
+        self.rays = _unit(camera.rays(np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)) @ R.T)
+        self.across, down = -(-width // TILE), -(-height // TILE)
+        corner = np.stack(np.meshgrid(np.arange(self.across + 1), np.arange(down + 1)), -1) * float(TILE) - 0.5
+        corners = _unit(camera.rays(corner) @ R.T)
+        corners = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]])
+        self.direction = _unit(corners.mean(0)).reshape(-1, 3)
+        angle = np.arccos(np.clip((corners.reshape(4, -1, 3) * self.direction).sum(-1).min(0), -1, 1)) * 1.05
+        self.sine, self.cosine = np.sin(angle), np.cos(angle)
+
+    def draw(self, figure: Figure, index: int) -> Shot:
+        """The figure's posture `index`."""
+        from shadowpuppet.synthetic import _tracing
+
+        s, width, height = self.surface, *self.camera.size
+        R, o = figure.rotation[index, s.segment], figure.origin[index, s.segment]
+        axes, origin = np.ascontiguousarray(R @ s.frame), o + (R @ s.start[..., None])[..., 0]
+        spheres = _covering(origin, axes, s)
+        middle = origin + axes[:, :, 2] * (s.size[:, 0] / 2)[:, None]
+        reach = s.size[:, 0] / 2 + s.size[:, 5] + s.size[:, 1:3].max(1)
+        eye = self.camera.centre
+        lists = np.zeros((len(self.direction), len(origin) + 1), np.int64)
+        span = np.zeros((len(self.direction), 2))
+        _tracing.list_parts(self.direction, self.sine, self.cosine, eye, spheres, lists, span)
+        depth, alpha, picture = np.zeros((height, width)), np.zeros((height, width)), np.zeros((height, width, 3))
+        _tracing.render(eye, self.rays, self.across, lists, span, origin, axes, s.table, s.size, s.code, middle, reach,
+                        self._joins(figure, index), self.colours, self.lights, self.stripes, OFFSETS, depth, picture, alpha)
+        return Shot(np.where(depth < _tracing.FAR, 255, 0).astype(np.uint8), picture, alpha)
+
+    def _joins(self, figure: Figure, index: int) -> Array:
+        """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""
+        names = [JOINTS.index(name) for name in ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")]
+        assert len(names) == len(GROUPS)
+        scale = np.linalg.norm(figure.joints[index, JOINTS.index("neck")] - figure.joints[index, JOINTS.index("pelvis")]) / 0.55
+        return np.column_stack([figure.joints[index, names], np.array([0.15, 0.15, 0.15, 0.22, 0.22]) * scale])
+
+
+def _unit(v: Array) -> Array:
+    return np.ascontiguousarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
+def _covering(origin: Array, axes: Array, s: Surface, count: int = 4) -> Array:
+    """Spheres (P, count, 4) that cover each part with its caps and half its blend."""
+    low, high = -s.size[:, 1], s.size[:, 0] + s.size[:, 2]
+    step = (high - low) / count
+    along = low[:, None] + step[:, None] * (np.arange(count) + 0.5)
+    centres = origin[:, None] + axes[:, None, :, 2] * along[..., None]
+    radius = np.hypot(s.size[:, 5], step / 2) + 0.5 * s.size[:, 3] + 0.005
+    return np.concatenate([centres, np.broadcast_to(radius[:, None, None], (*along.shape, 1))], -1)

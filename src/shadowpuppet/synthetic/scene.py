@@ -1,0 +1,132 @@
+"""The place: a textured room, its lamps, the person's soft shadow on floor and wall, and the camera's noise."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.synthetic.kinematics import Figure
+from shadowpuppet.synthetic.mannequin import JOINTS
+
+SHADOW_PARTS = (("pelvis", "neck", 0.13), ("neck", "head", 0.09), ("left_shoulder", "right_shoulder", 0.06),
+                *((f"{side}_{a}", f"{side}_{b}", radius) for side in ("left", "right") for a, b, radius in (
+                    ("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.055))))
+"""What casts the shadow: round sticks between joints, and their radius (m)."""
+
+
+class Room:
+    """A floor at z = 0 and a wall behind the person, with their texture, and two lamps; everything drawn from `rng`."""
+
+    def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float) -> None:
+        self.camera, self.shadow = camera, shadow
+        self.distance = rng.uniform(1.2, 3.5)
+        side = rng.choice([-1, 1])
+        key = np.array([side * rng.uniform(0.2, 0.7), -rng.uniform(0.5, 0.9), rng.uniform(0.5, 1.0)])
+        fill = np.array([-side * rng.uniform(0.4, 0.9), -rng.uniform(0.3, 0.8), rng.uniform(0.1, 0.4)])
+        self.lights = np.zeros((3, 4))
+        self.lights[0, :3], self.lights[1, :3] = key / np.linalg.norm(key), fill / np.linalg.norm(fill)
+        self.lights[:, 3] = rng.uniform(0.45, 0.6), rng.uniform(0.12, 0.22), rng.uniform(0.45, 0.6)
+        self.picture = self._paint(rng)
+
+    def _points(self, pixels: Array) -> Array:
+        """Where the rays of pixels (..., 2) meet floor or wall, (..., 3)."""
+        R, eye = inverse(self.camera.T_camera_world)[:3, :3], self.camera.centre
+        ray = self.camera.rays(pixels) @ R.T
+        with np.errstate(divide="ignore"):
+            to_wall = np.where(ray[..., 1] > 1e-6, (self.distance - eye[1]) / ray[..., 1], np.inf)
+            to_floor = np.where(ray[..., 2] < -1e-6, -eye[2] / ray[..., 2], np.inf)
+        return eye + np.minimum(np.minimum(to_wall, to_floor), 60.0)[..., None] * ray
+
+    def _paint(self, rng: np.random.Generator) -> Array:
+        """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of nine rays."""
+        width, height = self.camera.size
+        grid = np.stack(np.meshgrid(np.arange(3 * width), np.arange(3 * height)), -1) / 3.0 - 1 / 3
+        points = self._points(grid)
+        wall = self._wall(points[..., 0], points[..., 2], rng)
+        floor = self._floor(points[..., 0], points[..., 1], rng)
+        picture = np.where(points[..., 2:] < 1e-6, floor, wall)
+        picture *= 0.78 + 0.22 * np.exp(-((points[..., :1] - 0.5) ** 2 + (points[..., 2:] - 1.8) ** 2) / 6)
+        return picture.reshape(height, 3, width, 3, 3).mean((1, 3))
+
+    def _wall(self, x: Array, z: Array, rng: np.random.Generator) -> Array:
+        colour = np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.05, 0.4), rng.uniform(0.45, 0.85)))
+        paint = colour * (1 + rng.uniform(0.04, 0.22) * cloud(x, z, rng))[..., None]
+        for _ in range(rng.integers(3, 9)):
+            cx, cz, w, h = rng.uniform(-2.2, 2.2), rng.uniform(0.4, 2.6), rng.uniform(0.1, 0.45), rng.uniform(0.1, 0.35)
+            inside = (np.abs(x - cx) < w) & (np.abs(z - cz) < h)
+            poster = np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.1, 0.7), rng.uniform(0.25, 0.9)))
+            pattern = 1 + 0.12 * np.sin(rng.uniform(10, 60) * x + rng.uniform(10, 60) * z)
+            paint[inside] = (poster * pattern[..., None])[inside]
+        paint[z < 0.09] = 0.75 * colour + 0.1
+        return paint
+
+    def _floor(self, x: Array, y: Array, rng: np.random.Generator) -> Array:
+        colour = np.array(colorsys.hsv_to_rgb(rng.uniform(0.02, 0.15), rng.uniform(0.1, 0.5), rng.uniform(0.3, 0.65)))
+        size = rng.uniform(0.12, 0.4)
+        checks = np.sign(np.sin(np.pi * x / size) * np.sin(np.pi * y / (size * rng.choice([1, 4]))))
+        return colour * (1 + rng.uniform(0.03, 0.10) * checks + 0.06 * cloud(2 * x, 2 * y, rng))[..., None]
+
+    def shaded(self, figure: Figure, index: int) -> Array:
+        """The room's picture with the figure's shadow, (H, W, 3)."""
+        import cv2
+
+        if self.shadow == 0:
+            return self.picture
+        light = 1 - self.shadow * self._shade(figure, index)
+        return self.picture * cv2.resize(light, self.camera.size, interpolation=cv2.INTER_LINEAR)[..., None]
+
+    def _shade(self, figure: Figure, index: int, coarse: int = 4) -> Array:
+        """How far the key lamp is hidden, 0 to 1, on a grid `coarse` times wider than the pixels.
+
+        The lamp is distant: seen from it, floor and wall points and sticks are points and lines of a plane. The edge softens
+        with the distance between stick and shadow.
+        """
+        light = self.lights[0, :3]
+        e1 = np.cross(light, [0.0, 0.0, 1.0])
+        e1 /= np.linalg.norm(e1)
+        basis = np.stack([e1, np.cross(light, e1), light], 1)
+        if not hasattr(self, "_seen"):
+            width, height = self.camera.size
+            grid = np.stack(np.meshgrid(np.arange((width + coarse - 1) // coarse), np.arange((height + coarse - 1) // coarse)), -1)
+            self._seen = self._points(coarse * grid + (coarse - 1) / 2) @ basis
+        clear = np.ones(self._seen.shape[:2])
+        for a, b, radius in SHADOW_PARTS:
+            start, end = (figure.joints[index, JOINTS.index(name)] @ basis for name in (a, b))
+            along = end - start
+            t = np.clip(((self._seen - start)[..., :2] @ along[:2]) / max(along[:2] @ along[:2], 1e-9), 0, 1)
+            off = self._seen - start - t[..., None] * along
+            soft = 0.02 + 0.10 * np.abs(off[..., 2])
+            gap = (np.hypot(off[..., 0], off[..., 1]) - radius) / soft
+            clear *= 1 - np.clip(0.5 - 0.5 * gap, 0, 1) ** 2 * (3 - 2 * np.clip(0.5 - 0.5 * gap, 0, 1)) * (off[..., 2] < 0)
+        return 1 - clear
+
+
+def cloud(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Array:
+    """Fractal value noise over the plane, about -1 to 1."""
+    total = np.zeros_like(x)
+    for octave in range(octaves):
+        lattice = rng.uniform(-1, 1, (64, 64))
+        u, v = x * 1.3 * 2**octave + 31.7, y * 1.3 * 2**octave + 17.3
+        i, j = np.floor(u).astype(int), np.floor(v).astype(int)
+        fu, fv = u - i, v - j
+        fu, fv = fu * fu * (3 - 2 * fu), fv * fv * (3 - 2 * fv)
+        corner = [lattice[(i + a) % 64, (j + b) % 64] for a in (0, 1) for b in (0, 1)]
+        total += ((corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu) * 0.55**octave
+    return total
+
+
+def exposed(picture: Array, noise: float, rng: np.random.Generator) -> np.ndarray:
+    """What the sensor makes of light (H, W, 3), 0 to 1: slight blur of the lens, display gamma, noise; RGB uint8.
+
+    noise: standard deviation in grey levels at middle grey; it grows with brightness as photon noise does.
+    """
+    import cv2
+
+    blurred = cv2.GaussianBlur(picture, (0, 0), 0.45)
+    level = 255 * np.clip(blurred, 0, 1)
+    if noise > 0:
+        level = level + noise * (0.5 + 0.5 * np.sqrt(level / 128)) * rng.standard_normal(level.shape, np.float32)
+    return np.clip(level + 0.5, 0, 255).astype(np.uint8)
