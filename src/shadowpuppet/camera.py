@@ -32,29 +32,41 @@ class Camera:
     """Whether `T_camera_world` was measured; False when only a field of view is known (`from_fov`)."""
 
     def __post_init__(self) -> None:
-        width, height = (int(v) for v in self.size)
-        matrix, T = np.array(self.matrix, float), np.array(self.T_camera_world, float)
-        distortion = np.array(self.distortion, float).ravel()
-        allowed = (4,) if self.fisheye else (0, 4, 5, 8)
-
-        def check(good: bool, what: str, found: object, expected: str) -> None:
-            if not good:
-                raise CalibrationError(f"camera {self.name!r}: {what}: found {found}, expected {expected}")
-
-        check(width > 0 and height > 0, "size", [width, height], "two positive numbers of pixels")
-        check(matrix.shape == (3, 3) and bool(np.isfinite(matrix).all()), "matrix", matrix.tolist(), "3 x 3 finite numbers")
+        """Check every field, and bring each to its shape."""
+        numbers, check = self._numbers, self._check
+        size = numbers("size", self.size, (2,))
+        check(bool((size >= 1).all() and (size % 1 == 0).all()), "size", size.tolist(), "two positive whole numbers of pixels")
+        matrix = numbers("matrix", self.matrix, (3, 3))
         check(matrix[0, 0] > 0 and matrix[1, 1] > 0, "matrix", np.diag(matrix)[:2].tolist(), "positive focal lengths")
+        skew = [float(matrix[0, 1]), float(matrix[1, 0])]
+        check(max(map(abs, skew)) < 1e-6 * matrix[0, 0], "matrix", f"skew {skew}", "none (OpenCV's model has no skew)")
         check(bool(np.allclose(matrix[2], [0, 0, 1])), "matrix", matrix[2].tolist(), "a last row of 0 0 1")
-        check(distortion.size in allowed, "distortions", f"{distortion.size} numbers", f"{allowed} of them")
-        check(bool(np.isfinite(distortion).all()), "distortions", distortion.tolist(), "finite numbers")
-        check(T.shape == (4, 4) and bool(np.isfinite(T).all()), "rotation and translation", T.tolist(), "finite numbers")
+        distortion = numbers("distortions", self.distortion)
+        allowed = (4,) if self.fisheye else (0, 4, 5, 8)
+        check(distortion.size in allowed, "distortions", f"{distortion.size} numbers", " or ".join(map(str, allowed)))
+        distortion = distortion if self.fisheye else np.pad(distortion, (0, 8 - distortion.size))
+        T = numbers("rotation and translation", self.T_camera_world, (4, 4))
         R = T[:3, :3]
-        check(bool(np.allclose(R @ R.T, np.eye(3), atol=1e-4)) and np.linalg.det(R) > 0, "rotation",
-              np.round(R, 4).tolist(), "an orthonormal, right-handed matrix")
-        if not self.fisheye and distortion.size < 8:
-            distortion = np.concatenate([distortion, np.zeros(8 - distortion.size)])
-        for name, value in dict(size=(width, height), matrix=matrix, distortion=distortion, T_camera_world=T).items():
+        check(bool(np.allclose(R @ R.T, np.eye(3), atol=1e-4)) and np.linalg.det(R) > 0, "rotation", np.round(R, 4).tolist(),
+              "an orthonormal, right-handed matrix")
+        values = {"size": (int(size[0]), int(size[1])), "matrix": matrix, "distortion": distortion, "T_camera_world": T}
+        for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def _check(self, good: bool, what: str, found: object, expected: str) -> None:
+        if not good:
+            raise CalibrationError(f"camera {self.name!r}: {what}: found {found}, expected {expected}")
+
+    def _numbers(self, what: str, value: object, shape: tuple[int, ...] | None = None) -> Array:
+        expected = f"{' x '.join(map(str, shape))} finite numbers" if shape else "finite numbers"
+        try:
+            array = np.array(value, float)
+        except (TypeError, ValueError, OverflowError):
+            self._check(False, what, repr(value), expected)
+            raise
+        array = array if shape else array.ravel()
+        self._check(array.shape == (shape or array.shape) and bool(np.isfinite(array).all()), what, array.tolist(), expected)
+        return array
 
     @classmethod
     def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam") -> Camera:
@@ -81,7 +93,7 @@ class Camera:
         points = transform(self.T_camera_world, points_world)
         flat = points.reshape(-1, 1, 3)
         if not flat.size:
-            return np.zeros((*points.shape[:-1], 2))
+            return np.zeros((*points.shape[:-1], 2))  # OpenCV refuses none
         still = np.zeros(3)
         if self.fisheye:
             pixels = cv2.fisheye.projectPoints(flat, still, still, self.matrix, self.distortion)[0]
@@ -97,16 +109,19 @@ class Camera:
 
         pixels = np.asarray(pixels, float)
         flat = pixels.reshape(-1, 1, 2)
+        if not flat.size:
+            return np.zeros((*pixels.shape[:-1], 3))
         if self.fisheye:
             xy = cv2.fisheye.undistortPoints(flat, self.matrix, self.distortion)
         else:
             stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 100, 1e-12)
-            xy = cv2.undistortPoints(flat, self.matrix, self.distortion, criteria=stop)
+            undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 4's name, and 5's
+            xy = undistort(flat, self.matrix, self.distortion, R=None, P=None, criteria=stop)
         xy = np.asarray(xy, float).reshape(-1, 2)
         return np.concatenate([xy, np.ones((len(xy), 1))], 1).reshape(*pixels.shape[:-1], 3)
 
     def resized(self, size: tuple[int, int]) -> Camera:
-        """The same camera for pictures scaled to `size`. Pixel centres stay at integers, so the principal point moves by halves."""
+        """The same camera for pictures scaled to `size` (pixel centres stay at integers: the principal point moves by halves)."""
         sx, sy = size[0] / self.size[0], size[1] / self.size[1]
         matrix = self.matrix.copy()
         matrix[0] *= sx

@@ -24,10 +24,17 @@ def rotation_from_vector(vector: ArrayLike) -> Array:
 
 
 def vector_from_rotation(R: ArrayLike) -> Array:
-    """Rotation vector (3,), radians, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`."""
-    import cv2
+    """Rotation vector (3,), radians, at most pi long, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`.
 
-    return cv2.Rodrigues(np.asarray(R, float))[0].ravel()
+    By the quaternion that fits best (Bar-Itzhack 2000), which is exact near half a turn, too, where sines vanish.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = np.asarray(R, float)
+    K = np.array([[a - e - i, b + d, c + g, h - f], [b + d, e - a - i, f + h, c - g], [c + g, f + h, i - a - e, d - b],
+                  [h - f, c - g, d - b, a + e + i]])
+    x, y, z, w = np.linalg.eigh(K)[1][:, -1]
+    vector = np.array([x, y, z]) * (1 if w >= 0 else -1)
+    sine = np.linalg.norm(vector)
+    return np.zeros(3) if sine == 0 else vector * (2 * np.arctan2(sine, abs(w)) / sine)
 
 
 def rigid(R: ArrayLike, t: ArrayLike) -> Array:
