@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import re
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,6 +22,8 @@ FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 
 FILE_LIMIT = 10_000_000
 """Bytes; no calibration is longer, and a film given by mistake is not read."""
+BARE_KEY = r"[A-Za-z0-9_-]+"
+"""Section titles that TOML takes without quotes."""
 FARTHEST = 100.0
 """Metres; a camera farther from the world's origin was measured in millimetres."""
 
@@ -49,17 +53,16 @@ def read_calibration(path: str | Path) -> tuple[Camera, ...]:
 
 def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
     """Write cameras so that `read_calibration` gives them back. Raises `CalibrationError` where the file cannot be written."""
-    import tomli_w
-
-    path, data = Path(path), {}
+    path, sections = Path(path), {}
     for camera in cameras:
         _check_name(camera.name)
-        if camera.name in data:
+        if camera.name in sections:
             raise CalibrationError(f"{path}: two cameras are called {camera.name!r}; every camera needs its own name")
-        data[camera.name] = _section(camera)
+        sections[camera.name] = _section(camera)
+    text = "\n".join(sections.values())
     part = path.with_name(f"{path.name}.part")
     try:
-        part.write_text(tomli_w.dumps(data), "utf-8")
+        part.write_text(text, "utf-8")
         os.replace(part, path)
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be written ({error.strerror})") from None
@@ -89,13 +92,14 @@ def _camera(title: str, table: dict[str, Any]) -> Camera:
     missing = [key for key in FIELDS if key not in table]
     if missing:
         raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}")
-    size, matrix, distortions = _numbers(table, "size", [(2,)]), _numbers(table, "matrix", [(3, 3)]), _numbers(table, "distortions")
+    size, matrix = _numbers(table, "size", [(2,)]), _numbers(table, "matrix", [(3, 3)])
+    distortions = _numbers(table, "distortions")
     return Camera(name, (size[0], size[1]), matrix, distortions, rigid(_rotation(table), _translation(table)), fisheye, oriented)
 
 
 def _check_name(name: object) -> None:
     # A camera's name is that of its film, too.
-    if not isinstance(name, str) or not name.strip() or any(c in name for c in "/\\\0") or name in (".", ".."):
+    if not isinstance(name, str) or not name.strip(" .") or not name.isprintable() or "/" in name or "\\" in name:
         raise CalibrationError(f"name: found {name!r}, expected a word that can be a file's name")
 
 
@@ -114,8 +118,8 @@ def _translation(table: dict[str, Any]) -> Array:
     translation = _numbers(table, "translation", [(3,)])
     distance = float(np.linalg.norm(translation))
     if distance > FARTHEST:
-        raise CalibrationError(f"translation: found {translation.tolist()}, {distance:g} long, expected at most {FARTHEST:g} metres; "
-                               "it is probably in millimetres: divide it by 1000")
+        raise CalibrationError(f"translation: found {translation.tolist()}, {distance:g} long, expected at most {FARTHEST:g} "
+                               "metres; it is probably in millimetres: divide it by 1000")
     return translation
 
 
@@ -144,11 +148,14 @@ def _short(value: object) -> str:
     return text if len(text) <= 120 else text[:117] + "..."
 
 
-def _section(camera: Camera) -> dict[str, Any]:
+def _section(camera: Camera) -> str:
+    """A camera's section; a value a line, where JSON's spelling of printable words and finite numbers is TOML's, too."""
     distortions = camera.distortion.tolist()
     if not camera.fisheye:  # only as many as there are
         distortions = distortions[: 8 if any(distortions[5:]) else 5 if distortions[4] else 4]
-    section = {"name": camera.name, "size": list(camera.size), "matrix": camera.matrix.tolist(), "distortions": distortions,
-               "rotation": vector_from_rotation(camera.T_camera_world[:3, :3]).tolist(),
-               "translation": camera.T_camera_world[:3, 3].tolist(), "fisheye": camera.fisheye}
-    return section if camera.oriented else section | {"oriented": False}
+    values = {"name": camera.name, "size": list(camera.size), "matrix": camera.matrix.tolist(), "distortions": distortions,
+              "rotation": vector_from_rotation(camera.T_camera_world[:3, :3]).tolist(),
+              "translation": camera.T_camera_world[:3, 3].tolist(), "fisheye": camera.fisheye}
+    values |= {} if camera.oriented else {"oriented": False}
+    title = camera.name if re.fullmatch(BARE_KEY, camera.name) else json.dumps(camera.name, ensure_ascii=False)
+    return f"[{title}]\n" + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())

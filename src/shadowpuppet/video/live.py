@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 import warnings
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,7 +35,8 @@ def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
 def _opened(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
     import cv2
 
-    capture = cv2.VideoCapture(number)
+    with _quiet():
+        capture = cv2.VideoCapture(number)
     capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # pictures that waited would be stamped late
     if rate:
         capture.set(cv2.CAP_PROP_FPS, rate)
@@ -43,6 +45,20 @@ def _opened(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
         capture.release()
         raise VideoError(f"camera {number}: gives no picture; is it connected, and not in use by another program?")
     return capture, np.asarray(image, np.uint8)
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps OpenCV's own words for a camera that is not there off the terminal: the error says it."""
+    import cv2
+
+    log: Any = getattr(cv2.utils, "logging", cv2)  # OpenCV 5's place, and 4's
+    level = log.getLogLevel()
+    log.setLogLevel(0)
+    try:
+        yield
+    finally:
+        log.setLogLevel(level)
 
 
 def _frames(capture: VideoCapture, number: int, grey: bool, size: tuple[int, int]) -> Iterator[Frame]:

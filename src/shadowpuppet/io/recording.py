@@ -1,0 +1,248 @@
+"""Recording folders: cameras, films, empty scenes, ready masks, reference pictures, and what is known of the subject."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from warnings import warn
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.io.calibration import read_calibration, read_toml
+from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
+
+FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",
+                 ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".webm", ".wmv", ".y4m")
+"""Endings of the films that are looked for; one with another ending can be named in recording.toml."""
+POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
+"""Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
+KEYS = ("subject", "rate", "calibration", "truth", "training", "video", "background", "masks")
+"""Keys of recording.toml."""
+HEIGHTS, DISTANCES, RATES = (0.5, 2.5), (0.2, 30.0), (0.1, 10_000.0)
+"""What can be true: metres, metres, frames/s."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is known of the person; metres."""
+
+    height: float | None = None
+    """Of the person, shoes on."""
+    distance: float | None = None
+    """From the (single) camera to the middle of the body at the start."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera and what it saw; every source is one that `video.open_frames` opens."""
+
+    camera: Camera
+    video: Path | int | str
+    background: Path | None = None
+    """The empty scene."""
+    masks: Path | None = None
+    """Ready silhouettes."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The person in a known posture: a picture, film or folder of pictures."""
+
+    name: str
+    """One of `POSTURES`."""
+    image: Path
+    mask: Path | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording as it lies on the disk; nothing of it is read but the films' first frames."""
+
+    path: Path
+    name: str
+    views: tuple[View, ...]
+    subject: Subject = Subject()
+    references: tuple[Reference, ...] = ()
+    """In the order of `POSTURES`; those that are there."""
+    truth: Path | None = None
+    training: Path | None = None
+    rate: float | None = None
+    """Frames/s that replace the times of the films; None: theirs count."""
+
+
+def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
+    """A recording: a folder (video/, calibration.toml, ...), or one film, folder of pictures or live camera.
+
+    `calibration` replaces the folder's own; `fov` (horizontal, radians) is enough for one camera without any. Raises
+    `RecordingError`, `CalibrationError` or `VideoError`, naming file and field, where something is missing or does not fit.
+    """
+    folder = Path(str(path))
+    if camera_number(path) is None and not folder.exists():
+        raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
+    if folder.is_dir() and any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml")):
+        return _read_folder(folder, fov, calibration)
+    if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
+        raise RecordingError(f"{folder}: found neither video/ nor calibration.toml nor pictures in it, expected a recording "
+                             "(video/<camera>.mp4 and calibration.toml) or a folder of pictures")
+    source = folder if camera_number(path) is None else path
+    if source is folder:
+        open_frames(folder)  # a file that is no film is said to be that, before its calibration is asked for
+    cameras = _cameras(folder, {folder.stem: source}, fov, calibration)
+    named = [c for c in cameras if c.name == folder.stem or len(cameras) == 1]
+    if not named:
+        raise RecordingError(f"{calibration}: found no camera {folder.stem!r}, after the film's name; cameras there: "
+                             f"{choices(c.name for c in cameras)}")
+    view = View(named[0], source)
+    _check_sizes([view])
+    return Recording(folder, folder.stem, (view,))
+
+
+def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> Recording:
+    notes = _Notes(folder)
+    height = notes.number("height", HEIGHTS, "metres", "subject")
+    distance = notes.number("distance", DISTANCES, "metres", "subject")
+    films, backgrounds, masks = (_sources(folder, kind, notes) for kind in ("video", "background", "masks"))
+    if not films:
+        raise RecordingError(f"{folder}: no films in it, expected video/<camera>.mp4, a folder of pictures video/<camera>/, or a "
+                             "[video] table in recording.toml")
+    cameras = _cameras(folder, films, fov, calibration or notes.file("calibration") or _first(folder, "calibration", ["toml"]))
+    for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
+        _check_names(folder / kind, sources, cameras)
+    missing = [c.name for c in cameras if c.name not in films]
+    if missing:
+        warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}", ShadowPuppetWarning, stacklevel=3)
+    views = tuple(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name)) for c in cameras if c.name in films)
+    _check_sizes(views)
+    truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
+    training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh"])
+    rate = notes.number("rate", RATES, "frames/s")
+    references = _references(folder / "references")
+    return Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate)
+
+
+class _Notes:
+    """recording.toml, or nothing where there is none."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.path = folder, folder / "recording.toml"
+        self.data = read_toml(self.path, RecordingError) if self.path.exists() else {}
+        self._check_keys(self.data, KEYS, "")
+        self._check_keys(self.table("subject"), ("height", "distance"), "subject.")
+
+    def _check_keys(self, table: dict[str, Any], known: Iterable[str], prefix: str) -> None:
+        unknown = set(table) - set(known)
+        if unknown:
+            raise RecordingError(f"{self.path}: found the key {prefix}{min(unknown)}; keys known there: {choices(known)}")
+
+    def table(self, key: str) -> dict[str, Any]:
+        value = self.data.get(key, {})
+        if not isinstance(value, dict):
+            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected a table [{key}]")
+        return value
+
+    def number(self, key: str, limits: tuple[float, float], unit: str, table: str = "") -> float | None:
+        value = (self.table(table) if table else self.data).get(key)
+        if value is None:
+            return None
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or not limits[0] <= value <= limits[1]:
+            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected {limits[0]:g} to {limits[1]:g} {unit}")
+        return float(value)
+
+    def file(self, key: str) -> Path | None:
+        return self._existing(key, self.data[key]) if key in self.data else None
+
+    def source(self, kind: str, camera: str) -> Path | int | str:
+        value = self.table(kind)[camera]
+        live = not isinstance(value, bool) and isinstance(value, (int, str)) and camera_number(value) is not None
+        return value if live and kind == "video" else self._existing(f"{kind}.{camera}", value)
+
+    def _existing(self, key: str, value: object) -> Path:
+        path = self.folder / value if isinstance(value, str) else None
+        if path is None or not path.exists():
+            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected the path of an existing file, from this folder")
+        return path
+
+
+def _first(folder: Path, stem: str, endings: list[str]) -> Path | None:
+    return next((p for p in (folder / f"{stem}.{ending}" for ending in endings) if p.exists()), None)
+
+
+def _sources(folder: Path, kind: str, notes: _Notes) -> dict[str, Any]:
+    """Film, picture or folder of each camera: those that recording.toml names, else <kind>/<camera>.*."""
+    sources: dict[str, Any] = {camera: notes.source(kind, camera) for camera in notes.table(kind)}
+    found = _films(folder / kind, FILM_SUFFIXES if kind == "video" else FILM_SUFFIXES + IMAGE_SUFFIXES)
+    return {name: _only(paths) for name, paths in found.items() if name not in sources} | sources
+
+
+def _films(folder: Path, suffixes: tuple[str, ...]) -> dict[str, list[Path]]:
+    """Films and folders in a folder, by their names without endings, sorted."""
+    films: dict[str, list[Path]] = {}
+    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
+        if path.name[0] != "." and (path.is_dir() or path.suffix.lower() in suffixes):
+            films.setdefault(path.name if path.is_dir() else path.stem, []).append(path)
+    return films
+
+
+def _only(paths: list[Path]) -> Path:
+    if len(paths) > 1:
+        raise RecordingError(f"{paths[0].parent}: found {' and '.join(p.name for p in paths)}, expected one of them")
+    return paths[0]
+
+
+def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration: Path | None) -> tuple[Camera, ...]:
+    if calibration is not None and fov is not None:
+        raise RecordingError(f"{folder}: found a field of view and a calibration ({calibration.name}), expected one of them")
+    if calibration is not None:
+        return read_calibration(calibration)
+    if len(films) > 1:
+        raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several "
+                             "cameras must be calibrated together")
+    if fov is None:
+        raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES; a phone held "
+                             "across has about 65, a webcam 60) or a calibration.toml")
+    name, film = next(iter(films.items()))
+    return (Camera.from_fov(open_frames(film).size, fov, name),)
+
+
+def _check_names(folder: Path, sources: Iterable[str], cameras: Iterable[Camera]) -> None:
+    known = [camera.name for camera in cameras]
+    unknown = sorted(set(sources) - set(known))
+    if unknown:
+        raise RecordingError(f"{folder}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: "
+                             f"{choices(known)}")
+
+
+def _check_sizes(views: Iterable[View]) -> None:
+    """Raise `RecordingError` where pictures are not of their camera's size; live cameras are not opened for that."""
+    for view in views:
+        for source in (view.video, view.background, view.masks):
+            if source is None or camera_number(source) is not None:
+                continue
+            found, (width, height) = open_frames(source).size, view.camera.size
+            if found != (width, height):
+                raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
+                                     f"{view.camera.name!r} is for {width} x {height}; {_remedy(found, (width, height))}")
+
+
+def _remedy(found: tuple[int, int], expected: tuple[int, int]) -> str:
+    scale = found[0] / expected[0]
+    if found == expected[::-1]:
+        return "they are turned by a quarter: turn one of them"
+    if math.isclose(scale, found[1] / expected[1], rel_tol=0.01):
+        return f"they have the same shape: scale the film, or set size to {list(found)} and multiply the matrix by {scale:g}"
+    return "give the film that was calibrated, or calibrate this one"
+
+
+def _references(folder: Path) -> tuple[Reference, ...]:
+    found = _films(folder, FILM_SUFFIXES + IMAGE_SUFFIXES)
+    unknown = sorted(name for name in found if name.removesuffix("_mask") not in POSTURES)
+    if unknown:
+        raise RecordingError(f"{folder}: found {choices(unknown)}; postures known: {', '.join(POSTURES)}, and <posture>_mask")
+    alone = sorted(name for name in found if name.endswith("_mask") and name.removesuffix("_mask") not in found)
+    if alone:
+        raise RecordingError(f"{folder}: found {alone[0]} alone, expected the picture {alone[0].removesuffix('_mask')} beside it")
+    masks = {name: _only(found[f"{name}_mask"]) for name in POSTURES if f"{name}_mask" in found}
+    return tuple(Reference(name, _only(found[name]), masks.get(name)) for name in POSTURES if name in found)
