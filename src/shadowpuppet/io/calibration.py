@@ -126,7 +126,7 @@ def _translation(table: dict[str, Any]) -> Array:
 def _numbers(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
     """The finite numbers of a field, of one of the `shapes`, or any number of them in a row."""
     value = table[key]
-    expected = " or ".join(" x ".join(map(str, s)) + " finite numbers" for s in shapes) if shapes else "a row of finite numbers"
+    expected = " or ".join(" x ".join(map(str, s)) for s in shapes) + " finite numbers" if shapes else "a row of finite numbers"
     try:
         array = np.array(value, float) if _is_numeric(value) else None
     except (ValueError, OverflowError):  # rows of unequal length, a whole number of 400 digits
