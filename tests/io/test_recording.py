@@ -1,0 +1,248 @@
+"""Recording folders: what lies there is found; what is missing, unknown or does not fit is said."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, VideoError
+from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.recording import POSTURES, Subject, read_recording
+from shadowpuppet.video import write_frames, write_image
+
+SIZE = (32, 24)
+
+
+def picture(size=SIZE):
+    return np.full((size[1], size[0]), 100, np.uint8)
+
+
+def film(path, size=SIZE):
+    path.parent.mkdir(exist_ok=True, parents=True)
+    with write_frames(path, 10) as writer:
+        writer.write(picture(size))
+        writer.write(picture(size))
+    return path
+
+
+def still(path, size=SIZE):
+    path.parent.mkdir(exist_ok=True, parents=True)
+    write_image(path, picture(size))
+    return path
+
+
+def cameras(*names, size=SIZE):
+    return [Camera.from_fov(size, 1.0, name) for name in names]
+
+
+def recording(folder, *names):
+    folder.mkdir(exist_ok=True)
+    write_calibration(folder / "calibration.toml", cameras(*names))
+    for name in names:
+        film(folder / "video" / f"{name}.mp4")
+    return folder
+
+
+@pytest.fixture
+def one(tmp_path):
+    return recording(tmp_path / "bow", "cam")
+
+
+@pytest.fixture
+def two(tmp_path):
+    return recording(tmp_path / "walk", "left", "right")
+
+
+def notes(folder, text):
+    (folder / "recording.toml").write_text(text)
+    return folder
+
+
+def said(path, *parts, error=RecordingError, **options):
+    with pytest.raises(error) as found:
+        read_recording(path, **options)
+    for part in parts:
+        assert part in str(found.value)
+    assert "\n" not in str(found.value)
+
+
+def test_everything_in_its_place_is_found(one):
+    for name in POSTURES:
+        still(one / "references" / f"{name}.png")
+    still(one / "references" / "front_t_pose_mask.png")
+    film(one / "background" / "cam.mp4")
+    still(one / "masks" / "cam" / "0.png")
+    for name in ("truth.csv", "truth.trc", "training.trc", "video/notes.txt", "references/front_t_pose.csv", "masks/.hidden.mp4"):
+        (one / name).write_text("")
+    notes(one, "rate = 15\n[subject]\nheight = 1.83\ndistance = 2\n")
+    found = read_recording(one)
+    view, = found.views
+    assert (found.name, found.path, found.rate) == ("bow", one, 15.0)
+    assert found.subject == Subject(1.83, 2.0)
+    assert (view.camera.name, view.video) == ("cam", one / "video/cam.mp4")
+    assert (view.background, view.masks) == (one / "background/cam.mp4", one / "masks/cam")
+    assert [r.name for r in found.references] == list(POSTURES)
+    assert [r.mask for r in found.references] == [one / "references/front_t_pose_mask.png", None, None]
+    assert (found.truth, found.training) == (one / "truth.csv", one / "training.trc")
+
+
+def test_little_is_enough(one):
+    found = read_recording(one)
+    assert (found.subject, found.references, found.truth, found.training, found.rate) == (Subject(), (), None, None, None)
+
+
+def test_views_follow_the_calibration(two):
+    assert [v.camera.name for v in read_recording(two).views] == ["left", "right"]
+
+
+def test_a_film_alone_needs_a_field_of_view_or_a_calibration(one):
+    path = film(one / "take.mp4")
+    said(path, "take.mp4: no calibration", "--fov DEGREES", "calibration.toml")
+    found = read_recording(path, fov=1.0)
+    assert (found.name, found.views[0].camera.oriented, found.views[0].camera.size) == ("take", False, SIZE)
+    assert read_recording(path, calibration=one / "calibration.toml").views[0].camera.name == "cam"
+    said(path, "expected one of them", fov=1.0, calibration=one / "calibration.toml")
+    said(path, "between 0 and 180", fov=4.0, error=CalibrationError)
+
+
+def test_a_film_alone_takes_the_camera_of_its_name(two):
+    found = read_recording(two / "video" / "right.mp4", calibration=two / "calibration.toml")
+    assert [v.camera.name for v in found.views] == ["right"]
+    said(film(two / "middle.mp4"), "no camera 'middle'", "cameras there: left, right", calibration=two / "calibration.toml")
+
+
+def test_a_folder_of_pictures_alone_is_a_film(tmp_path):
+    still(tmp_path / "take" / "1.png")
+    found = read_recording(tmp_path / "take", fov=1.0)
+    assert (found.views[0].video, found.views[0].camera.size) == (tmp_path / "take", SIZE)
+
+
+def test_one_camera_s_folder_takes_a_field_of_view_instead(one):
+    said(one, "a field of view and a calibration (calibration.toml)", fov=1.0)
+    (one / "calibration.toml").unlink()
+    said(one, "--fov DEGREES")
+    assert not read_recording(one, fov=1.0).views[0].camera.oriented
+
+
+def test_several_cameras_need_a_calibration(two):
+    (two / "calibration.toml").unlink()
+    said(two, "no calibration.toml for its 2 cameras (left, right)", fov=1.0)
+
+
+def test_a_given_calibration_replaces_the_folder_s(one):
+    write_calibration(one / "other.toml", cameras("cam", size=(33, 24)))
+    said(one, "33 x 24", calibration=one / "other.toml")
+    said(notes(one, 'calibration = "other.toml"'), "33 x 24")
+
+
+def test_paths_are_named_in_recording_toml(one, tmp_path):
+    film(tmp_path / "elsewhere.mkv")
+    still(one / "empty.png")
+    (one / "joints.csv").write_text("")
+    notes(one, 'truth = "joints.csv"\ntraining = "joints.csv"\n[video]\ncam = "../elsewhere.mkv"\n'
+               '[background]\ncam = "empty.png"\n[masks]\ncam = "empty.png"\n')
+    found = read_recording(one)
+    view, = found.views
+    assert (view.video, view.background) == (one / "../elsewhere.mkv", one / "empty.png")
+    assert (found.truth, found.training) == (one / "joints.csv",) * 2
+
+
+@pytest.mark.parametrize("camera", ["0", '"camera:0"'])
+def test_a_live_camera_is_named_in_recording_toml(one, camera):
+    found = read_recording(notes(one, f"[video]\ncam = {camera}"))
+    assert found.views[0].video in (0, "camera:0")
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("hieght = 1.8", "found the key hieght; keys known there: background, calibration, masks, rate, subject, training, truth"),
+    ("[subject]\nheigth = 1.8", "found the key subject.heigth; keys known there: distance, height"),
+    ("[subject]\nheight = 183", "height: found 183, expected 0.5 to 2.5 metres"),
+    ("[subject]\nheight = nan", "height: found nan"),
+    ("[subject]\nheight = true", "height: found True"),
+    ("[subject]\ndistance = '2 m'", "distance: found '2 m', expected 0.2 to 30 metres"),
+    ("subject = 1.8", "subject: found 1.8, expected a table [subject]"),
+    ("video = 'cam.mp4'", "video: found 'cam.mp4', expected a table [video]"),
+    ("rate = 0", "rate: found 0, expected 0.1 to 10000 frames/s"),
+    ("truth = 'nowhere.csv'", "truth: found 'nowhere.csv', expected the path of an existing file"),
+    ("calibration = 3", "calibration: found 3"),
+    ("[video]\ncam = 'nowhere.mp4'", "video.cam: found 'nowhere.mp4'"),
+    ("[video]\ncam = true", "video.cam: found True"),
+    ("[masks]\ncam = 'camera:0'", "masks.cam: found 'camera:0'"),
+    ("[masks]\nkam = 'video/cam.mp4'", "found kam, but the calibration knows no such camera; cameras known: cam"),
+    ("a b", "not valid TOML"),
+])
+def test_a_mistake_in_recording_toml_is_said(one, text, words):
+    said(notes(one, text), words, str(one))
+
+
+def test_films_of_unknown_cameras_are_said(two):
+    film(two / "video" / "middle.mp4")
+    said(two, "video: found middle", "cameras known: left, right")
+
+
+def test_a_camera_without_film_is_left_out_with_a_warning(two):
+    (two / "video" / "left.mp4").unlink()
+    with pytest.warns(ShadowPuppetWarning, match="no film of left; going on with right"):
+        assert [v.camera.name for v in read_recording(two).views] == ["right"]
+
+
+def test_two_films_of_one_camera_are_said_unless_one_is_named(one):
+    film(one / "video" / "cam.mkv")
+    said(one, "found cam.mkv and cam.mp4, expected one of them")
+    notes(one, '[video]\ncam = "video/cam.mkv"')
+    assert read_recording(one).views[0].video == one / "video/cam.mkv"
+
+
+@pytest.mark.parametrize(("size", "remedy"), [
+    ((64, 48), "set size to [64, 48] and multiply the matrix by 2"),
+    ((24, 32), "turned by a quarter"),
+    ((32, 32), "calibrate this one"),
+])
+@pytest.mark.parametrize("kind", ["video", "background", "masks"])
+def test_pictures_of_another_size_than_the_calibration_s_are_said(one, kind, size, remedy):
+    film(one / kind / "cam.mp4", size)
+    said(one, f"{kind}/cam.mp4: found pictures of {size[0]} x {size[1]} pixels", "camera 'cam' is for 32 x 24", remedy)
+
+
+def test_references_may_be_films_and_folders(one):
+    film(one / "references" / "front_t_pose.mp4")
+    still(one / "references" / "side_arms_hanging" / "1.png")
+    found = read_recording(one).references
+    assert {r.name: r.image.name for r in found} == {"front_t_pose": "front_t_pose.mp4", "side_arms_hanging": "side_arms_hanging"}
+
+
+def test_unknown_postures_and_lonely_masks_are_said(one):
+    path = still(one / "references" / "t_pose.png")
+    said(one, "references: found t_pose; postures known: front_t_pose, side_arms_hanging, front_arms_t_pose")
+    path.rename(path.with_name("front_t_pose_mask.png"))
+    said(one, "found front_t_pose_mask alone, expected the picture front_t_pose beside it")
+
+
+def test_what_is_no_recording_is_said(tmp_path, one):
+    said(tmp_path / "nowhere", "no such recording")
+    said(tmp_path, "found neither video/ nor calibration.toml nor pictures")
+    (one / "video" / "cam.mp4").unlink()
+    said(one, "no films in it, expected video/<camera>.mp4")
+    (one / "video" / "cam.mp4").write_bytes(b"no film")
+    said(one, "cam.mp4: no film that can be read", error=VideoError)
+    said(one / "calibration.toml", "calibration.toml: no ", fov=1.0, error=VideoError)
+    (one / "calibration.toml").write_bytes(b"\xff")
+    said(one, "no text", error=CalibrationError)
+
+
+@pytest.mark.shared
+def test_shared_recordings_are_read(shared):
+    folders = sorted(p.parent for p in shared.glob("re*/*/calibration.toml"))
+    assert folders
+    for folder in folders:
+        found = read_recording(folder)
+        named = re.findall(r'^name = "(.*)"', (folder / "calibration.toml").read_text(), re.M)
+        assert [v.camera.name for v in found.views] == named
+        assert all(v.background for v in found.views)
+        height = found.subject.height
+        assert len(found.references) == (3 if (folder / "references").exists() else 0)
+        assert height is None or math.isclose(height, 1.83)
