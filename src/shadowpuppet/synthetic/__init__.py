@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shadowpuppet.synthetic.collection import demo_spec, proving_ground
 from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, View, demo_spec, spec_from
+from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, Viewpoint, spec_from
 
 if TYPE_CHECKING:
     import numpy as np
 
-__all__ = ["Gesture", "Mannequin", "Scene", "Spec", "View", "demo_spec", "spec_from", "synthesize"]
+__all__ = ["Gesture", "Mannequin", "Scene", "Spec", "Viewpoint", "demo_spec", "proving_ground", "spec_from", "synthesize"]
 
 
 def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator) -> Path:

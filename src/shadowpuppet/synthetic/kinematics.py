@@ -114,7 +114,7 @@ def _legs(body: Mannequin, q: dict, yaw: Array, pelvis: Array, stance: float, jo
         ankles[side] = yaw @ np.array([sign * stance * (thigh + shank), 0, rest[f"{side}_ankle"][2]])
         hips[side] = pelvis @ (rest[f"{side}_hip"] - rest["pelvis"])
     sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
-    span = 0.997 * (thigh + shank)
+    span = 0.999 * (thigh + shank)
     heights = [ankles[s][:, 2] - hips[s][:, 2] + np.sqrt(span**2 - ((sway + hips[s] - ankles[s])[:, :2] ** 2).sum(1)) for s in hips]
     centre = sway + np.minimum(*heights)[:, None] * [0, 0, 1]
     for side in ("left", "right"):

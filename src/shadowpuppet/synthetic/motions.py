@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.kinematics import ARM, CHANNELS
+from shadowpuppet.synthetic.kinematics import CHANNELS, pose
+from shadowpuppet.synthetic.mannequin import JOINTS, Mannequin
 
 Posture = dict[str, float]
 Keys = list[tuple[float, Posture]]
@@ -113,8 +114,8 @@ def overhead(seconds: float, rng: np.random.Generator) -> Keys:
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
-LIMITS = {"spine_bow": (-6, 28), "spine_side": (-20, 20), "spine_twist": (-28, 28), "pelvis_bow": (-2, 14), "pelvis_twist": (-10, 10),
-          "head_nod": (-15, 22), "head_tilt": (-12, 12), "head_turn": (-40, 40), "side": (2, 135), "front": (-18, 100), "roll": (-25, 75),
+LIMITS = {"spine_bow": (-5, 24), "spine_side": (-17, 17), "spine_twist": (-26, 26), "pelvis_bow": (-2, 12), "pelvis_twist": (-10, 10),
+          "head_nod": (-15, 22), "head_tilt": (-10, 10), "head_turn": (-35, 35), "side": (2, 130), "front": (-18, 100), "roll": (-25, 75),
           "elbow": (6, 125), "supination": (-30, 70), "wrist_flex": (-30, 35), "wrist_side": (-12, 15), "curl": (0, 40)}
 """Ranges of `random` motion, degrees: inside what healthy adults reach (Boone & Azen 1979)."""
 
@@ -125,24 +126,50 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
     t = np.arange(0.7, max(seconds - 0.3, 0.9), step)
     pace = np.clip(1.4 + 1.6 * band_noise(t, 0.25, rng), 0.0, 1.6)
     own = np.cumsum(pace) * step
-    columns = {}
-    for name, (low, high) in LIMITS.items():
-        for channel in (f"left_{name}", f"right_{name}") if name in ARM else (name,):
-            share = 0.5 + 0.5 * np.tanh(1.1 * band_noise(own, 0.45, rng))
-            columns[channel] = np.radians(low + (high - low) * share)
+    table = np.zeros((len(t), len(CHANNELS)))
+    for column, channel in enumerate(CHANNELS):
+        low, high = np.radians(LIMITS.get(_plain(channel), (0, 0)))
+        table[:, column] = low + (high - low) * (0.5 + 0.5 * np.tanh(0.9 * band_noise(own, 0.45, rng)))
     for side in ("left", "right"):
-        _bounded_swing(columns, side)
-    return [(float(when), {name: float(values[n]) for name, values in columns.items()}) for n, when in enumerate(t)]
+        swing = [CHANNELS.index(f"{side}_side"), CHANNELS.index(f"{side}_front")]
+        size = np.hypot(*table[:, swing].T)
+        table[:, swing] *= np.minimum(1, np.radians(140) / np.maximum(size, 1e-6))[:, None]
+    table = clear_of_trunk(table)
+    return [(float(when), dict(zip(CHANNELS, map(float, row)))) for when, row in zip(t, table)]
 
 
-def _bounded_swing(columns: dict[str, Array], side: str) -> None:
-    """Keep the arm's swing under 140 degrees, and a bent forearm from being turned into the chest."""
-    lateral, forward = columns[f"{side}_side"], columns[f"{side}_front"]
-    size = np.hypot(lateral, forward)
-    shrink = np.minimum(1, np.radians(140) / np.maximum(size, 1e-6))
-    columns[f"{side}_side"], columns[f"{side}_front"] = lateral * shrink, forward * shrink
-    bent, low = columns[f"{side}_elbow"] / np.radians(125), np.clip(1 - size / np.radians(70), 0, 1)
-    columns[f"{side}_roll"] = columns[f"{side}_roll"] + bent * low * np.radians(40)
+def _plain(channel: str) -> str:
+    """A channel's name without its side."""
+    return channel.removeprefix("left_").removeprefix("right_")
+
+
+def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
+    """Key postures (n, `CHANNELS`) with the arms moved outward and straightened where forearm or hand would enter trunk or head.
+
+    Judged on the mean body: trunk and head as round sticks; shared with the neighbouring keys, so that the motion stays smooth.
+    """
+    table, body = table.copy(), Mannequin()
+    for _ in range(rounds):
+        figure = pose(body, table)
+        joint = dict(zip(JOINTS, figure.joints.swapaxes(0, 1)))
+        crown = joint["head"] + 0.6 * (joint["head"] - joint["neck"])
+        for side in ("left", "right"):
+            elbow, wrist, hand = (joint[f"{side}_{name}"] for name in ("elbow", "wrist", "hand"))
+            points = [elbow + 0.5 * (wrist - elbow), wrist, wrist + 4.0 * (hand - wrist)]
+            inside = [np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points]
+            excess = np.maximum(np.max(inside, 0), 0)
+            push = np.maximum(excess, np.convolve(np.pad(excess, 2, "edge"), [0.1, 0.25, 0.3, 0.25, 0.1], "valid"))
+            table[:, CHANNELS.index(f"{side}_side")] += 1.0 * push
+            table[:, CHANNELS.index(f"{side}_roll")] += 1.5 * push
+            table[:, CHANNELS.index(f"{side}_elbow")] *= 1 - 1.5 * np.minimum(push, 0.2)
+    return table
+
+
+def _off(points: Array, start: Array, end: Array) -> Array:
+    """Distances (n,) of points (n, 3) from the sticks between `start` and `end`, (n, 3) each."""
+    along = end - start
+    t = np.clip(((points - start) * along).sum(1) / (along**2).sum(1), 0, 1)
+    return np.linalg.norm(points - start - t[:, None] * along, axis=1)
 
 
 MOTIONS: dict[str, Callable[[float, np.random.Generator], Keys]] = {
@@ -168,7 +195,7 @@ def involuntary(t: Array, rng: np.random.Generator) -> Array:
     """Sway, breathing, restlessness and tremor at times `t` (T,), of shape (T, `CHANNELS`)."""
     total = np.zeros((len(t), len(CHANNELS)))
     for column, channel in enumerate(CHANNELS):
-        name = channel.split("_", 1)[1] if channel.startswith(("left_", "right_")) else channel
+        name = _plain(channel)
         size, highest = RESTLESS.get(name, (0.0, 1.0))
         size = size if name.startswith("sway") else np.radians(size)
         total[:, column] = size * band_noise(t, highest, rng) + np.radians(TREMOR.get(name, 0.0)) * band_noise(t, 5.0, rng)

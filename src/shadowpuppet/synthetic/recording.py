@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,9 +10,9 @@ import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError
-from shadowpuppet.geometry import Array, vector_from_rotation
+from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions
-from shadowpuppet.synthetic.kinematics import Figure, pose
+from shadowpuppet.synthetic.kinematics import CHANNELS, Figure, pose
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.synthetic.scene import Room, exposed
@@ -27,6 +28,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator) -> Path
 
     The same spec and seed give the same pictures, masks and truth. Raises `RecordingError` where the folder cannot be written.
     """
+    from shadowpuppet.io.calibration import write_calibration
     from shadowpuppet.video import write_frames
 
     folder = Path(folder)
@@ -34,7 +36,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator) -> Path
     _folders(folder, references=len(cameras) == 1)
     for_motion, for_noise = rng.spawn(2)
     times, figure = perform(spec, for_motion)
-    _write_calibration(folder / "calibration.toml", cameras)
+    write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
     write_truth(folder / "truth", times, figure.joints, spec.rate)
     for camera, noise in zip(cameras, for_noise.spawn(len(cameras))):
@@ -56,7 +58,9 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
     """Times (T,), seconds, and the figure of `spec` in its motion at those times."""
     gestures = [(gesture.motion, gesture.seconds) for gesture in spec.motion]
     times = np.arange(int(motions.duration(gestures) * spec.rate + 1e-6) + 1) / spec.rate
-    return times, pose(spec.body, motions.compose(gestures, times, rng, spec.still))
+    postures = motions.compose(gestures, times, rng, spec.still)
+    postures[:, CHANNELS.index("turn")] += np.radians(spec.turn_deg)
+    return times, pose(spec.body, postures)
 
 
 class Studio:
@@ -65,7 +69,8 @@ class Studio:
     def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator) -> None:
         """rng: of the noise; clothes and room have their own seeds in the spec."""
         clothes = Clothes.draw(np.random.default_rng(spec.scene.clothing))
-        self.room = Room(camera, np.random.default_rng(spec.scene.room), spec.scene.shadow)
+        least = max((view.distance + 1 for view in spec.cameras if abs(view.azimuth_deg) > 60), default=0.0)
+        self.room = Room(camera, np.random.default_rng(spec.scene.room), spec.scene.shadow, least)
         self.renderer = Renderer(camera, surface(spec.body, clothes), clothes, self.room.lights)
         self.noise, self.rng = spec.scene.noise, rng
 
@@ -80,13 +85,27 @@ class Studio:
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
         """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255."""
-        shot = self.renderer.draw(figure, index)
-        light = shot.picture + (1 - shot.alpha[..., None]) * self.room.shaded(figure, index)
-        return exposed(light, self.noise, self.rng)[..., ::-1], shot.mask
+        return self._exposed(*self._lit(figure, index))
 
-    def film(self, figure: Figure) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """All postures of the figure, one after another."""
-        return (self.take(figure, index) for index in range(len(figure.joints)))
+    def film(self, figure: Figure, workers: int = 2) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """`take` of all postures, one after another; `workers` threads draw ahead, the noise is drawn in order."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        count = len(figure.joints)
+        with ThreadPoolExecutor(workers) as pool:
+            ahead = deque(pool.submit(self._lit, figure, index) for index in range(min(2 * workers, count)))
+            for index in range(count):
+                light, mask = ahead.popleft().result()
+                if index + 2 * workers < count:
+                    ahead.append(pool.submit(self._lit, figure, index + 2 * workers))
+                yield self._exposed(light, mask)
+
+    def _lit(self, figure: Figure, index: int) -> tuple[Array, np.ndarray]:
+        shot = self.renderer.draw(figure, index)
+        return shot.picture + (1 - shot.alpha[..., None]) * self.room.shaded(figure, index), shot.mask
+
+    def _exposed(self, light: Array, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return exposed(light, self.noise, self.rng)[..., ::-1], mask
 
 
 def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
@@ -94,14 +113,14 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
     names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
     rows = joints.reshape(len(joints), -1)
     lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
-    path.with_suffix(".csv").write_text("\n".join([",".join(["time", *names]), *lines]) + "\n", encoding="utf-8")
+    _write(path.with_suffix(".csv"), [",".join(["time", *names]), *lines])
     count, trc = len(joints), path.with_suffix(".trc")
     head = [f"PathFileType\t4\t(X/Y/Z)\t{trc.name}",
             "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
             f"{rate:g}\t{rate:g}\t{count}\t{len(JOINTS)}\tmm\t{rate:g}\t1\t{count}", "Frame#\tTime\t" + "\t\t\t".join(JOINTS),
             "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"), ""]
     lines = ["\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)]) for n, (t, row) in enumerate(zip(times, rows), 1)]
-    trc.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
+    _write(trc, [*head, *lines])
 
 
 def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
@@ -115,15 +134,6 @@ def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
         write_truth(folder / name, np.zeros(1), figure.joints, 1.0)
 
 
-def _write_calibration(path: Path, cameras: list[Camera]) -> None:
-    import tomli_w
-
-    data: dict = {c.name: {"name": c.name, "size": list(c.size), "matrix": c.matrix.tolist(), "distortions": c.distortion.tolist()[:4],
-                           "rotation": vector_from_rotation(c.T_camera_world[:3, :3]).tolist(), "translation": c.T_camera_world[:3, 3].tolist(),
-                           "fisheye": False} for c in cameras}
-    path.write_text(tomli_w.dumps(data | {"metadata": {"adjusted": False, "error": 0.0}}), encoding="utf-8")
-
-
 def _write_subject(path: Path, spec: Spec) -> None:
     """recording.toml: what is told of the subject."""
     lines = ["[subject]"]
@@ -131,7 +141,14 @@ def _write_subject(path: Path, spec: Spec) -> None:
         lines.append(f"height = {spec.body.stature:.3f}     # metres, shoes on")
     if "distance" in spec.tells and len(spec.cameras) == 1:
         lines.append(f"distance = {spec.cameras[0].distance:.3f}   # metres, camera to the middle of the body, before the first movement")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    _write(path, lines)
+
+
+def _write(path: Path, lines: list[str]) -> None:
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
 
 
 def _folders(folder: Path, references: bool) -> None:

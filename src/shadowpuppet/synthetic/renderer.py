@@ -39,6 +39,7 @@ class Renderer:
         self.camera, self.surface, self.lights = camera, surface, lights
         self.colours = np.array([clothes.colours.get(name, (0.5, 0.5, 0.5)) for name in MATERIALS])
         self.stripes = clothes.stripes
+        self.table = np.concatenate([1 / surface.table[..., :2], surface.table[..., 2:]], -1)
         self.rays = _unit(camera.rays(np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)) @ R.T)
         self.across, down = -(-width // TILE), -(-height // TILE)
         corner = np.stack(np.meshgrid(np.arange(self.across + 1), np.arange(down + 1)), -1) * float(TILE) - 0.5
@@ -52,20 +53,21 @@ class Renderer:
         """The figure's posture `index`."""
         from shadowpuppet.synthetic import _tracing
 
-        s, width, height = self.surface, *self.camera.size
+        s, (width, height), eye = self.surface, self.camera.size, self.camera.centre
         R, o = figure.rotation[index, s.segment], figure.origin[index, s.segment]
-        axes, origin = np.ascontiguousarray(R @ s.frame), o + (R @ s.start[..., None])[..., 0]
-        spheres = _covering(origin, axes, s)
-        middle = origin + axes[:, :, 2] * (s.size[:, 0] / 2)[:, None]
+        axes, origin = R @ s.frame, o + (R @ s.start[..., None])[..., 0]
+        middle = origin + axes[:, :, 2] * (s.size[:, :1] / 2)
         reach = s.size[:, 0] / 2 + s.size[:, 5] + s.size[:, 1:3].max(1)
-        eye = self.camera.centre
-        lists = np.zeros((len(self.direction), len(origin) + 1), np.int64)
-        span = np.zeros((len(self.direction), 2))
-        _tracing.list_parts(self.direction, self.sine, self.cosine, eye, spheres, lists, span)
-        depth, alpha, picture = np.zeros((height, width)), np.zeros((height, width)), np.zeros((height, width, 3))
-        _tracing.render(eye, self.rays, self.across, lists, span, origin, axes, s.table, s.size, s.code, middle, reach,
-                        self._joins(figure, index), self.colours, self.lights, self.stripes, OFFSETS, depth, picture, alpha)
-        return Shot(np.where(depth < _tracing.FAR, 255, 0).astype(np.uint8), picture, alpha)
+        placed = np.column_stack([axes.swapaxes(1, 2).reshape(-1, 9), origin, middle, reach, s.size[:, 0], 1 / s.size[:, 1:3], s.size[:, 3],
+                                  (s.table.shape[1] - 1) / s.size[:, 0], s.size[:, 4]])
+        lists, span = np.zeros((len(self.direction), len(origin) + 1), np.int64), np.zeros((len(self.direction), 2))
+        _tracing.list_parts(self.direction, self.sine, self.cosine, eye, _covering(origin, axes, s), lists, span)
+        traced = eye, self.rays, self.across, lists, span, placed, self.table, s.code, self._joins(figure, index)
+        depth, near = np.empty((height, width)), np.empty((height, width), np.int64)
+        _tracing.find_surface(*traced, depth, near)
+        alpha, picture = np.empty((height, width)), np.empty((height, width, 3))
+        _tracing.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
+        return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha)
 
     def _joins(self, figure: Figure, index: int) -> Array:
         """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""

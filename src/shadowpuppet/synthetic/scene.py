@@ -16,13 +16,17 @@ SHADOW_PARTS = (("pelvis", "neck", 0.13), ("neck", "head", 0.09), ("left_shoulde
                     ("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.055))))
 """What casts the shadow: round sticks between joints, and their radius (m)."""
 
+COARSE = 4
+"""Pixels along a cell of the grid on which shadows are computed; they are soft."""
+
 
 class Room:
-    """A floor at z = 0 and a wall behind the person, with their texture, and two lamps; everything drawn from `rng`."""
+    """A floor at z = 0, walls around, one of them behind the person, with their texture, and two lamps; all drawn from `rng`."""
 
-    def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float) -> None:
+    def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float, least: float = 0.0) -> None:
+        """shadow: how dark the person's is, 0 to 1; least: the wall is at least so far behind the person, metres."""
         self.camera, self.shadow = camera, shadow
-        self.distance = rng.uniform(1.2, 3.5)
+        self.distance = max(rng.uniform(1.2, 3.5), least)
         side = rng.choice([-1, 1])
         key = np.array([side * rng.uniform(0.2, 0.7), -rng.uniform(0.5, 0.9), rng.uniform(0.5, 1.0)])
         fill = np.array([-side * rng.uniform(0.4, 0.9), -rng.uniform(0.3, 0.8), rng.uniform(0.1, 0.4)])
@@ -30,26 +34,35 @@ class Room:
         self.lights[0, :3], self.lights[1, :3] = key / np.linalg.norm(key), fill / np.linalg.norm(fill)
         self.lights[:, 3] = rng.uniform(0.45, 0.6), rng.uniform(0.12, 0.22), rng.uniform(0.45, 0.6)
         self.picture = self._paint(rng)
+        across = np.cross(self.lights[0, :3], [0.0, 0.0, 1.0])
+        across /= np.linalg.norm(across)
+        self._from_lamp = np.stack([across, np.cross(self.lights[0, :3], across), self.lights[0, :3]], 1)
+        coarse = np.stack(np.meshgrid(*(np.arange(-(-n // COARSE)) for n in camera.size)), -1)
+        self._seen = self._points(COARSE * coarse + (COARSE - 1) / 2)[0] @ self._from_lamp
 
-    def _points(self, pixels: Array) -> Array:
-        """Where the rays of pixels (..., 2) meet floor or wall, (..., 3)."""
-        R, eye = inverse(self.camera.T_camera_world)[:3, :3], self.camera.centre
-        ray = self.camera.rays(pixels) @ R.T
-        with np.errstate(divide="ignore"):
-            to_wall = np.where(ray[..., 1] > 1e-6, (self.distance - eye[1]) / ray[..., 1], np.inf)
-            to_floor = np.where(ray[..., 2] < -1e-6, -eye[2] / ray[..., 2], np.inf)
-        return eye + np.minimum(np.minimum(to_wall, to_floor), 60.0)[..., None] * ray
+    def _points(self, pixels: Array) -> tuple[Array, Array]:
+        """Where the rays of pixels (..., 2) meet floor or wall, (..., 3), and the place along the walls, (...), metres."""
+        eye, ray = self.camera.centre, self.camera.rays(pixels) @ inverse(self.camera.T_camera_world)[:3, :3].T
+        half = max(self.distance, 6.0, 1.2 * float(np.hypot(*eye[:2])))
+        ends = [(0, half, 20.0), (0, -half, -20.0), (1, self.distance, 0.0), (1, -half, 40.0), (2, 0.0, 0.0)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = np.stack([(end - eye[axis]) / ray[..., axis] for axis, end, _ in ends])
+        away[~(away > 0)] = np.inf
+        met = away.argmin(0)
+        points = eye + np.take_along_axis(away, met[None], 0)[0][..., None] * ray
+        along = np.where(met < 2, points[..., 1], points[..., 0]) + np.array([start for *_, start in ends])[met]
+        return points, along
 
     def _paint(self, rng: np.random.Generator) -> Array:
-        """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of nine rays."""
+        """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of four rays."""
         width, height = self.camera.size
-        grid = np.stack(np.meshgrid(np.arange(3 * width), np.arange(3 * height)), -1) / 3.0 - 1 / 3
-        points = self._points(grid)
-        wall = self._wall(points[..., 0], points[..., 2], rng)
+        grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
+        points, along = self._points(grid)
+        wall = self._wall(along, points[..., 2], rng)
         floor = self._floor(points[..., 0], points[..., 1], rng)
-        picture = np.where(points[..., 2:] < 1e-6, floor, wall)
+        picture = np.where(points[..., 2:] < 1e-9, floor, wall)
         picture *= 0.78 + 0.22 * np.exp(-((points[..., :1] - 0.5) ** 2 + (points[..., 2:] - 1.8) ** 2) / 6)
-        return picture.reshape(height, 3, width, 3, 3).mean((1, 3))
+        return picture.reshape(height, 2, width, 2, 3).mean((1, 3))
 
     def _wall(self, x: Array, z: Array, rng: np.random.Generator) -> Array:
         colour = np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.05, 0.4), rng.uniform(0.45, 0.85)))
@@ -76,25 +89,18 @@ class Room:
         if self.shadow == 0:
             return self.picture
         light = 1 - self.shadow * self._shade(figure, index)
-        return self.picture * cv2.resize(light, self.camera.size, interpolation=cv2.INTER_LINEAR)[..., None]
+        width, height = self.camera.size
+        return self.picture * cv2.resize(light, (COARSE * light.shape[1], COARSE * light.shape[0]), interpolation=cv2.INTER_LINEAR)[:height, :width, None]
 
-    def _shade(self, figure: Figure, index: int, coarse: int = 4) -> Array:
-        """How far the key lamp is hidden, 0 to 1, on a grid `coarse` times wider than the pixels.
+    def _shade(self, figure: Figure, index: int) -> Array:
+        """How far the key lamp is hidden, 0 to 1, on the coarse grid.
 
         The lamp is distant: seen from it, floor and wall points and sticks are points and lines of a plane. The edge softens
         with the distance between stick and shadow.
         """
-        light = self.lights[0, :3]
-        e1 = np.cross(light, [0.0, 0.0, 1.0])
-        e1 /= np.linalg.norm(e1)
-        basis = np.stack([e1, np.cross(light, e1), light], 1)
-        if not hasattr(self, "_seen"):
-            width, height = self.camera.size
-            grid = np.stack(np.meshgrid(np.arange((width + coarse - 1) // coarse), np.arange((height + coarse - 1) // coarse)), -1)
-            self._seen = self._points(coarse * grid + (coarse - 1) / 2) @ basis
         clear = np.ones(self._seen.shape[:2])
         for a, b, radius in SHADOW_PARTS:
-            start, end = (figure.joints[index, JOINTS.index(name)] @ basis for name in (a, b))
+            start, end = (figure.joints[index, JOINTS.index(name)] @ self._from_lamp for name in (a, b))
             along = end - start
             t = np.clip(((self._seen - start)[..., :2] @ along[:2]) / max(along[:2] @ along[:2], 1e-9), 0, 1)
             off = self._seen - start - t[..., None] * along

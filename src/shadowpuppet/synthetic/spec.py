@@ -30,7 +30,7 @@ class Gesture:
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
-class View:
+class Viewpoint:
     """A camera that looks horizontally, or pitched, at the vertical axis through the person's place."""
 
     name: Name = "cam"
@@ -88,12 +88,14 @@ class Spec:
     """The person."""
     motion: Annotated[tuple[Gesture, ...], Field(min_length=1)] = (Gesture(motion="wave_hands"),)
     """Gestures, one after another."""
-    cameras: Annotated[tuple[View, ...], Field(min_length=1)] = (View(),)
+    cameras: Annotated[tuple[Viewpoint, ...], Field(min_length=1)] = (Viewpoint(),)
     """One camera, or several."""
     scene: Scene = Scene()
     """Clothes, room and noise."""
     rate: Annotated[float, Field(ge=1, le=240)] = 15.0
     """Pictures a second."""
+    turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    """How far the person stands turned to their left, degrees; in the references they do not."""
     still: Annotated[float, Field(ge=0, le=3)] = 1.0
     """Factor on sway and tremor: 0 is a robot."""
     tells: Literal["height and distance", "height", "distance", "nothing"] = "height and distance"
@@ -124,11 +126,5 @@ def _siblings(place: tuple[int | str, ...]) -> str:
 
     kind: Any = Spec
     for key in place[:-1]:
-        kind = {"body": Mannequin, "motion": Gesture, "cameras": View, "scene": Scene}.get(str(key), kind)
+        kind = {"body": Mannequin, "motion": Gesture, "cameras": Viewpoint, "scene": Scene}.get(str(key), kind)
     return ", ".join(sorted(f.name for f in fields(kind)))
-
-
-def demo_spec() -> Spec:
-    """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
-    gestures = [Gesture(motion=name, seconds=s) for name, s in (("wave_hands", 3.6), ("bend_aside", 3.4), ("bow_forward", 2.9), ("reach", 4.5))]
-    return Spec(name="demo", body=Mannequin(stature=1.78), motion=tuple(gestures), scene=Scene(clothing=11, room=5))

@@ -15,7 +15,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.kinematics import SEGMENTS
 from shadowpuppet.synthetic.mannequin import Mannequin
 
-MATERIALS = ("skin", "shirt", "trousers", "hair", "shoes")
+MATERIALS = ("skin", "shirt", "trousers", "hair", "shoes", "eyes", "lips")
 GROUPS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Parts blend within a group, and groups with the trunk only close to their shoulder or hip: a hanging arm does not melt into the side."""
 SAMPLES = 33
@@ -58,7 +58,7 @@ class Surface(NamedTuple):
     size: Array
     """Length, both caps, blend, change of material, greatest radius, of shape (P, 6), metres."""
     code: np.ndarray
-    """Group, both materials, special, of shape (P, 4); special is 1 for the face, 2 for what bends with the fingers."""
+    """Index into `GROUPS` and twice into `MATERIALS`, of shape (P, 3)."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,9 @@ class Clothes:
 
         tone = rng.uniform(0, 1)
         skin = tuple(float(v) for v in (1 - tone) * np.array([0.86, 0.66, 0.55]) + tone * np.array([0.42, 0.27, 0.20]))
-        hair = tuple(float(v) for v in np.array([0.30, 0.20, 0.13]) * rng.uniform(0.3, 2.0))
-        colours = dict(skin=skin, hair=hair, shirt=colour(0.25, 0.85, 0.8), trousers=colour(0.1, 0.45, 0.5), shoes=colour(0.1, 0.4, 0.3))
+        hair = tuple(float(v) for v in np.array([0.30, 0.20, 0.13]) * rng.uniform(0.3, 1.4))
+        lips = (0.85 * skin[0], 0.6 * skin[1], 0.6 * skin[2])
+        colours = dict(skin=skin, hair=hair, lips=lips, eyes=(0.12, 0.10, 0.09), shirt=colour(0.25, 0.85, 0.8), trousers=colour(0.1, 0.45, 0.5), shoes=colour(0.1, 0.4, 0.3))
         return cls(rng.uniform(0.006, 0.022), float(rng.choice([0.28, 0.36, 0.9])), rng.uniform(0.004, 0.022), colours,
                    float(rng.choice([0, 0, 0.35])))
 
@@ -95,7 +96,7 @@ def surface(body: Mannequin, clothes: Clothes) -> Surface:
         lofts += limb + [_mirrored(loft) for loft in limb]
     lofts.sort(key=lambda loft: GROUPS.index(loft.group))
     table, size = zip(*(_sampled(loft) for loft in lofts))
-    code = [(GROUPS.index(p.group), *map(MATERIALS.index, p.materials), 1 if p.segment == "head" else 0) for p in lofts]
+    code = [(GROUPS.index(p.group), *map(MATERIALS.index, p.materials)) for p in lofts]
     return Surface(np.array([SEGMENTS.index(p.segment) for p in lofts]), np.stack([p.start for p in lofts]),
                    np.stack([p.frame for p in lofts]), np.stack(table), np.array(size), np.array(code))
 
@@ -132,18 +133,17 @@ def _trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
     shirt = ("shirt", "shirt")
     crotch = at["pelvis"][2] - 0.045 * H
     mid = lambda a, b, t: a + (b - a) * t  # noqa: E731
-    parts = [
-        _along("pelvis", at["pelvis"], [(crotch, 0.80 * hip, 0.66 * seat, 0.010), (crotch + 0.035 * H, 0.985 * hip, 0.97 * seat, 0.010),
-               (0.535 * H, hip, 0.97 * seat, 0.008), (0.57 * H, mid(hip, waist, 0.5), mid(seat, belly, 0.6), 0.002), (0.60 * H, waist, 0.97 * belly)],
-               caps=(0.03, 0.03), blend=0.03, materials=("trousers", "shirt"), change=0.548 * H - crotch),
-        _along("abdomen", at["lumbar"], [(0.565 * H, 0.97 * mid(hip, waist, 0.6), 0.94 * mid(seat, belly, 0.6)), (0.61 * H, 0.97 * waist, 0.97 * belly),
-               (0.65 * H, 0.96 * mid(waist, chest, 0.4), 0.95 * mid(belly, breast, 0.4)), (0.69 * H, 0.93 * chest, 0.90 * breast)],
-               caps=(0.03, 0.03), blend=0.035, materials=shirt),
-        _along("thorax", at["thoracic"], [(0.64 * H, 0.96 * mid(waist, chest, 0.4), 0.93 * mid(belly, breast, 0.4)), (0.69 * H, 0.97 * chest, 0.93 * breast),
-               (0.725 * H, chest, 0.97 * breast, 0.002), (0.765 * H, 0.96 * chest, 0.88 * breast, 0.008), (0.795 * H, 0.84 * chest, 0.66 * breast, 0.014),
-               (0.815 * H, 0.60 * chest, 0.45 * breast, 0.014)],
-               caps=(0.03, 0.022), blend=0.035, materials=shirt),
-    ]
+    rows = {
+        "pelvis": [(crotch, 0.74 * hip, 0.62 * seat, 0.010), (crotch + 0.03 * H, 0.96 * hip, 0.96 * seat, 0.010), (0.525 * H, hip, 0.98 * seat, 0.008),
+                   (0.57 * H, mid(hip, waist, 0.55), mid(seat, belly, 0.6), 0.002), (0.615 * H, 0.93 * waist, 0.93 * belly)],
+        "abdomen": [(0.57 * H, 0.92 * mid(hip, waist, 0.6), 0.92 * mid(seat, belly, 0.6)), (0.61 * H, 0.985 * waist, 0.985 * belly),
+                    (0.65 * H, 0.98 * mid(waist, chest, 0.4), 0.97 * mid(belly, breast, 0.4)), (0.69 * H, 0.91 * chest, 0.89 * breast)],
+        "thorax": [(0.64 * H, 0.91 * mid(waist, chest, 0.4), 0.91 * mid(belly, breast, 0.4)), (0.685 * H, 0.975 * chest, 0.95 * breast),
+                   (0.725 * H, chest, 0.98 * breast, 0.002), (0.765 * H, 0.96 * chest, 0.88 * breast, 0.008),
+                   (0.795 * H, 0.84 * chest, 0.66 * breast, 0.014), (0.815 * H, 0.60 * chest, 0.45 * breast, 0.014)],
+    }
+    parts = [_along(name, at[base], rows[name], caps=(0.04, 0.03), blend=0.03, materials=materials, change=0.545 * H - crotch)
+             for name, base, materials in (("pelvis", "pelvis", ("trousers", "shirt")), ("abdomen", "lumbar", shirt), ("thorax", "thoracic", shirt))]
     neck = m("neck") / (2 * np.pi)
     for sign in (1, -1):
         shoulder = at["left_shoulder"] * (sign, 1, 1)
@@ -152,11 +152,11 @@ def _trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
         parts.append(_between(("left" if sign > 0 else "right") + "_clavicle", at["left_clavicle"] * (sign, 1, 1), inner, outer,
                               [(0, 0.040, 0.034), (0.5, 0.048, 0.033), (1, 0.048 * body.girth, 0.038 * body.girth)], scale=H / 1.75,
                               caps=(0.03, 0.03), blend=0.05, materials=shirt))
-        if body.build < 0.6:
+        if body.build < 0.4:
             size = (1 - body.build) * H / 1.63 * body.girth
-            at_nipple = np.array([sign * 0.047 * H, -0.62 * breast, 0.715 * H])
-            parts.append(_between("thorax", at["thoracic"], at_nipple, at_nipple + np.array([sign * 0.006, -0.030, -0.004]),
-                                  [(0, 0.060, 0.058), (1, 0.046, 0.045)], scale=size, caps=(0.03, 0.03), blend=0.045, materials=shirt))
+            inside = np.array([sign * 0.046 * H, -0.56 * breast, 0.715 * H])
+            parts.append(_between("thorax", at["thoracic"], inside, inside + np.array([sign * 0.008, -0.024, -0.006]),
+                                  [(0, 0.066, 0.064), (1, 0.048, 0.046)], scale=size, caps=(0.03, 0.026), blend=0.06, materials=shirt))
     return parts
 
 
@@ -199,7 +199,12 @@ def _head(body: Mannequin, clothes: Clothes) -> list[Loft]:
     for sign in (1, -1):
         ear = centre + np.array([sign * width * 1.0, 0.10 * length, -0.08 * height])
         parts.append(ball(ear, 0.010 * unit, 0.018 * unit, 0.030 * unit, blend=0.006))
-    parts.append(ball(centre + np.array([0, 0.16 * length, 0.04 * height]), width + 0.7 * clothes.hair, 0.92 * length + clothes.hair,
+        eye = centre + np.array([sign * 0.42 * width, -0.86 * length, -0.02 * height])
+        parts.append(ball(eye, 0.012 * unit, 0.008 * unit, 0.006 * unit, blend=0.002, materials=("eyes", "eyes")))
+        parts.append(ball(eye + [sign * 0.002, -0.003, 0.016 * unit], 0.018 * unit, 0.008 * unit, 0.0035 * unit, blend=0.002, materials=("hair", "hair")))
+    mouth = centre + np.array([0, -0.93 * length, -0.275 * height])
+    parts.append(ball(mouth, 0.022 * unit, 0.010 * unit, 0.005 * unit, blend=0.004, materials=("lips", "lips")))
+    parts.append(ball(centre + np.array([0, 0.12 * length, 0.05 * height]), width + 0.7 * clothes.hair, 0.94 * length + clothes.hair,
                       0.42 * height + 0.6 * clothes.hair, blend=0.006, materials=("hair", "hair")))
     if body.build < 0.5 and clothes.hair > 0.008:
         top = centre + np.array([0, 0.45 * length, 0.02 * height])
@@ -271,13 +276,14 @@ def _leg(body: Mannequin, clothes: Clothes) -> list[Loft]:
     thigh, knee, calf, ankle = (m(name) / (2 * np.pi) for name in ("thigh", "knee", "calf", "ankle"))
     long, low = body.length("thigh"), body.length("shank")
     common = dict(group="left_leg", materials=("trousers", "trousers"))
-    rows = np.array([(-0.10, 0.99 * thigh, 0.98 * thigh, 0.014, 0.004), (0.12, thigh, 0.99 * thigh, 0.010, 0.0), (0.5, 0.85 * thigh, 0.87 * thigh, 0.004, -0.006),
-                     (0.85, 1.05 * knee, 1.08 * knee, 0.0, -0.004), (1, knee, 1.04 * knee, 0, 0)])
+    rows = np.array([(-0.06, 0.72 * thigh, 0.76 * thigh, -0.012, 0.004), (0.06, 0.92 * thigh, 0.95 * thigh, -0.010, 0.004),
+                     (0.2, 0.96 * thigh, 0.99 * thigh, -0.006, 0.0), (0.5, 0.84 * thigh, 0.88 * thigh, 0.0, -0.006),
+                     (0.85, 1.04 * knee, 1.08 * knee, 0.0, -0.004), (1, 0.93 * knee, 0.97 * knee, 0, 0)])
     rows[:, 0] *= long
     rows[:, 1:3] += loose
     down = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]])
-    parts = [Loft("left_thigh", np.array([0, 0, 0.10 * long]), down, _from_zero(rows), (0.05, 0.05), 0.03, **common)]
-    rows = np.array([(0, knee, 1.04 * knee, 0, 0), (0.25, calf, 1.02 * calf, 0.002, 0.018), (0.6, 0.72 * calf, 0.75 * calf, 0, 0.010), (0.9, 1.02 * ankle, 1.1 * ankle, 0, 0),
+    parts = [Loft("left_thigh", np.array([0, 0, 0.06 * long]), down, _from_zero(rows), (0.06, 0.05), 0.03, **common)]
+    rows = np.array([(0, 0.93 * knee, 0.97 * knee, 0, 0), (0.10, 0.97 * knee, knee, 0, 0.006), (0.28, calf, 1.02 * calf, 0.002, 0.018), (0.6, 0.72 * calf, 0.75 * calf, 0, 0.010), (0.9, 1.02 * ankle, 1.1 * ankle, 0, 0),
                      (1, ankle, 1.1 * ankle, 0, 0)])
     rows[:, 0] *= low
     rows[:, 1:3] += loose

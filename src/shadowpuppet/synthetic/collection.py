@@ -1,0 +1,56 @@
+"""Specs that the project uses again and again: the demo's, and the proving ground on which settings are chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, Viewpoint
+
+
+def demo_spec() -> Spec:
+    """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
+    gestures = _gestures("wave_hands 3.4, bend_aside 3.4, bow_forward 2.6, reach 4.4")
+    return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=11, room=5))
+
+
+PAPER = "wave_hands 3.4, bend_aside 3.4, bow_forward 2.6"
+PROVING = (
+    # name, kind and seed of the body, gestures, distance (m), fov (degrees), pitch (degrees), noise (grey levels), turn (degrees)
+    ("man_paper", "man", 1, PAPER, 2.0, 60, 0, 2.5, 0),
+    ("woman_paper", "woman", 2, PAPER, 2.0, 60, 0, 2.5, 0),
+    ("child_paper", "child", 3, PAPER, 1.8, 60, 0, 2.5, 0),
+    ("man_reach", "man", 4, "reach 6, forearms_up 3", 2.0, 60, 0, 2.5, 0),
+    ("woman_reach", "woman", 5, "reach 6, twist 3.2", 2.4, 55, 0, 2.5, 0),
+    ("woman_random", "woman", 6, "random 10", 2.2, 60, 0, 2.5, 0),
+    ("man_random", "man", 7, "random 10", 2.6, 50, 0, 2.5, 8),
+    ("child_random", "child", 8, "random 10", 2.2, 50, 5, 2.5, 0),
+    ("man_wide_near", "man", 9, "wave_hands 3.4, reach 6", 1.8, 75, 0, 2.5, 0),
+    ("woman_far", "woman", 10, "bend_aside 3.4, random 6", 3.5, 45, 0, 2.5, 0),
+    ("man_from_above", "man", 11, "wave_hands 3.4, reach 6", 2.4, 60, 15, 2.5, 0),
+    ("woman_from_below", "woman", 12, "bow_forward 2.6, overhead 3, twist 3.2", 2.2, 60, -12, 2.5, 0),
+    ("man_noisy", "man", 13, "wave_hands 3.4, random 6", 2.0, 60, 0, 8.0, 0),
+    ("woman_noisy", "woman", 14, "bend_aside 3.4, reach 6", 2.3, 60, 0, 6.0, -10),
+)
+
+
+def proving_ground() -> tuple[Spec, ...]:
+    """Recordings of one camera, bodies x motions x cameras x noise, each of about ten seconds, to choose settings by.
+
+    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`. Cameras stand at 0.9 of the stature when level,
+    so that the picture cuts the legs; higher or lower when pitched, so that the person stays in it.
+    """
+    return tuple(_proof(n, *row) for n, row in enumerate(PROVING))
+
+
+def _proof(n: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float, turn: float) -> Spec:
+    body = Mannequin.draw(np.random.default_rng(seed), kind)
+    height = 0.9 * body.stature + distance * float(np.tan(np.radians(pitch)))
+    view = Viewpoint(fov_deg=fov, height=height, distance=distance, pitch_deg=pitch)
+    return Spec(name=name, body=body, motion=_gestures(gestures), cameras=(view,), scene=Scene(clothing=n, room=n, noise=noise), turn_deg=turn)
+
+
+def _gestures(text: str) -> tuple[Gesture, ...]:
+    """Gestures from `name seconds, name seconds`."""
+    pairs = (item.split() for item in text.split(","))
+    return tuple(Gesture(motion=name, seconds=float(seconds)) for name, seconds in pairs)  # pyright: ignore[reportArgumentType]
