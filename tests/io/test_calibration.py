@@ -62,7 +62,8 @@ def test_what_is_written_is_read(tmp_path, rig):
 
 def test_what_other_programs_add_is_skipped(tmp_path):
     text = section(without=["fisheye", "name"], size="[640.0, 480.0]", error="0.4", port="3", grid_count="[1, 2]")
-    found = read(tmp_path, f"# by another program\nversion = 3\n[capture]\nfps = 30\n{text}[metadata]\nadjusted = false\nerror = 0\n")
+    others = "# by another program\nversion = 3\n[capture]\nfps = 30\n"
+    found = read(tmp_path, others + text + "[metadata]\nadjusted = false\nerror = 0\n")
     assert [(c.name, c.size, c.fisheye) for c in found] == [("cam1", (640, 480), False)]
 
 

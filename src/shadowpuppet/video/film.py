@@ -22,8 +22,12 @@ if TYPE_CHECKING:
 
 PLAIN_LUMA = re.compile(r"yuvj?4\d\dp|nv12|nv16|nv21|gray")
 """Pixel formats whose first plane is the 8-bit luma."""
+DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")
+"""Those with more bits."""
 FULL_RANGE = 2
 """FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
+LONGEST_STUTTER = 1.0
+"""Seconds; times that go back by more have started anew."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
 """Video's usual luma range, 16..235, stretched to 0..255."""
 
@@ -53,17 +57,18 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
 
 def _frames(path: Path, film: FrameSource, grey: bool, rate: float | None) -> Iterator[Frame]:
     step = 1 / (film.rate if math.isfinite(film.rate) else ASSUMED_RATE)
-    clock, convert, n, time, broken = _Clock(path, step), _converter(grey), 0, -step, ""
+    clock, convert, n, broken = _Clock(path, step), _converter(grey), 0, ""
+    time = previous = longest = 0.0
     with _opened(path) as (container, stream):
         try:
             for frame in _decoded(container, stream):
                 time, image = n / rate if rate else clock(frame), convert(frame)
                 check_size(path, n, time, image, film.size)
                 yield Frame(time, image)
-                n += 1
+                longest, previous, n = max(longest, time - previous), time, n + 1
         except _Break as cause:
             broken = str(cause)
-    missing = film.duration - time - step > step / 2  # False where the duration is not a number
+    missing = film.duration - time > 1.5 * max(longest, step)  # False where the duration is not a number
     if not broken and missing and not rate and n != film.count:
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
@@ -73,6 +78,8 @@ def _frames(path: Path, film: FrameSource, grey: bool, rate: float | None) -> It
 
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
+    if container.format.name == "avi" and stream.frames and stream.average_rate:
+        return float(stream.frames / stream.average_rate)  # FFmpeg's figure is that of what is left of the file
     if stream.duration is not None and stream.time_base is not None:
         return float(stream.duration * stream.time_base)
     tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska's, for each stream
@@ -160,7 +167,7 @@ class _Clock:
             return time
         self.bad_pts += 1
         self._tell(self.last, "is followed by one that is not later; times are moved so that they increase")
-        if self.last - time < self.step:  # a stutter: the times after it are right again
+        if self.last - time < LONGEST_STUTTER:  # the times after it are right again
             return self.last + self.step / 2
         self.shift += self.last + self.step - time  # a new start
         return self.last + self.step
@@ -184,6 +191,8 @@ def _converter(grey: bool) -> Callable[[VideoFrame], Image]:
     def convert(frame: VideoFrame) -> Image:
         if grey and PLAIN_LUMA.fullmatch(frame.format.name):
             image = _luma(frame)
+        elif grey and DEEP_LUMA.match(frame.format.name):
+            image = reformat(frame, format="gray").to_ndarray()
         else:
             image = reformat(frame, format="bgr24").to_ndarray()
             image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if grey else image
