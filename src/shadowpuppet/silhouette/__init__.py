@@ -1,0 +1,12 @@
+"""Pictures into silhouettes of a person before a fixed camera.
+
+`learn_background` learns the empty scene; the `Segmenter` that it returns turns each picture into a mask.
+"""
+
+from shadowpuppet.silhouette.background import background_from_film
+from shadowpuppet.silhouette.learning import learn_background
+from shadowpuppet.silhouette.ready import ready_mask
+from shadowpuppet.silhouette.segmenter import Segmenter
+from shadowpuppet.silhouette.settings import SilhouetteSettings
+
+__all__ = ["Segmenter", "SilhouetteSettings", "background_from_film", "learn_background", "ready_mask"]

@@ -1,0 +1,187 @@
+"""What the empty scene looks like, and how much it varies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import SilhouetteError
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+SMOOTHING = 0.7
+"""Standard deviation (pixels) of the smoothing that detection sees: it halves the noise, and the outline is drawn without it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Background:
+    """Statistics of an empty scene."""
+
+    frames: int
+    """How many pictures they were learnt from."""
+    colour: bool
+    """Whether the pictures have colour channels."""
+    brightness: NDArray[np.float64]
+    """Mean brightness, of shape (H, W), grey levels."""
+    sigma: NDArray[np.float64]
+    """Standard deviation of brightness, of shape (H, W), grey levels."""
+    mean: Floats
+    """Mean Y, Cr, Cb, of shape (H, W, 3)."""
+    smooth_sigma: Floats
+    """Standard deviation of the smoothed Y, Cr, Cb, of shape (H, W, 3)."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width, pixels."""
+        return self.brightness.shape[0], self.brightness.shape[1]
+
+    @property
+    def image_shape(self) -> tuple[int, ...]:
+        """The shape of its pictures: (H, W, 3) or (H, W)."""
+        return (*self.shape, 3) if self.colour else self.shape
+
+
+def learn_statistics(images: Iterable[Image], see: Callable[[Image], object] = lambda image: None) -> Background:
+    """Means and standard deviations of pictures (H, W, 3) or (H, W), taken one at a time and shown to `see`.
+
+    Raises `SilhouetteError` for pictures that are none or unlike each other, and without any.
+    """
+    sums = None
+    for n, image in enumerate(images):
+        check_image(image, f"background frame {n}")
+        if sums is None:
+            sums = _Sums(image)
+        check_alike(image, sums.shape, f"background frame {n}")
+        sums.add(image)
+        see(image)
+    if sums is None:
+        raise SilhouetteError("background: found no frame, expected a picture or film of the empty scene; "
+                              "without one, it is taken from the film itself (background_from_film)")
+    return sums.statistics()
+
+
+class _Sums:
+    """Running sums; exact, since pixels are whole numbers."""
+
+    def __init__(self, image: Image) -> None:
+        self.shape, self.frames = image.shape, 0
+        flat, deep = image.shape[:2], (*image.shape[:2], 3)
+        self.grey, self.planes, self.smooth = ([np.zeros(s), np.zeros(s)] for s in (flat, deep, deep))
+
+    def add(self, image: Image) -> None:
+        import cv2
+
+        self.frames += 1
+        planes = to_planes(image)
+        seen = [(self.grey, to_brightness(image)), (self.planes, planes), (self.smooth, smoothed(planes))]
+        for (first, second), values in seen:
+            cv2.accumulate(values, first)
+            cv2.accumulateSquare(values, second)
+
+    def statistics(self) -> Background:
+        def moments(sums: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+            first, second = sums
+            variance = np.maximum(self.frames * second - first**2, 0) / self.frames**2
+            return first / self.frames, np.sqrt(variance)
+
+        brightness, sigma = moments(self.grey)
+        return Background(self.frames, len(self.shape) == 3, brightness, sigma, moments(self.planes)[0].astype(np.float32),
+                          moments(self.smooth)[1].astype(np.float32))
+
+
+def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
+    """The empty scene as the median, pixel by pixel, of `count` to twice as many frames spread over a film: (H, W, 3) or (H, W).
+
+    Memory does not grow with the film. Right wherever the person is elsewhere for more than half of it; who stands still becomes
+    background. Raises `SilhouetteError` for fewer than 3 frames.
+    """
+    frames = spread(images, count)
+    if len(frames) < 3:
+        raise SilhouetteError(f"background: found a film of {len(frames)} frames, expected at least 3 to tell a person who moves "
+                              "from the scene; give a picture or film of the empty scene")
+    for n, image in enumerate(frames):
+        check_image(image, f"film frame {n}")
+        check_alike(image, frames[0].shape, f"film frame {n}")
+    middle, rows = len(frames) // 2, 32
+    strips = (np.stack([f[y : y + rows] for f in frames]) for y in range(0, len(frames[0]), rows))
+    return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
+
+
+class Spread:
+    """Copies of `count` to twice as many of the pictures added (of all, where they are fewer), evenly spread over them."""
+
+    def __init__(self, count: int) -> None:
+        """Start with none."""
+        self.kept: list[Image] = []
+        self._count, self._step, self._seen = count, 1, 0
+
+    def add(self, image: Image) -> None:
+        """The next picture."""
+        if self._seen % self._step == 0:
+            self.kept.append(np.array(image))
+            if len(self.kept) == 2 * self._count:
+                self.kept, self._step = self.kept[::2], 2 * self._step
+        self._seen += 1
+
+
+def spread(images: Iterable[Image], count: int) -> list[Image]:
+    """The pictures that `Spread` keeps of a sequence."""
+    kept = Spread(count)
+    for image in images:
+        kept.add(image)
+    return kept.kept
+
+
+def film_noise(frames: list[Image], mean: Floats) -> NDArray[np.float64]:
+    """Standard deviation of a film's Y, Cr, Cb (3,), grey levels, from the smoothed background (H, W, 3) where nobody is.
+
+    It is what 68 % of all pixels stay under, as one standard deviation of a normal distribution; a person who covers less than a
+    third of the picture hardly moves it.
+    """
+    differences = [np.abs(smoothed(to_planes(f).astype(np.float32)) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
+    return np.percentile(np.concatenate(differences), 68, axis=0)
+
+
+def to_planes(image: Image) -> Image:
+    """Y, Cr, Cb (H, W, 3) of a picture (H, W, 3) blue green red, or (H, W) grey: without colour then."""
+    import cv2
+
+    if image.ndim == 3:
+        return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), np.uint8)
+    neutral = np.full_like(image, 128)
+    return np.asarray(cv2.merge([image, neutral, neutral]), np.uint8)
+
+
+def to_brightness(image: Image) -> Image:
+    """Brightness (H, W) of a picture (H, W, 3) or (H, W)."""
+    import cv2
+
+    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def smoothed(planes: np.ndarray) -> np.ndarray:
+    """Planes (H, W, 3) with the noise of single pixels averaged out."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(planes, (3, 3), SMOOTHING), planes.dtype)
+
+
+def check_image(image: np.ndarray, name: str) -> None:
+    """Raise `SilhouetteError` for what is no picture (H, W) or (H, W, 3) of 8 bits."""
+    shape = getattr(image, "shape", ())
+    if len(shape) not in (2, 3) or shape[2:] not in ((), (3,)) or not image.size:
+        found = f"an array of shape {shape}" if shape else type(image).__name__
+        raise SilhouetteError(f"{name}: found {found}, expected a picture of shape (H, W, 3), blue green red, or (H, W), grey")
+    if image.dtype != np.uint8:
+        raise SilhouetteError(f"{name}: found values of type {image.dtype}, expected 8 bits, 0 to 255 (uint8)")
+
+
+def check_alike(image: np.ndarray, shape: tuple[int, ...], name: str) -> None:
+    """Raise `SilhouetteError` for a picture of another size, or with or without colour unlike `shape`."""
+    if image.shape != shape:
+        found, expected = (f"{s[1]} x {s[0]} {'grey' if len(s) == 2 else 'colour'}" for s in (image.shape, shape))
+        raise SilhouetteError(f"{name}: found {found}, expected {expected} as the background; "
+                              "film and background must come from one camera at one setting")

@@ -1,0 +1,125 @@
+"""Tests that a pixel must pass to be foreground.
+
+Each is called with a picture and labels its pixels: 0 background, 1 perhaps a person, 2 a person.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.silhouette.background import Floats, Image, smoothed, to_brightness, to_planes
+from shadowpuppet.silhouette.outlines import Mask
+
+KEYED = {"brightness": (1, 0, 0), "colour": (0, 1, 1), "both": (1, 1, 1)}
+"""Channels of Y, Cr, Cb that each key compares."""
+SHADOWED = {"brightness": (1, 1, 1), "colour": (0, 1, 1), "both": (1, 1, 1)}
+"""Channels that a shadow must explain: colour tells it from dark clothes even where brightness alone is the key."""
+CERTAIN = 2.0
+"""How many times more than a pixel that may belong to a person one must differ that surely does."""
+NEAR = 20
+"""Grey levels within which a pixel is near to a sample of the background (OpenCV's dist2Threshold is its square)..."""
+NEEDED = 2
+"""... and how many samples it must be near to."""
+SAMPLES = 7
+"""Samples kept, to twice as many."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyRule:
+    """Pixels that differ by `factor` standard deviations in the key's channels, taken together, and are no shadow."""
+
+    key: str
+    mean: Floats
+    """The smoothed background's Y, Cr, Cb, of shape (H, W, 3)."""
+    inverse_sigma: Floats
+    """One over the standard deviation assumed, of shape (H, W, 3)."""
+    factor: float
+    darkest: float
+    """Least share of its light that a background keeps in a shadow; 1 where nothing is taken for shadow."""
+
+    def __call__(self, image: Image) -> Mask:
+        """Labels (H, W) of a picture (H, W, 3) or (H, W)."""
+        return self.labels(smoothed(to_planes(image)))
+
+    def labels(self, planes: Image) -> Mask:
+        """Labels (H, W) of smoothed Y, Cr, Cb (H, W, 3)."""
+        from shadowpuppet.silhouette._kernels import classify
+
+        label = np.empty(planes.shape[:2], np.uint8)
+        keyed, shadowed = np.array(KEYED[self.key], np.float32), np.array(SHADOWED[self.key], np.float32)
+        weak, strong = np.float32(self.factor), np.float32(CERTAIN * self.factor)
+        classify(planes, self.mean, self.inverse_sigma, keyed, shadowed, np.float32(self.darkest), weak, strong, label)
+        return label
+
+
+@dataclass(frozen=True, eq=False)
+class PlainRule:
+    """Liu 2011, eq. 1: |I_B - I_t| >= factor * sigma_B, as the range of whole numbers that are background, pixel by pixel."""
+
+    lowest: Image
+    highest: Image
+    """Both of shape (H, W); where `lowest` exceeds `highest`, every value is foreground."""
+
+    @classmethod
+    def of(cls, mean: NDArray[np.float64], sigma: NDArray[np.float64], factor: float) -> PlainRule:
+        """The rule for a mean and a standard deviation of brightness (H, W)."""
+        reach = factor * sigma
+        values = np.floor(mean - reach) + np.arange(3)[:, None, None]
+        # The rule itself decides between neighbours, so that rounding cannot make the range differ from it.
+        lowest = values[0] + np.count_nonzero(np.abs(mean - values) >= reach, axis=0)
+        values = np.ceil(mean + reach) - np.arange(3)[:, None, None]
+        highest = values[0] - np.count_nonzero(np.abs(mean - values) >= reach, axis=0)
+        empty = lowest > highest
+        lowest, highest = np.where(empty, 1, np.clip(lowest, 0, 255)), np.where(empty, 0, np.clip(highest, 0, 255))
+        return cls(lowest.astype(np.uint8), highest.astype(np.uint8))
+
+    def __call__(self, image: Image) -> Mask:
+        """Labels (H, W), 0 or 2, of a picture (H, W, 3) or (H, W)."""
+        import cv2
+
+        within = np.asarray(cv2.inRange(to_brightness(image), self.lowest, self.highest), np.uint8)
+        return np.bitwise_and(~within, np.uint8(2))
+
+
+class MixtureRule:
+    """OpenCV's mixture of Gaussians (Stauffer & Grimson 1999, Zivkovic 2004), which no longer learns when it is called."""
+
+    def __init__(self, shadow: bool) -> None:
+        """`shadow`: its own test takes darkened background for shadow, not for foreground."""
+        import cv2
+
+        self._subtractor = cv2.createBackgroundSubtractorMOG2(detectShadows=shadow)
+
+    def learn(self, image: Image) -> None:
+        """The next picture of the empty scene."""
+        self._subtractor.apply(image)
+
+    def __call__(self, image: Image) -> Mask:
+        """Labels (H, W), 0 or 2, of a picture (H, W, 3) or (H, W)."""
+        return np.where(self._subtractor.apply(image, learningRate=0) == 255, 2, 0).astype(np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class NeighbourRule:
+    """Pixels that hardly any picture of the empty scene is near to (Zivkovic & van der Heijden 2006).
+
+    With the numbers of OpenCV's KNN subtractor, which itself cannot be used: it goes on learning at a learning rate of 0, so that
+    a mask would depend on the frames before.
+    """
+
+    samples: NDArray[np.uint8]
+    """Pictures of the empty scene, of shape (N, H, W, C)."""
+    shadows: KeyRule | None
+    """Whose shadows are background; None for none."""
+
+    def __call__(self, image: Image) -> Mask:
+        """Labels (H, W), 0 or 2, of a picture (H, W, 3) or (H, W)."""
+        from shadowpuppet.silhouette._kernels import far_from_samples
+
+        far = np.empty(image.shape[:2], np.uint8)
+        deep = np.ascontiguousarray(image).reshape(*image.shape[:2], -1)
+        far_from_samples(deep, self.samples, NEAR * NEAR, min(NEEDED, len(self.samples)), far)
+        return 2 * far if self.shadows is None else 2 * (far & (self.shadows(image) > 0))
