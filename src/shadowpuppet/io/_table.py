@@ -1,0 +1,124 @@
+"""Tables with named columns, one row a frame (CSV), and what is said where one is malformed."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shadowpuppet.errors import FormatError
+from shadowpuppet.geometry import Array
+from shadowpuppet.io._files import read_text
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table as text; columns become numbers when they are asked for, so that others may hold anything."""
+
+    path: Path
+    columns: tuple[str, ...]
+    rows: list[list[str]]
+    lines: list[int]
+    """The file's line that each row stands in."""
+
+    def numbers(self, names: Sequence[str]) -> Array:
+        """Columns as an array (T, len(names)), not a number in empty cells. Raises `FormatError` naming line and column."""
+        places = [self._place(name) for name in names]
+        rows = [self._row(i, places) for i in range(len(self.rows))]
+        return np.array(rows, float).reshape(len(rows), len(places))
+
+    def texts(self, name: str) -> list[str]:
+        """A column as it stands. Raises `FormatError` where there is none."""
+        place = self._place(name)
+        return [row[place].strip() for row in self.rows]
+
+    def times(self) -> Array:
+        """The column `time`, of shape (T,), seconds. Raises `FormatError` where one is missing or not after that before it."""
+        times = self.numbers(["time"])[:, 0]
+        check_times(self.path, times, self.lines)
+        return times
+
+    def _place(self, name: str) -> int:
+        if name not in self.columns:
+            raise FormatError(f"{self.path}: no column {name!r}; columns there: {shorten(self.columns)}")
+        return self.columns.index(name)
+
+    def _row(self, i: int, places: list[int]) -> list[float]:
+        return [number(self.path, self.lines[i], self.columns[place], self.rows[i][place]) for place in places]
+
+
+def number(path: Path, line: int, column: str, cell: str) -> float:
+    """The number in a cell, none where it is empty. Raises `FormatError` naming line and column."""
+    try:
+        value = float(cell) if cell and not cell.isspace() else np.nan
+    except ValueError:
+        value = np.inf
+    if value in (np.inf, -np.inf):
+        raise FormatError(f"{path}: line {line}, column {column!r}: found {shorten([cell])!r}, expected a number or nothing")
+    return value
+
+
+def check_times(path: Path, times: Array, lines: Sequence[int]) -> None:
+    """Raise `FormatError`, naming the line, where times (T,) are missing or do not increase."""
+    bad = np.flatnonzero(~np.isfinite(times) | (np.diff(times, prepend=-np.inf) <= 0))
+    if len(bad):
+        i = int(bad[0])
+        before = f"more than the {times[i - 1]:g} of the row before" if i and np.isfinite(times[i]) else "seconds"
+        found = f"{times[i]:g}" if np.isfinite(times[i]) else "no number"
+        raise FormatError(f"{path}: line {lines[i]}, column 'time': found {found}, expected {before}")
+
+
+def read_table(path: Path, cut: bool = False) -> Table:
+    """Read a CSV table with a header line. Raises `FormatError`, naming file and line.
+
+    `cut`: the writer may have been killed, so that a last line without its end is left out.
+    """
+    text = read_text(path)
+    if cut:
+        text = text[: text.rfind("\n") + 1]
+    reader = csv.reader(io.StringIO(text, newline=""))
+    rows, lines = [], []
+    try:
+        for row in reader:
+            if len(row) > 1 or any(map(str.strip, row)):
+                rows.append(row)
+                lines.append(reader.line_num)
+    except csv.Error as error:
+        raise FormatError(f"{path}: line {reader.line_num}: {error}, expected a table with commas (CSV)") from None
+    columns = tuple(cell.strip() for cell in rows[0]) if rows else ()
+    _check_columns(path, columns)
+    for row, line in zip(rows[1:], lines[1:]):
+        if len(row) != len(columns):
+            raise FormatError(f"{path}: line {line}: found {len(row)} cells, expected {len(columns)} as in the header")
+    return Table(path, columns, rows[1:], lines[1:])
+
+
+def csv_line(cells: Iterable[str]) -> str:
+    """One line of a CSV table."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerow(cells)
+    return out.getvalue()
+
+
+def cells(values: Iterable[float], decimals: int = 6) -> list[str]:
+    """Numbers as cells; empty where not a number."""
+    return ["" if value != value else f"{value:.{decimals}f}" for value in values]
+
+
+def shorten(words: Iterable[str], limit: int = 120) -> str:
+    """Words as a list, cut to a length that a message can have."""
+    text = ", ".join(words)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _check_columns(path: Path, columns: tuple[str, ...]) -> None:
+    named = [name for name in columns if name]
+    twice = [name for i, name in enumerate(named) if name in named[:i]]
+    if twice:
+        raise FormatError(f"{path}: column {twice[0]!r}: found it twice, expected every column once")
+    if "time" not in columns:
+        raise FormatError(f"{path}: no column 'time', expected a header time,<name>,...; found {shorten(columns)!r}")

@@ -1,0 +1,71 @@
+"""A person's sizes as a file (person.toml), so that they are measured once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
+from shadowpuppet.io._files import write_whole
+from shadowpuppet.io.calibration import read_toml
+
+if TYPE_CHECKING:  # the body brings its kernels' compiler
+    from shadowpuppet.body import CardboxSizes
+
+KEYS = ("height", "source", "notes", "sizes")
+HEIGHTS = (0.5, 2.5)
+"""What can be true, metres."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person as the model has them. Raises `ShadowPuppetError` where the height cannot be one."""
+
+    sizes: CardboxSizes
+    height: float | None = None
+    """Metres, shoes on; None where it is not known."""
+    source: str = ""
+    """What the sizes come from, such as `references` or `proportions`."""
+    notes: str = ""
+    """Anything that a person wants to remember."""
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if self.height is not None and (not _is_number(self.height) or not HEIGHTS[0] <= self.height <= HEIGHTS[1]):
+            raise ShadowPuppetError(f"height: found {self.height!r}, expected {HEIGHTS[0]:g} to {HEIGHTS[1]:g} metres")
+        for key in ("source", "notes"):
+            if not isinstance(getattr(self, key), str):
+                raise ShadowPuppetError(f"{key}: found {getattr(self, key)!r}, expected text in quotes")
+
+
+def read_person(path: str | Path) -> Person:
+    """A person from a file. Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible."""
+    from shadowpuppet.body import CardboxSizes
+
+    path = Path(path)
+    data = read_toml(path, FormatError)
+    unknown = set(data) - set(KEYS)
+    if unknown:
+        raise FormatError(f"{path}: found the key {min(unknown)!r}; keys known: {choices(KEYS)}")
+    sizes = data.pop("sizes", None)
+    if not isinstance(sizes, dict):
+        raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(CardboxSizes.names())}")
+    try:
+        return Person(CardboxSizes.from_mapping(sizes), **data)
+    except ShadowPuppetError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def write_person(path: str | Path, person: Person) -> None:
+    """Write a person so that `read_person` gives them back. Raises `ShadowPuppetError` where that fails."""
+    import tomli_w
+
+    known: dict[str, Any] = {} if person.height is None else {"height": float(person.height)}
+    sizes = dict(zip(person.sizes.names(), person.sizes.to_array().tolist()))
+    head = "# Lengths in metres; the sizes are a1..a18 of Liu 2011, Fig. 2.\n"
+    write_whole(Path(path), head + tomli_w.dumps({**known, "source": person.source, "notes": person.notes, "sizes": sizes}))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -1,0 +1,186 @@
+"""How good a motion is: errors against a truth, and what is known without one. Metres throughout; summaries have millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion import BONES, JointTable, Motion
+
+UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
+"""What is compared where one camera saw the upper body."""
+LIMBS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
+"""What is compared where the whole body was seen."""
+LOST, FAR = 0.5, 0.3
+"""Metres: what a joint that is not there counts, so that leaving out bad frames never helps; and beyond which one is far off."""
+LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""World to camera of a level camera that looks along the world's y."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointErrors:
+    """Distances between joints and their truth. Joints that the run lacks count as `LOST` in every distance."""
+
+    names: tuple[str, ...]
+    """Joints compared, J of them."""
+    known: NDArray[np.bool_]
+    """Where there is a truth, of shape (T, J)."""
+    lost: NDArray[np.bool_]
+    """Where there is a truth but no joint, of shape (T, J)."""
+    distance: Array
+    """In space, of shape (T, J), metres."""
+    plane: Array
+    """Across the camera's optical axis."""
+    depth: Array
+    """Along the camera's optical axis."""
+    aligned: Array
+    """In space, less each frame's mean offset over the joints."""
+
+    def summary(self) -> dict[str, Any]:
+        """Figures in millimetres, over all joints and for each: mean, RMSE, percentiles, share that is far off."""
+        joints = {name: _summary(self._values(k)) for k, name in enumerate(self.names) if self.known[:, k].any()}
+        return {"frames": len(self.known), "lost": int(self.lost.any(1).sum()), **_summary(self._values()), "joints": joints}
+
+    def _values(self, joint: int | None = None) -> dict[str, Array]:
+        """Distances of each kind, of one joint or all, where there is a truth."""
+        these = np.arange(len(self.names)) if joint is None else np.array([joint])
+        kinds = ("distance", "plane", "depth", "aligned")
+        return {kind: getattr(self, kind)[:, these][self.known[:, these]] for kind in kinds}
+
+
+def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | None = None, *, camera: Camera | None = None,
+                 start: int = 0) -> JointErrors:
+    """Compare joints with a truth, frame by frame of the truth from `start` on.
+
+    Frames belong together that are nearest in time, within half a step of the truth. `joints`: those compared, by default
+    `default_joints`. `camera` says what is plane and depth; left out, it is level and looks along the world's y.
+    Raises `ShadowPuppetError` where joints are missing, or there is nothing to compare.
+    """
+    names = default_joints(run, truth) if joints is None else tuple(joints)
+    _check_joints(names, run, truth)
+    index, matched = match(run.times, truth.times[start:])
+    reference = truth.select(names).positions[start:]
+    found = run.select(names).positions[index]
+    found[~matched] = np.nan
+    known = np.asarray(np.isfinite(reference).all(2))
+    if not known.any():
+        raise ShadowPuppetError("the truth has no position of any of the joints compared, so there is nothing to compare")
+    lost = known & ~np.asarray(np.isfinite(found).all(2))
+    delta = found - reference
+    across = delta @ (LEVEL if camera is None else camera.T_camera_world[:3, :3]).T
+    distances = (np.linalg.norm(delta, axis=2), np.linalg.norm(across[..., :2], axis=2), np.abs(across[..., 2]),
+                 np.linalg.norm(delta - _offsets(delta), axis=2))
+    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances))
+
+
+def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:
+    """`LIMBS` of a run that has legs, else `UPPER`; those that both have."""
+    group = LIMBS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER
+    return tuple(name for name in group if name in run.names and name in truth.names)
+
+
+def match(times: ArrayLike, truth_times: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """For each time of the truth (T,) the index of the nearest of `times` (increasing), and whether it is within half a step.
+
+    The step is the truth's median one; a truth of one frame takes any.
+    """
+    times, truth_times = np.asarray(times, float), np.asarray(truth_times, float)
+    after = np.clip(np.searchsorted(times, truth_times), 1, max(len(times) - 1, 1))
+    before, after = after - 1, np.minimum(after, len(times) - 1)
+    index = np.where(np.abs(times[before] - truth_times) <= np.abs(times[after] - truth_times), before, after)
+    half = 0.5 * np.median(np.diff(truth_times)) if len(truth_times) > 1 else np.inf
+    return index, np.abs(times[index] - truth_times) <= half + 1e-9
+
+
+def overlap(model: NDArray[np.bool_], silhouette: NDArray[np.bool_], ignore: NDArray[np.bool_] | None = None) -> float:
+    """Intersection over union of two masks (H, W); not a number where both are empty. `ignore`: pixels that do not count."""
+    if ignore is not None:
+        model, silhouette = model & ~ignore, silhouette & ~ignore
+    union = np.count_nonzero(model | silhouette)
+    return np.count_nonzero(model & silhouette) / union if union else np.nan
+
+
+def statistics(values: ArrayLike) -> dict[str, float]:
+    """Count, mean, standard deviation, percentiles and extremes of the finite `values`; the count alone where there is none."""
+    values = np.asarray(values, float)
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return {"count": 0}
+    p5, p50, p95 = np.percentile(values, [5, 50, 95]).tolist()
+    return {"count": values.size, "mean": float(values.mean()), "sd": float(values.std()), "min": float(values.min()), "p5": p5,
+            "p50": p50, "p95": p95, "max": float(values.max())}
+
+
+def accelerations(table: JointTable) -> Array:
+    """Accelerations (T - 2, J, 3), m/s^2, by second differences: a constant one is exact whatever the steps of time."""
+    step = np.diff(table.times)[:, None, None]
+    speed = np.diff(table.positions, axis=0) / step
+    return np.diff(speed, axis=0) / (0.5 * (step[1:] + step[:-1]))
+
+
+def jitter(table: JointTable) -> float:
+    """Root mean square acceleration of joints, m/s^2, over the frames that have neighbours; not a number where none has.
+
+    It has the motion's own in it and grows with the frame rate: compare it with that of the truth, or of another run of the film.
+    """
+    squares = (accelerations(table) ** 2).sum(2)
+    squares = squares[np.isfinite(squares)]
+    return float(np.sqrt(squares.mean())) if squares.size else np.nan
+
+
+def bone_lengths(table: JointTable) -> dict[str, dict[str, float]]:
+    """`statistics` of the length (m) of every limb bone whose joints are there, by the bone's name `<joint>-<joint>`.
+
+    A skeleton's are constant by its making; those of triangulated or measured joints are not.
+    """
+    bones = [(a, b) for a, b in BONES if a.split("_")[0] == b.split("_")[0] and a in table.names and b in table.names]
+    ends = {name: table.positions[:, i] for i, name in enumerate(table.names)}
+    return {f"{a}-{b}": statistics(np.linalg.norm(ends[a] - ends[b], axis=1)) for a, b in bones}
+
+
+def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[str] | None = None, *,
+             camera: Camera | None = None, start: int = 0) -> dict[str, Any]:
+    """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments."""
+    run = motion.table
+    errors = None if truth is None else joint_errors(run, truth, joints, camera=camera, start=start)
+    names = errors.names if errors else joints or default_joints(run, run)
+    said: dict[str, Any] = {"frames": len(motion), "status": motion.status_counts, "overlap": statistics(motion.overlap),
+                            "cost_px": statistics(motion.cost), "jitter_m_s2": jitter(run.select(names)),
+                            "bones_m": bone_lengths(run)}
+    if truth is not None and errors is not None:
+        said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary()}
+    return said
+
+
+def _check_joints(names: tuple[str, ...], run: JointTable, truth: JointTable) -> None:
+    for what, table in (("run", run), ("truth", truth)):
+        missing = [name for name in names if name not in table.names]
+        if missing or not names:
+            found = missing[0] if missing else "none to compare"
+            raise ShadowPuppetError(f"joints: found {found!r}, which the {what} lacks; the run has {choices(run.names)}; "
+                                    f"the truth has {choices(truth.names)}")
+    if not len(run.times):
+        raise ShadowPuppetError("the run has no frames, so there is nothing to compare")
+
+
+def _offsets(delta: Array) -> Array:
+    """Each frame's mean difference (T, 1, 3) over the joints that are there."""
+    seen = np.isfinite(delta).all(2, keepdims=True)
+    return np.where(seen, delta, 0).sum(1, keepdims=True) / np.maximum(seen.sum(1, keepdims=True), 1)
+
+
+def _summary(values: dict[str, Array]) -> dict[str, float]:
+    """Figures of distances (metres) in millimetres."""
+    d = values["distance"] * 1000
+    p50, p90, p95 = np.percentile(d, [50, 90, 95]).tolist()
+    return {"mean_mm": float(d.mean()), "rmse_mm": float(np.sqrt((d**2).mean())), "p50_mm": p50, "p90_mm": p90, "p95_mm": p95,
+            "max_mm": float(d.max()), "far": float((d > 1000 * FAR).mean()),
+            **{f"{key}_mm": float(values[kind].mean() * 1000)
+               for key, kind in (("plane", "plane"), ("depth", "depth"), ("aligned_mean", "aligned"))}}

@@ -1,0 +1,235 @@
+"""Motion: what a tracker found over time, as arrays; and joints over time, whoever measured them."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.geometry import Array
+
+STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
+"""What can be said of a frame: followed; followed, but in doubt; carried on without a picture; not known where; nobody there."""
+BLANK = ("lost", "absent")
+"""Statuses of frames that have no pose and no joints: there is no honest value."""
+SERIES = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
+"""The fields of a `Motion` that have a row a frame."""
+BONES = (
+    ("pelvis", "neck"), ("neck", "head"),
+    ("neck", "left_shoulder"), ("left_shoulder", "left_elbow"), ("left_elbow", "left_wrist"), ("left_wrist", "left_hand"),
+    ("neck", "right_shoulder"), ("right_shoulder", "right_elbow"), ("right_elbow", "right_wrist"), ("right_wrist", "right_hand"),
+    ("pelvis", "left_hip"), ("left_hip", "left_knee"), ("left_knee", "left_ankle"),
+    ("pelvis", "right_hip"), ("right_hip", "right_knee"), ("right_knee", "right_ankle"),
+)
+"""Pairs of joints with a bone between them."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointTable:
+    """Joints over time. Raises `ShadowPuppetError` where shapes do not fit or times do not increase."""
+
+    times: Array
+    """Seconds, of shape (T,)."""
+    names: tuple[str, ...]
+    """Joint names, J of them."""
+    positions: Array
+    """World, metres, of shape (T, J, 3); not a number where unknown."""
+
+    def __post_init__(self) -> None:
+        """Check."""
+        _set(self, names=_names("joints", self.names), times=_times(self.times), positions=np.asarray(self.positions, float))
+        _check_shape("positions", self.positions, (len(self.times), len(self.names), 3))
+
+    def select(self, names: Sequence[str]) -> JointTable:
+        """The same with only these joints. Raises `ShadowPuppetError` with the names there are."""
+        missing = [name for name in names if name not in self.names]
+        if missing:
+            raise ShadowPuppetError(f"unknown joint {missing[0]!r}; there are: {choices(self.names)}")
+        return JointTable(self.times, tuple(names), self.positions[:, [self.names.index(name) for name in names]])
+
+
+class MotionFrame(NamedTuple):
+    """What is known of one frame; what is left out is not known."""
+
+    time: float
+    """Seconds."""
+    status: str
+    """One of `STATUSES`."""
+    pose: ArrayLike | None = None
+    """Degrees of freedom, of shape (D,), rad or m."""
+    joints: ArrayLike | None = None
+    """World, metres, of shape (J, 3)."""
+    pose_sd: ArrayLike | None = None
+    """Standard deviations of the pose, of shape (D,)."""
+    joint_sd: ArrayLike | None = None
+    """Standard deviations of the joints, of shape (J, 3), metres."""
+    cost: float = np.nan
+    """Pixels."""
+    overlap: float = np.nan
+    """Intersection over union of model and silhouette, 0..1."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion:
+    """A tracked motion; `motion[10:20]` is a part of it.
+
+    Values are not numbers where there is no honest one: poses and joints of frames that are lost or absent always.
+    Raises `ShadowPuppetError` where shapes do not fit, times do not increase, or a status is unknown.
+    """
+
+    body_name: str
+    dof_names: tuple[str, ...]
+    """Degrees of freedom, D of them."""
+    joint_names: tuple[str, ...]
+    """Joints, J of them."""
+    times: Array
+    """Seconds, of shape (T,)."""
+    poses: Array
+    """Of shape (T, D), rad or m."""
+    pose_sd: Array
+    """Standard deviations, of shape (T, D), rad or m."""
+    joints: Array
+    """World, metres, of shape (T, J, 3)."""
+    joint_sd: Array
+    """Standard deviations, of shape (T, J, 3), metres."""
+    cost: Array
+    """Pixels in which model and silhouette differ, of shape (T,)."""
+    overlap: Array
+    """Intersection over union of model and silhouette, of shape (T,)."""
+    status: NDArray[np.str_]
+    """Of `STATUSES`, of shape (T,)."""
+
+    def __post_init__(self) -> None:
+        """Check every field, and bring each to its type."""
+        _set(self, dof_names=_names("degrees of freedom", self.dof_names), joint_names=_names("joints", self.joint_names),
+             times=_times(self.times), status=_statuses(self.status))
+        T, D, J = len(self.times), len(self.dof_names), len(self.joint_names)
+        shapes = {"poses": (T, D), "pose_sd": (T, D), "joints": (T, J, 3), "joint_sd": (T, J, 3), "cost": (T,), "overlap": (T,)}
+        _check_shape("status", self.status, (T,))
+        for name, shape in shapes.items():
+            _set(self, **{name: np.asarray(getattr(self, name), float)})
+            _check_shape(name, getattr(self, name), shape)
+        self._check_blank()
+
+    def __len__(self) -> int:
+        """Number of frames, T."""
+        return len(self.times)
+
+    def __getitem__(self, frames: slice | NDArray[np.bool_]) -> Motion:
+        """Some frames: a slice, or a mask (T,)."""
+        return replace(self, **{name: getattr(self, name)[frames] for name in SERIES})
+
+    def _check_blank(self) -> None:
+        blank = np.flatnonzero(np.isin(self.status, BLANK))
+        for name in ("poses", "pose_sd", "joints", "joint_sd"):
+            values = getattr(self, name)[blank]
+            known = blank[np.isfinite(values).any(tuple(range(1, values.ndim)))]
+            if len(known):
+                status = self.status[known[0]]
+                raise ShadowPuppetError(f"{name}: found values in frame {known[0]}, which is {status}, expected none")
+
+    @property
+    def status_counts(self) -> dict[str, int]:
+        """Number of frames of each status that occurs."""
+        return {status: int(count) for status in STATUSES if (count := (self.status == status).sum())}
+
+    @property
+    def table(self) -> JointTable:
+        """The joints alone."""
+        return JointTable(self.times, self.joint_names, self.joints)
+
+
+class MotionBuilder:
+    """Collects a motion frame by frame, in as many numbers a frame as there are."""
+
+    def __init__(self, body_name: str, dof_names: Iterable[str], joint_names: Iterable[str]) -> None:
+        """Names as `Motion` has them."""
+        self.body_name = body_name
+        self.dof_names, self.joint_names = _names("degrees of freedom", dof_names), _names("joints", joint_names)
+        self._rows, self._status = array("d"), bytearray()
+        self._last = -np.inf
+
+    def __len__(self) -> int:
+        """Number of frames so far."""
+        return len(self._status)
+
+    def append(self, frame: MotionFrame) -> MotionFrame:
+        """Add a frame, later than those before it; returns it as it is kept: arrays all, blank where it is lost or absent.
+
+        Raises `ShadowPuppetError` where a shape, the time or the status does not fit; nothing is added then.
+        """
+        kept = self._checked(frame)
+        self._rows.extend([kept.time, kept.cost, kept.overlap])
+        for values in (kept.pose, kept.pose_sd, kept.joints, kept.joint_sd):
+            self._rows.frombytes(np.asarray(values).tobytes())
+        self._status.append(STATUSES.index(frame.status))
+        self._last = kept.time
+        return kept
+
+    def build(self) -> Motion:
+        """The motion so far."""
+        D, J, T = len(self.dof_names), len(self.joint_names), len(self)
+        width = 3 + 2 * D + 6 * J
+        rows = np.array(self._rows)[: T * width].reshape(T, width)  # an interrupt may have left a part of a row
+        poses, pose_sd, joints, joint_sd = np.split(rows[:, 3:], np.cumsum([D, D, 3 * J]), axis=1)
+        return Motion(body_name=self.body_name, dof_names=self.dof_names, joint_names=self.joint_names, times=rows[:, 0],
+                      cost=rows[:, 1], overlap=rows[:, 2], poses=poses, pose_sd=pose_sd, joints=joints.reshape(T, J, 3),
+                      joint_sd=joint_sd.reshape(T, J, 3), status=np.array(STATUSES)[np.frombuffer(bytes(self._status), np.uint8)])
+
+    def _checked(self, frame: MotionFrame) -> MotionFrame:
+        _statuses([frame.status])
+        if not self._last < frame.time < np.inf:
+            raise ShadowPuppetError(f"motion: frame {len(self)}: time: found {frame.time} s, expected more than {self._last} s")
+        D, J = (len(self.dof_names),), (len(self.joint_names), 3)
+        arrays = {}
+        for name, shape in {"pose": D, "pose_sd": D, "joints": J, "joint_sd": J}.items():
+            value = getattr(frame, name)
+            arrays[name] = np.full(shape, np.nan) if value is None or frame.status in BLANK else np.array(value, float)
+            _check_shape(name, arrays[name], shape)
+        for name in ("cost", "overlap"):
+            _check_shape(name, np.asarray(getattr(frame, name), float), ())
+        return frame._replace(time=float(frame.time), cost=float(frame.cost), overlap=float(frame.overlap), **arrays)
+
+
+def _set(target: object, **values: object) -> None:
+    for name, value in values.items():
+        object.__setattr__(target, name, value)
+
+
+def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
+    """Names that can head the columns of a table."""
+    names = tuple(str(name) for name in names)
+    bad = [name for i, name in enumerate(names) if name != name.strip() or not name or name.endswith("_sd") or name in names[:i]]
+    if bad:
+        raise ShadowPuppetError(f"names of {what}: found {bad[0]!r}, expected words, each once, none ending in _sd (that is for "
+                                "standard deviations)")
+    return names
+
+
+def _times(times: ArrayLike) -> Array:
+    times = np.asarray(times, float)
+    bad = np.flatnonzero(~np.isfinite(times) | (np.diff(times, prepend=-np.inf) <= 0)) if times.ndim == 1 else [0]
+    if len(bad):
+        raise ShadowPuppetError(f"times: found {times.ravel()[bad[:1]]} s at frame {bad[0]} of an array {times.shape}, expected "
+                                "finite and increasing seconds (T,)")
+    return times
+
+
+def _statuses(status: ArrayLike) -> NDArray[np.str_]:
+    status = np.asarray(status, str)
+    unknown = status[~np.isin(status, STATUSES)]
+    if len(unknown):
+        raise ShadowPuppetError(f"status: found {str(unknown[0])!r}, expected one of {choices(STATUSES)}")
+    return status.astype(np.array(STATUSES).dtype)
+
+
+def _check_shape(what: str, values: NDArray, shape: tuple[int, ...]) -> None:
+    if values.shape != shape:
+        raise ShadowPuppetError(f"{what}: found shape {values.shape}, expected {shape}")
+    if values.dtype.kind == "f" and np.isinf(values).any():
+        raise ShadowPuppetError(f"{what}: found infinity, expected finite values, or none (not a number) where unknown")
