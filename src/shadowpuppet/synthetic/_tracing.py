@@ -1,12 +1,15 @@
 """Kernels of the renderer: sphere tracing of the blended lofts (Hart 1996). Arrays and scalars only; see `renderer.py`.
 
-A placed part is a row of numbers (`PLACED` of them): 0-8 its frame's columns width, depth, axis; 9-11 its start; 12-15 middle and
-radius of a sphere about it; 16 length; 17, 18 one over its caps; 19 blend; 20 samples per length; 21 where the second material begins.
-`table` (P, samples, 4) holds one over the half widths and half depths, and the centres along the axes, `code` (P, 3) the group and both materials, `joints` (groups, 4) where a group melts into the
-trunk and how far around. `parts` lists a tile's parts: their count, then their indices, ordered by group.
+A placed part is a row of `PLACED` numbers: 0-8 its frame's columns width, depth, axis; 9-11 its start; 12-15 middle and radius of
+a sphere about it; 16 length; 17, 18 one over its caps; 19 blend; 20 samples per length; 21 where the second material begins.
+`table` (P, samples, 4) holds one over the half widths and half depths, and the centres along the axes, `code` (P, 3) the group
+and both materials, `joints` (groups, 4) where a group melts into the trunk and how far around. `parts` lists a tile's parts:
+their count, then their indices, ordered by group.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -21,8 +24,9 @@ TILE = 8
 """Pixels along the side of the tiles that list the parts in reach of their rays."""
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
-# Without reference counting: the kernels make no arrays, and counting references at every call took half of the time.
-kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, _nrt=False)
+# Without reference counting ("_nrt"): the kernels make no arrays, and counting references at every call took half of the time.
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FAST, "_nrt": False}
+kernel = njit(**OPTIONS)
 
 
 @kernel
@@ -135,8 +139,9 @@ def march(eye, rx, ry, rz, start, stop, parts, placed, table, code, joints):
 @kernel
 def _weave(x, y, z):
     """Smooth variation about 0, within 1.5, a few centimetres in size: sines in odd directions."""
-    return (np.sin(61.0 * x + 23.0 * y + 3.0 * np.sin(31.0 * z)) * np.sin(47.0 * z + 37.0 * y + 2.0 * np.sin(43.0 * x))
-            + 0.5 * np.sin(151.0 * x - 89.0 * z) * np.sin(131.0 * z + 113.0 * y))
+    return np.sin(61.0 * x + 23.0 * y + 3.0 * np.sin(31.0 * z)) * np.sin(
+        47.0 * z + 37.0 * y + 2.0 * np.sin(43.0 * x)
+    ) + 0.5 * np.sin(151.0 * x - 89.0 * z) * np.sin(131.0 * z + 113.0 * y)
 
 
 @kernel
@@ -178,8 +183,19 @@ def find_surface(eye, rays, tiles, lists, span, placed, table, code, joints, dep
             tile = (v // TILE) * tiles + u // TILE
             depth[v, u], near[v, u] = FAR, -1
             if lists[tile, 0] > 0:
-                depth[v, u], near[v, u] = march(eye, rays[v, u, 0], rays[v, u, 1], rays[v, u, 2], span[tile, 0], span[tile, 1],
-                                                lists[tile], placed, table, code, joints)
+                depth[v, u], near[v, u] = march(
+                    eye,
+                    rays[v, u, 0],
+                    rays[v, u, 1],
+                    rays[v, u, 2],
+                    span[tile, 0],
+                    span[tile, 1],
+                    lists[tile],
+                    placed,
+                    table,
+                    code,
+                    joints,
+                )
 
 
 @kernel
@@ -205,8 +221,10 @@ def _nearest(v, u, depth):
 
 
 @kernel
-def colour_surface(eye, rays, tiles, lists, span, placed, table, code, joints, depth, near, colours, lights, stripes, offsets, picture, alpha):
-    """Fill picture (H, W, 3), premultiplied by alpha (H, W), of the surface found; edges are traced at `offsets` (K, 2), pixels."""
+def colour_surface(
+    eye, rays, tiles, lists, span, placed, table, code, joints, depth, near, colours, lights, stripes, offsets, picture, alpha
+):
+    """Fill picture (H, W, 3), premultiplied by alpha (H, W), of the surface; edges are traced at `offsets` (K, 2), pixels."""
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
@@ -233,8 +251,19 @@ def colour_surface(eye, rays, tiles, lists, span, placed, table, code, joints, d
                     continue
                 if code[p, 0] != group:
                     group = code[p, 0]
-                    material, light = shade(eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz, p, lists[tile], placed, table, code, joints,
-                                            lights, stripes)
+                    material, light = shade(
+                        eye[0] + t * rx,
+                        eye[1] + t * ry,
+                        eye[2] + t * rz,
+                        p,
+                        lists[tile],
+                        placed,
+                        table,
+                        code,
+                        joints,
+                        lights,
+                        stripes,
+                    )
                 alpha[v, u] += 1.0 / count
                 for c in range(3):
                     picture[v, u, c] += colours[material, c] * light / count

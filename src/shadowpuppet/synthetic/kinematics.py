@@ -10,16 +10,39 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.mannequin import JOINTS, Mannequin
 
 ARM = ("side", "front", "roll", "elbow", "supination", "wrist_flex", "wrist_side", "shrug", "protract", "curl")
-CHANNELS = ("turn", "sway_x", "sway_y", "pelvis_bow", "pelvis_side", "pelvis_twist", "spine_bow", "spine_side", "spine_twist",
-            "head_nod", "head_tilt", "head_turn", *(f"{side}_{name}" for side in ("left", "right") for name in ARM))
+CHANNELS = (
+    "turn",
+    "sway_x",
+    "sway_y",
+    "pelvis_bow",
+    "pelvis_side",
+    "pelvis_twist",
+    "spine_bow",
+    "spine_side",
+    "spine_twist",
+    "head_nod",
+    "head_tilt",
+    "head_turn",
+    *(f"{side}_{name}" for side in ("left", "right") for name in ARM),
+)
 """Columns of a posture array, rad (sway: m; curl: 0 open, 1 fist).
 
-`*_bow`, `*_side`, `*_twist` are components of a joint's rotation vector: forward, to the person's left, turning left. An upper arm
-starts hanging; (`front`, `side`) is its swing as a rotation vector, `roll` turns it about itself (positive outward),
+`*_bow`, `*_side`, `*_twist` are components of a joint's rotation vector: forward, to the person's left, turning left. An upper
+arm starts hanging; (`front`, `side`) is its swing as a rotation vector, `roll` turns it about itself (positive outward),
 `elbow` bends it, `supination` turns the palm up. `turn` turns the whole figure to its left.
 """
-SEGMENTS = ("pelvis", "abdomen", "thorax", "neck", "head", *(f"{side}_{name}" for side in ("left", "right") for name in
-            ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")))
+SEGMENTS = (
+    "pelvis",
+    "abdomen",
+    "thorax",
+    "neck",
+    "head",
+    *(
+        f"{side}_{name}"
+        for side in ("left", "right")
+        for name in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+    ),
+)
 MIRROR = np.array([1.0, -1.0, -1.0])
 HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
@@ -67,18 +90,25 @@ def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     nod = turns(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
     neck, head = thorax @ nod, thorax @ nod @ nod
     joint["head"] = joint["neck"] + neck @ (rest["head"] - rest["neck"])
-    frame |= dict(abdomen=(abdomen, lumbar), thorax=(thorax, thoracic), neck=(neck, joint["neck"]), head=(head, joint["head"]))
+    frame |= {"abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
+    frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
     for side in ("left", "right"):
         _arm(rest, q, side, thorax, thoracic, joint, frame)
-    return Figure(np.stack([joint[name] for name in JOINTS], 1), np.stack([frame[name][0] for name in SEGMENTS], 1),
-                  np.stack([frame[name][1] for name in SEGMENTS], 1), np.stack([q["left_curl"], q["right_curl"]], 1))
+    return Figure(
+        np.stack([joint[name] for name in JOINTS], 1),
+        np.stack([frame[name][0] for name in SEGMENTS], 1),
+        np.stack([frame[name][1] for name in SEGMENTS], 1),
+        np.stack([q["left_curl"], q["right_curl"]], 1),
+    )
 
 
-def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
+def _arm(
+    rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict
+) -> None:
     """Clavicle, upper arm, forearm and hand of one side.
 
-    The clavicle rises by 0.13 of what the arm is raised beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig
-    et al. 2009): shoulders are not fixed to the chest.
+    The clavicle rises by 0.13 of what the arm is raised beyond 25 degrees and protracts by 0.12 of its forward swing (after
+    Ludewig et al. 2009): shoulders are not fixed to the chest.
     """
     mirror = np.ones(3) if side == "left" else MIRROR
 
@@ -99,10 +129,18 @@ def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, 
     shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
     elbow = shoulder + upper @ (at["elbow"] - at["shoulder"])
     wrist = elbow + fore @ (at["wrist"] - at["elbow"])
-    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist,
-              f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"])}
-    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (half, elbow),
-              f"{side}_hand": (hand, wrist)}
+    joint |= {
+        f"{side}_shoulder": shoulder,
+        f"{side}_elbow": elbow,
+        f"{side}_wrist": wrist,
+        f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"]),
+    }
+    frame |= {
+        f"{side}_clavicle": (clavicle, sternum),
+        f"{side}_upper_arm": (upper, shoulder),
+        f"{side}_forearm": (half, elbow),
+        f"{side}_hand": (hand, wrist),
+    }
 
 
 def _legs(body: Mannequin, q: dict, yaw: Array, pelvis: Array, stance: float, joint: dict, frame: dict) -> Array:
@@ -115,7 +153,9 @@ def _legs(body: Mannequin, q: dict, yaw: Array, pelvis: Array, stance: float, jo
         hips[side] = pelvis @ (rest[f"{side}_hip"] - rest["pelvis"])
     sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
     span = 0.999 * (thigh + shank)
-    heights = [ankles[s][:, 2] - hips[s][:, 2] + np.sqrt(span**2 - ((sway + hips[s] - ankles[s])[:, :2] ** 2).sum(1)) for s in hips]
+    heights = [
+        ankles[s][:, 2] - hips[s][:, 2] + np.sqrt(span**2 - ((sway + hips[s] - ankles[s])[:, :2] ** 2).sum(1)) for s in hips
+    ]
     centre = sway + np.minimum(*heights)[:, None] * [0, 0, 1]
     for side in ("left", "right"):
         hip, ankle = centre + hips[side], ankles[side]
@@ -128,8 +168,11 @@ def _legs(body: Mannequin, q: dict, yaw: Array, pelvis: Array, stance: float, jo
         cosine = np.clip((thigh**2 + reach**2 - shank**2) / (2 * thigh * reach), -1, 1)
         knee = hip + thigh * (cosine * down + np.sqrt(1 - cosine**2) * ahead)
         joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
-        frame |= {f"{side}_thigh": (_upright(hip - knee, ahead), hip), f"{side}_shank": (_upright(knee - ankle, ahead), knee),
-                  f"{side}_foot": (yaw @ turns(*np.zeros((2, 1)), np.array([0.12 if side == "left" else -0.12])), ankle)}
+        frame |= {
+            f"{side}_thigh": (_upright(hip - knee, ahead), hip),
+            f"{side}_shank": (_upright(knee - ankle, ahead), knee),
+            f"{side}_foot": (yaw @ turns(*np.zeros((2, 1)), np.array([0.12 if side == "left" else -0.12])), ankle),
+        }
     return centre
 
 

@@ -59,8 +59,13 @@ def wave_hands(seconds: float, rng: np.random.Generator) -> Keys:
     for n, t in enumerate(np.arange(0.9 + period / 2, seconds - 0.3, period / 2)):
         out, back = rng.uniform(35, 52), rng.uniform(92, 112)
         bends = (out, back) if n % 2 else (back, out)
-        keys.append((float(t), left(side=rng.uniform(80, 96), roll=rng.uniform(76, 92), elbow=bends[0])
-                     | right(side=rng.uniform(80, 96), roll=rng.uniform(76, 92), elbow=bends[1] * (1 - phase) + bends[0] * phase)))
+        keys.append(
+            (
+                float(t),
+                left(side=rng.uniform(80, 96), roll=rng.uniform(76, 92), elbow=bends[0])
+                | right(side=rng.uniform(80, 96), roll=rng.uniform(76, 92), elbow=bends[1] * (1 - phase) + bends[0] * phase),
+            )
+        )
     return keys
 
 
@@ -71,7 +76,9 @@ def _swings(seconds: float, rng: np.random.Generator, ends: Sequence[Posture], b
     each = (seconds - 1.2) / count
     for n in range(count):
         vary = rng.uniform(0.85, 1.1)
-        end = {name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()}
+        end = {
+            name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()
+        }
         keys.append((0.8 + (n + rng.uniform(0.45, 0.6)) * each, between | end))
     return [*keys, (seconds - 0.3, between)]
 
@@ -97,7 +104,9 @@ def reach(seconds: float, rng: np.random.Generator) -> Keys:
     """The left hand toward the camera, then the right, then both."""
     third, keys = seconds / 3, []
     for n, arms in enumerate((left, right, both)):
-        aim = arms(front=rng.uniform(74, 90), side=rng.uniform(-4, 14), elbow=rng.uniform(4, 22), supination=rng.uniform(0, 40), curl=15)
+        aim = arms(
+            front=rng.uniform(74, 90), side=rng.uniform(-4, 14), elbow=rng.uniform(4, 22), supination=rng.uniform(0, 40), curl=15
+        )
         turn = trunk(spine_twist=(-8, 8, 0)[n], spine_bow=3)
         keys += [(third * (n + 0.42), aim | turn), (third * (n + 0.66), {**aim, **turn}), (third * (n + 0.98), {})]
     return keys
@@ -114,9 +123,24 @@ def overhead(seconds: float, rng: np.random.Generator) -> Keys:
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
-LIMITS = {"spine_bow": (-5, 24), "spine_side": (-17, 17), "spine_twist": (-26, 26), "pelvis_bow": (-2, 12), "pelvis_twist": (-10, 10),
-          "head_nod": (-15, 22), "head_tilt": (-10, 10), "head_turn": (-35, 35), "side": (2, 130), "front": (-18, 100), "roll": (-25, 75),
-          "elbow": (6, 125), "supination": (-30, 70), "wrist_flex": (-30, 35), "wrist_side": (-12, 15), "curl": (0, 40)}
+LIMITS = {
+    "spine_bow": (-5, 24),
+    "spine_side": (-17, 17),
+    "spine_twist": (-26, 26),
+    "pelvis_bow": (-2, 12),
+    "pelvis_twist": (-10, 10),
+    "head_nod": (-15, 22),
+    "head_tilt": (-10, 10),
+    "head_turn": (-35, 35),
+    "side": (2, 130),
+    "front": (-18, 100),
+    "roll": (-25, 75),
+    "elbow": (6, 125),
+    "supination": (-30, 70),
+    "wrist_flex": (-30, 35),
+    "wrist_side": (-12, 15),
+    "curl": (0, 40),
+}
 """Ranges of `random` motion, degrees: inside what healthy adults reach (Boone & Azen 1979)."""
 
 
@@ -156,7 +180,9 @@ def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
         for side in ("left", "right"):
             elbow, wrist, hand = (joint[f"{side}_{name}"] for name in ("elbow", "wrist", "hand"))
             points = [elbow + 0.5 * (wrist - elbow), wrist, wrist + 4.0 * (hand - wrist)]
-            inside = [np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points]
+            inside = [
+                np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points
+            ]
             excess = np.maximum(np.max(inside, 0), 0)
             push = np.maximum(excess, np.convolve(np.pad(excess, 2, "edge"), [0.1, 0.25, 0.3, 0.25, 0.1], "valid"))
             table[:, CHANNELS.index(f"{side}_side")] += 1.0 * push
@@ -173,13 +199,30 @@ def _off(points: Array, start: Array, end: Array) -> Array:
 
 
 MOTIONS: dict[str, Callable[[float, np.random.Generator], Keys]] = {
-    f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)}
+    f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)
+}
 """All gestures by name."""
 
-RESTLESS = {"sway_x": (0.006, 0.35), "sway_y": (0.006, 0.35), "spine_bow": (0.8, 0.4), "spine_side": (0.8, 0.4), "spine_twist": (1.0, 0.4),
-            "head_nod": (2.5, 0.4), "head_tilt": (2.0, 0.4), "head_turn": (4.0, 0.35), "side": (1.2, 0.7), "front": (1.2, 0.7), "roll": (1.5, 0.7),
-            "elbow": (1.8, 0.7), "supination": (4.0, 0.5), "wrist_flex": (4.0, 0.6), "wrist_side": (2.0, 0.6), "shrug": (1.0, 0.3),
-            "protract": (1.5, 0.3), "curl": (5.0, 0.4)}
+RESTLESS = {
+    "sway_x": (0.006, 0.35),
+    "sway_y": (0.006, 0.35),
+    "spine_bow": (0.8, 0.4),
+    "spine_side": (0.8, 0.4),
+    "spine_twist": (1.0, 0.4),
+    "head_nod": (2.5, 0.4),
+    "head_tilt": (2.0, 0.4),
+    "head_turn": (4.0, 0.35),
+    "side": (1.2, 0.7),
+    "front": (1.2, 0.7),
+    "roll": (1.5, 0.7),
+    "elbow": (1.8, 0.7),
+    "supination": (4.0, 0.5),
+    "wrist_flex": (4.0, 0.6),
+    "wrist_side": (2.0, 0.6),
+    "shrug": (1.0, 0.3),
+    "protract": (1.5, 0.3),
+    "curl": (5.0, 0.4),
+}
 """Size (degrees; sway in metres) and highest frequency (Hz) of involuntary motion by channel."""
 TREMOR = {"side": 0.25, "front": 0.25, "elbow": 0.35, "wrist_flex": 0.5, "head_nod": 0.15, "spine_side": 0.08}
 """Size, degrees, of the faster part, up to 5 Hz."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,20 +12,26 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions
+from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.kinematics import CHANNELS, Figure, pose
 from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.parts import dressed
 from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.synthetic.scene import Room, exposed
 from shadowpuppet.synthetic.spec import Spec
-from shadowpuppet.synthetic.surface import Clothes, Surface, surface
 
-REFERENCES = {"front_t_pose": motions.LEVEL, "side_arms_hanging": motions.HANGING_ARMS | motions.trunk(turn=90), "front_arms_t_pose": motions.LEVEL}
+REFERENCES = {
+    "front_t_pose": motions.LEVEL,
+    "side_arms_hanging": motions.HANGING_ARMS | motions.trunk(turn=90),
+    "front_arms_t_pose": motions.LEVEL,
+}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
 
 
-def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator) -> Path:
+def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator, tell: Callable[[int, int], None] | None = None) -> Path:
     """Write the recording that `spec` describes into `folder`, made where missing, and return its path.
 
+    tell: called after each picture with how many are done and how many there will be.
     The same spec and seed give the same pictures, masks and truth. Raises `RecordingError` where the folder cannot be written.
     """
     from shadowpuppet.io.calibration import write_calibration
@@ -39,16 +45,22 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator) -> Path
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
     write_truth(folder / "truth", times, figure.joints, spec.rate)
+    done = 0
     for camera, noise in zip(cameras, for_noise.spawn(len(cameras))):
         studio = Studio(spec, camera, noise)
         with write_frames(folder / "background" / f"{camera.name}.mp4", spec.rate) as film:
             for _ in range(max(1, round(spec.scene.empty_seconds * spec.rate))):
                 film.write(studio.empty())
-        with (write_frames(folder / "video" / f"{camera.name}.mp4", spec.rate) as film,
-              write_frames(folder / "masks" / f"{camera.name}.mkv", spec.rate, lossless=True) as masks):
+        with (
+            write_frames(folder / "video" / f"{camera.name}.mp4", spec.rate) as film,
+            write_frames(folder / "masks" / f"{camera.name}.mkv", spec.rate, lossless=True) as masks,
+        ):
             for image, mask in studio.film(figure):
                 film.write(image)
                 masks.write(mask)
+                done += 1
+                if tell is not None:
+                    tell(done, len(times) * len(cameras))
         if len(cameras) == 1:
             _write_references(folder / "references", spec, studio)
     return folder
@@ -71,13 +83,8 @@ class Studio:
         clothes = Clothes.draw(np.random.default_rng(spec.scene.clothing))
         least = max((view.distance + 1 for view in spec.cameras if abs(view.azimuth_deg) > 60), default=0.0)
         self.room = Room(camera, np.random.default_rng(spec.scene.room), spec.scene.shadow, least)
-        self.renderer = Renderer(camera, surface(spec.body, clothes), clothes, self.room.lights)
+        self.renderer = Renderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
         self.noise, self.rng = spec.scene.noise, rng
-
-    @property
-    def surface(self) -> Surface:
-        """The person's surface."""
-        return self.renderer.surface
 
     def empty(self) -> np.ndarray:
         """A picture without the person, (H, W, 3) BGR."""
@@ -115,11 +122,18 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
     lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
     _write(path.with_suffix(".csv"), [",".join(["time", *names]), *lines])
     count, trc = len(joints), path.with_suffix(".trc")
-    head = [f"PathFileType\t4\t(X/Y/Z)\t{trc.name}",
-            "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-            f"{rate:g}\t{rate:g}\t{count}\t{len(JOINTS)}\tmm\t{rate:g}\t1\t{count}", "Frame#\tTime\t" + "\t\t\t".join(JOINTS),
-            "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"), ""]
-    lines = ["\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)]) for n, (t, row) in enumerate(zip(times, rows), 1)]
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{trc.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate:g}\t{rate:g}\t{count}\t{len(JOINTS)}\tmm\t{rate:g}\t1\t{count}",
+        "Frame#\tTime\t" + "\t\t\t".join(JOINTS),
+        "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"),
+        "",
+    ]
+    lines = [
+        "\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)])
+        for n, (t, row) in enumerate(zip(times, rows), 1)
+    ]
     _write(trc, [*head, *lines])
 
 
@@ -140,7 +154,8 @@ def _write_subject(path: Path, spec: Spec) -> None:
     if "height" in spec.tells:
         lines.append(f"height = {spec.body.stature:.3f}     # metres, shoes on")
     if "distance" in spec.tells and len(spec.cameras) == 1:
-        lines.append(f"distance = {spec.cameras[0].distance:.3f}   # metres, camera to the middle of the body, before the first movement")
+        distance = spec.cameras[0].distance
+        lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
     _write(path, lines)
 
 
@@ -156,4 +171,6 @@ def _folders(folder: Path, references: bool) -> None:
         for name in ("video", "background", "masks", *(["references"] if references else [])):
             (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RecordingError(f"{folder}: the recording cannot be written there ({(error.strerror or str(error)).lower()})") from None
+        raise RecordingError(
+            f"{folder}: the recording cannot be written there ({(error.strerror or str(error)).lower()})"
+        ) from None

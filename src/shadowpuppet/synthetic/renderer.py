@@ -8,9 +8,10 @@ import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.kinematics import Figure
 from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.synthetic.surface import GROUPS, MATERIALS, Clothes, Surface
+from shadowpuppet.synthetic.surface import GROUPS, MATERIALS, Surface
 
 OFFSETS = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
 """Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
@@ -31,7 +32,7 @@ class Renderer:
     """Draws one person with one camera: rays and tiles are prepared once."""
 
     def __init__(self, camera: Camera, surface: Surface, clothes: Clothes, lights: Array) -> None:
-        """lights: (3, 4), unit directions toward the two lamps and their strength; the third row's strength is the ambient light."""
+        """lights: (3, 4), unit directions toward the two lamps and their strength; the third row's is the ambient light."""
         from shadowpuppet.synthetic._tracing import TILE
 
         width, height = camera.size
@@ -56,10 +57,10 @@ class Renderer:
         s, (width, height), eye = self.surface, self.camera.size, self.camera.centre
         R, o = figure.rotation[index, s.segment], figure.origin[index, s.segment]
         axes, origin = R @ s.frame, o + (R @ s.start[..., None])[..., 0]
-        middle = origin + axes[:, :, 2] * (s.size[:, :1] / 2)
-        reach = s.size[:, 0] / 2 + s.size[:, 5] + s.size[:, 1:3].max(1)
-        placed = np.column_stack([axes.swapaxes(1, 2).reshape(-1, 9), origin, middle, reach, s.size[:, 0], 1 / s.size[:, 1:3], s.size[:, 3],
-                                  (s.table.shape[1] - 1) / s.size[:, 0], s.size[:, 4]])
+        middle = origin + axes[:, :, 2] * (s.length[:, None] / 2)
+        reach = s.length / 2 + s.radius + s.caps.max(1)
+        sizes = [s.length, 1 / s.caps, s.blend, (s.table.shape[1] - 1) / s.length, s.change]
+        placed = np.column_stack([axes.swapaxes(1, 2).reshape(-1, 9), origin, middle, reach, *sizes])
         lists, span = np.zeros((len(self.direction), len(origin) + 1), np.int64), np.zeros((len(self.direction), 2))
         _tracing.list_parts(self.direction, self.sine, self.cosine, eye, _covering(origin, axes, s), lists, span)
         traced = eye, self.rays, self.across, lists, span, placed, self.table, s.code, self._joins(figure, index)
@@ -73,19 +74,21 @@ class Renderer:
         """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""
         names = [JOINTS.index(name) for name in ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")]
         assert len(names) == len(GROUPS)
-        scale = np.linalg.norm(figure.joints[index, JOINTS.index("neck")] - figure.joints[index, JOINTS.index("pelvis")]) / 0.55
+        elbow, wrist = (figure.joints[index, JOINTS.index(name)] for name in ("left_elbow", "left_wrist"))
+        scale = float(np.linalg.norm(wrist - elbow)) / 0.27
         return np.column_stack([figure.joints[index, names], np.array([0.15, 0.15, 0.15, 0.22, 0.22]) * scale])
 
 
 def _unit(v: Array) -> Array:
+    """Vectors (..., 3) of length 1, contiguous for the kernels."""
     return np.ascontiguousarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
 def _covering(origin: Array, axes: Array, s: Surface, count: int = 4) -> Array:
     """Spheres (P, count, 4) that cover each part with its caps and half its blend."""
-    low, high = -s.size[:, 1], s.size[:, 0] + s.size[:, 2]
+    low, high = -s.caps[:, 0], s.length + s.caps[:, 1]
     step = (high - low) / count
     along = low[:, None] + step[:, None] * (np.arange(count) + 0.5)
     centres = origin[:, None] + axes[:, None, :, 2] * along[..., None]
-    radius = np.hypot(s.size[:, 5], step / 2) + 0.5 * s.size[:, 3] + 0.005
+    radius = np.hypot(s.radius, step / 2) + 0.5 * s.blend + 0.005
     return np.concatenate([centres, np.broadcast_to(radius[:, None, None], (*along.shape, 1))], -1)

@@ -5,15 +5,28 @@ from __future__ import annotations
 import colorsys
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.synthetic.kinematics import Figure
 from shadowpuppet.synthetic.mannequin import JOINTS
 
-SHADOW_PARTS = (("pelvis", "neck", 0.13), ("neck", "head", 0.09), ("left_shoulder", "right_shoulder", 0.06),
-                *((f"{side}_{a}", f"{side}_{b}", radius) for side in ("left", "right") for a, b, radius in (
-                    ("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.055))))
+SHADOW_PARTS = (
+    ("pelvis", "neck", 0.13),
+    ("neck", "head", 0.09),
+    ("left_shoulder", "right_shoulder", 0.06),
+    *(
+        (f"{side}_{a}", f"{side}_{b}", radius)
+        for side in ("left", "right")
+        for a, b, radius in (
+            ("shoulder", "elbow", 0.05),
+            ("elbow", "wrist", 0.04),
+            ("hip", "knee", 0.08),
+            ("knee", "ankle", 0.055),
+        )
+    ),
+)
 """What casts the shadow: round sticks between joints, and their radius (m)."""
 
 COARSE = 4
@@ -40,7 +53,7 @@ class Room:
         coarse = np.stack(np.meshgrid(*(np.arange(-(-n // COARSE)) for n in camera.size)), -1)
         self._seen = self._points(COARSE * coarse + (COARSE - 1) / 2)[0] @ self._from_lamp
 
-    def _points(self, pixels: Array) -> tuple[Array, Array]:
+    def _points(self, pixels: ArrayLike) -> tuple[Array, Array]:
         """Where the rays of pixels (..., 2) meet floor or wall, (..., 3), and the place along the walls, (...), metres."""
         eye, ray = self.camera.centre, self.camera.rays(pixels) @ inverse(self.camera.T_camera_world)[:3, :3].T
         half = max(self.distance, 6.0, 1.2 * float(np.hypot(*eye[:2])))
@@ -90,7 +103,12 @@ class Room:
             return self.picture
         light = 1 - self.shadow * self._shade(figure, index)
         width, height = self.camera.size
-        return self.picture * cv2.resize(light, (COARSE * light.shape[1], COARSE * light.shape[0]), interpolation=cv2.INTER_LINEAR)[:height, :width, None]
+        return (
+            self.picture
+            * cv2.resize(light, (COARSE * light.shape[1], COARSE * light.shape[0]), interpolation=cv2.INTER_LINEAR)[
+                :height, :width, None
+            ]
+        )
 
     def _shade(self, figure: Figure, index: int) -> Array:
         """How far the key lamp is hidden, 0 to 1, on the coarse grid.
@@ -120,7 +138,9 @@ def cloud(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Arr
         fu, fv = u - i, v - j
         fu, fv = fu * fu * (3 - 2 * fu), fv * fv * (3 - 2 * fv)
         corner = [lattice[(i + a) % 64, (j + b) % 64] for a in (0, 1) for b in (0, 1)]
-        total += ((corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu) * 0.55**octave
+        total += (
+            (corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu
+        ) * 0.55**octave
     return total
 
 

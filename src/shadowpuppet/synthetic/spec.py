@@ -48,7 +48,12 @@ class Viewpoint:
     pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
     """How far it looks down, degrees."""
     distortion: tuple[float, ...] = ()
-    """OpenCV's k1 k2 p1 p2 [k3]."""
+    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; none for a perfect lens."""
+
+    def __post_init__(self) -> None:
+        """The numbers of distortion must be a model's."""
+        if len(self.distortion) not in (0, 4, 5, 8):
+            raise ValueError(f"distortion: found {len(self.distortion)} numbers, expected 0, 4, 5 or 8")
 
     def camera(self) -> Camera:
         """The calibrated camera in the world: Z up, floor at 0, the person at the origin facing -Y."""
@@ -102,6 +107,7 @@ class Spec:
     """What recording.toml says of the subject."""
 
     def __post_init__(self) -> None:
+        """Camera names must differ."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")

@@ -1,0 +1,18 @@
+"""All lofts of the dressed person."""
+
+from __future__ import annotations
+
+from shadowpuppet.synthetic.clothes import Clothes
+from shadowpuppet.synthetic.head import head
+from shadowpuppet.synthetic.limbs import arm, leg
+from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.surface import Surface
+from shadowpuppet.synthetic.trunk import shoulders, trunk
+
+
+def dressed(body: Mannequin, clothes: Clothes) -> Surface:
+    """The surface of `body` in `clothes`."""
+    left = [*arm(body, clothes), *leg(body, clothes)]
+    return Surface.of(
+        [*trunk(body, clothes), *shoulders(body, clothes), *head(body, clothes), *left, *(loft.mirrored() for loft in left)]
+    )
