@@ -20,7 +20,7 @@ class SilhouetteSettings:
     factor: Annotated[float, Field(gt=0, le=100)] = 2.0
     """A pixel is foreground where it differs by this many standard deviations (eq. 1). Brightness, colour and both also ask that
     it hangs together with pixels that differ by twice as much; mog2 and knn have thresholds of their own."""
-    noise_floor: Annotated[float, Field(ge=0, le=100)] = 2.0
+    noise_floor: Annotated[float, Field(ge=0, le=100)] = 2.5
     """Least standard deviation assumed (grey levels; three quarters of it for colour). Not used by `averaging`."""
     shadow: bool = True
     """Whether a pixel that keeps its colour and loses up to half of its light is taken for the background in shadow. A grey film

@@ -1,0 +1,212 @@
+"""What can be said of silhouettes before tracking, and without it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import SilhouetteError
+
+Mask = NDArray[np.bool_]
+"""A silhouette, of shape (H, W)."""
+
+NEARLY_ALL = 0.8
+"""Share of the picture from which on a silhouette is no person's."""
+TINY = 0.003
+"""Share of the picture below which limbs are too few pixels wide (15 pixels high of 240)."""
+JUMP = 0.25
+"""Relative change of the area from one frame to the next that no motion makes: a part of the person was lost or found."""
+CONTACT = 2
+"""Pixels on a side of the picture from which on the person touches it: one may be noise."""
+
+# From here on a warning is due. Exact silhouettes of walking, running and waving people reach at most a third of these.
+MUCH_CONTACT = 0.02
+MUCH_CHANGE = 0.05
+MANY_JUMPS = 0.02
+MUCH_FLICKER = 0.06
+MUCH_SPECK = 0.02
+MUCH_HOLE = 0.1
+MANY_HOLES = 10
+
+
+@dataclass(frozen=True)
+class MaskQuality:
+    """Silhouettes in figures. `warnings` puts into words what is wrong with them, `refusal` whether tracking is hopeless."""
+
+    frames: int
+    """How many there are."""
+    area: float
+    """Median share of the picture that the person covers, where there is one."""
+    area_change: float
+    """Median relative change of the area from one frame to the next; a moving person's changes by a percent or two."""
+    area_jumps: float
+    """Share of frames in which the area changed by over a quarter of itself."""
+    flicker: float
+    """Median over frames of the pixels that differ from the frame before and the one after alike, over the person's area.
+
+    Motion makes such pixels only where something thinner than its own step passes, so few in the typical frame.
+    """
+    border: dict[str, float]
+    """Share of frames in which the person touches the left, right, top and bottom side of the picture."""
+    specks: float
+    """Parts beyond the largest, mean a frame."""
+    speck_area: float
+    """Their area over the largest part's, mean."""
+    holes: float
+    """Holes in the largest part, mean a frame."""
+    hole_area: float
+    """Their area over the largest part's, mean."""
+    empty: int
+    """Frames without any silhouette."""
+    full: int
+    """Frames in which nearly all is silhouette."""
+    first_empty: int | None = None
+    """The first empty frame, from 0."""
+    first_full: int | None = None
+    """The first full frame, from 0."""
+
+    def refusal(self) -> str | None:
+        """Why tracking is hopeless, and the remedy, in a sentence; None where it is not."""
+        if not self.frames:
+            return "there is no silhouette: the film has no frames"
+        if self.empty > 0.9 * self.frames:
+            return (f"the silhouette is empty in {self._share(self.empty)} of the frames: nobody is in the picture, or "
+                    "the person does not differ from the background; give a background of the same light, or set another method")
+        if self.full > 0.5 * self.frames:
+            return (f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames: the light changed "
+                    "or the camera moved since the background was taken; take it again, or leave it out: the film then serves")
+        return None
+
+    def warnings(self) -> tuple[str, ...]:
+        """What harms tracking, and the remedy, a sentence each; none where there is a refusal."""
+        return () if self.refusal() else (*self._incomplete(), *self._unsteady(), *self._unclean())
+
+    def _incomplete(self) -> Iterator[str]:
+        if self.empty:
+            yield (f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
+                   "person is out of the picture, or does not differ from the background; cut the film, or set another method")
+        if self.full:
+            yield (f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
+                   f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure")
+        for side in ("left", "right", "top"):
+            if self.border[side] > MUCH_CONTACT:
+                yield (f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
+                       "is partly outside the picture, and what is outside is guessed; step back, or turn the camera")
+        if 0 < self.area < TINY:
+            yield (f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
+                   "camera with more pixels")
+
+    def _unsteady(self) -> Iterator[str]:
+        remedy = "the person hardly differs from the background; try another method, more light, or other clothes"
+        if self.area_jumps > MANY_JUMPS:
+            yield (f"the area of the silhouette changes by over {_percent(JUMP)} at once in {_percent(self.area_jumps)} of the "
+                   f"frames, as parts are lost and found: {remedy}")
+        elif self.area_change > MUCH_CHANGE:
+            yield f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}"
+        if self.flicker > MUCH_FLICKER:
+            yield (f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
+                   "a lamp's flicker, or silhouettes that are not cleaned; use more light, or the setting clean")
+
+    def _unclean(self) -> Iterator[str]:
+        if self.speck_area > MUCH_SPECK:
+            yield (f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
+                   "noise, shadow or another person; use the setting clean, or keep others out of the picture")
+        if self.hole_area > MUCH_HOLE or self.holes > MANY_HOLES:
+            yield (f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
+                   "background, or noise; try another method, or other clothes")
+
+    def _share(self, frames: int) -> str:
+        return _percent(frames / self.frames)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
+
+
+class _Look(NamedTuple):
+    """What one silhouette shows."""
+
+    area: int
+    touched: tuple[bool, bool, bool, bool]
+    specks: int
+    speck_share: float
+    holes: int
+    hole_share: float
+
+
+def mask_quality(masks: Iterable[Mask]) -> MaskQuality:
+    """Look through silhouettes (H, W), in order of time, of which three at most are held.
+
+    Raises `SilhouetteError` for what is none, or where sizes differ.
+    """
+    looks: list[_Look] = []
+    blinks: list[int] = []
+    last: list[Mask] = []
+    for n, mask in enumerate(masks):
+        _check(mask, last[-1].shape if last else None, n)
+        looks.append(_look(mask))
+        last = [*last[-2:], mask]
+        if len(last) == 3:
+            before, now, after = last
+            blinks.append(int(np.count_nonzero((before == after) & (now != before))))
+    return _summary(looks, blinks, last[0].size if last else 0)
+
+
+def _check(mask: Mask, shape: tuple[int, ...] | None, n: int) -> None:
+    found = getattr(mask, "shape", ())
+    if len(found) != 2 or mask.dtype != bool or not mask.size:
+        raise SilhouetteError(f"silhouette {n}: found {getattr(mask, 'dtype', type(mask).__name__)} of shape {found}, "
+                              "expected true and false of shape (H, W)")
+    if shape is not None and shape != found:
+        raise SilhouetteError(f"silhouette {n}: found {found[1]} x {found[0]} pixels, expected {shape[1]} x {shape[0]}")
+
+
+def _look(mask: Mask) -> _Look:
+    import cv2
+
+    pixels = mask.astype(np.uint8)
+    _, _, parts, _ = cv2.connectedComponentsWithStats(pixels, connectivity=8)
+    areas = np.sort(parts[1:, cv2.CC_STAT_AREA])[::-1]
+    # A margin joins all of the outside, so that what else is not silhouette is a hole.
+    _, _, gaps, _ = cv2.connectedComponentsWithStats(1 - np.pad(pixels, 1), connectivity=4)
+    holes = gaps[2:, cv2.CC_STAT_AREA]
+    largest = max(int(areas[0]) if len(areas) else 0, 1)
+    sides = (mask[:, 0], mask[:, -1], mask[0], mask[-1])
+    left, right, top, bottom = (int(np.count_nonzero(side)) >= CONTACT for side in sides)
+    specks = areas[1:]
+    return _Look(int(areas.sum()), (left, right, top, bottom), len(specks), float(specks.sum() / largest), len(holes),
+                 float(holes.sum() / largest))
+
+
+def _summary(looks: list[_Look], blinks: list[int], size: int) -> MaskQuality:
+    areas = np.array([look.area for look in looks], float)
+    empty = np.flatnonzero(areas == 0)
+    full = np.flatnonzero(areas >= NEARLY_ALL * max(size, 1))
+    person = _median(areas[areas > 0])
+    change = np.abs(np.diff(areas)) / np.maximum(np.maximum(areas[1:], areas[:-1]), 1)
+    touched = np.mean([look.touched for look in looks] or [(0, 0, 0, 0)], axis=0)
+    specks, speck_area, holes, hole_area = np.mean([look[2:] for look in looks] or [(0, 0, 0, 0)], axis=0).tolist()
+    return MaskQuality(
+        frames=len(looks),
+        area=person / max(size, 1),
+        area_change=_median(change),
+        area_jumps=float(np.mean(change > JUMP)) if len(change) else 0.0,
+        flicker=_median(np.array(blinks)) / max(person, 1),
+        border=dict(zip(("left", "right", "top", "bottom"), touched.tolist())),
+        specks=specks,
+        speck_area=speck_area,
+        holes=holes,
+        hole_area=hole_area,
+        empty=len(empty),
+        full=len(full),
+        first_empty=int(empty[0]) if len(empty) else None,
+        first_full=int(full[0]) if len(full) else None,
+    )
+
+
+def _median(values: NDArray) -> float:
+    return float(np.median(values)) if len(values) else 0.0
