@@ -143,8 +143,8 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     joints = [Joint(shoulder, "torso", (0.0, y, z)), Joint(elbow, shoulder, (0.0, 0.0, -sizes.upper_arm_length))]
     dofs = [
         Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190])),
-        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-50, 100])),
-        Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-100, 110])),
+        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100])),
+        Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95])),
         Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150])),
     ]
     return joints, dofs
@@ -159,7 +159,7 @@ def upper_body_skeleton(sizes: CardboxSizes) -> Skeleton:
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
         Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90])),
-        Dof("torso_bow", "torso", "y", *np.radians([-30, 90])),
+        Dof("torso_bow", "torso", "y", *np.radians([-10, 90])),
         Dof("torso_bend", "torso", "x", *np.radians([-50, 50])),
     ]
     for side in SIDES:
@@ -169,11 +169,11 @@ def upper_body_skeleton(sizes: CardboxSizes) -> Skeleton:
     return Skeleton(tuple(joints), tuple(dofs))
 
 
-WRIST_SHARE = 0.146 / (0.146 + 0.108)
-"""Where the wrist lies between the elbow and the finger tips: forearm and hand are 0.146 and 0.108 of the stature (Drillis & Contini
-1966, as given by Winter, Biomechanics and Motor Control of Human Movement, 2009, Fig. 4.1)."""
-HAND_SHARE = WRIST_SHARE + 0.019 / (0.146 + 0.108)
-"""Where the base of the fingers lies: CMU's mocap skeletons have it (the end of `lhand`) 0.019 of the stature past the wrist."""
+FOREARM, TO_TIP, HAND_POINT = 0.1535, 0.254, 0.019
+"""Fractions of the stature: elbow to wrist (de Leva 1996, table 4, mean of women and men); elbow to the end of the card in a silhouette;
+wrist to the base of the fingers as CMU's mocap skeletons have it (the bone `lhand`)."""
+WRIST_SHARE, HAND_SHARE = FOREARM / TO_TIP, (FOREARM + HAND_POINT) / TO_TIP
+"""Where wrist and base of the fingers lie on the forearm's card."""
 
 
 def _landmarks(sizes: CardboxSizes) -> dict[str, tuple[str, tuple[float, float, float]]]:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body import Body
 from shadowpuppet.camera import Camera
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, inverse, rigid, transform
 
 Bits = NDArray[np.uint64]
 NEAR = 0.05
@@ -57,12 +57,15 @@ class Picture:
         """Joint transforms (N, J, 3, 4) into the camera's frame, of poses (N, D)."""
         return self.body.skeleton.forward(poses, self.T_camera_base)
 
-    def polygons(self, transforms: Array, quads: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """Pictures of some quads: corners (N, Q, 5, 2) in pixels and their number (N, Q), 0 where all is behind the camera."""
+    def polygons(self, transforms: Array, quads: NDArray[np.int64], shapes: Array | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """Pictures of some quads: corners (N, Q, 5, 2) in pixels and their number (N, Q), 0 where all is behind the camera.
+
+        `shapes` (N, all quads, 4, 3) gives every pose quads of its own measures.
+        """
+        shapes = self.body.quads[None] if shapes is None else shapes
         camera, corners = self.camera, np.empty((len(transforms), len(quads), 5, 2))
         counts = np.empty((len(transforms), len(quads)), np.int64)
-        _project(transforms, self.body.quads, self.body.quad_joints, quads, camera.matrix, camera.distortion, camera.fisheye, NEAR,
-                 corners, counts)
+        _project(transforms, shapes, self.body.quad_joints, quads, camera.matrix, camera.distortion, camera.fisheye, NEAR, corners, counts)
         return corners, counts
 
     def empty(self) -> Bits:
@@ -79,16 +82,50 @@ class Picture:
         _draw(corners[0], counts[0], self.camera.size[0], bits)
         return bits
 
+    def legs(self, pose: ArrayLike, spread: float = np.radians(25)) -> NDArray[np.bool_]:
+        """Mask (H, W) of where the legs of a pose (D,) may be: under the waist's lower edge, wider by `spread` (rad) to each side.
+
+        The model ends at the waist; what is seen below says nothing about it.
+        """
+        width, height = self.camera.size
+        waist = [part == "waist" for part in self.body.quad_parts]
+        corners = self.body.quads[waist]
+        T = self.transforms(np.asarray(pose, float)[None])[0, self.body.quad_joints[waist][0]]
+        low = corners[corners[..., 2] == corners[..., 2].min()] @ T[:, :3].T + T[:, 3]
+        if low[:, 2].min() < NEAR:
+            return np.zeros((height, width), bool)
+        pixels = self.camera.project(transform(inverse(self.camera.T_camera_world), low))
+        left, right, top = pixels[:, 0].min(), pixels[:, 0].max(), np.median(pixels[:, 1])
+        deep = max(height - top, 1.0)
+        wide = deep * np.tan(spread)
+        return draw_polygon([[left, top], [right, top], [right + wide, top + deep], [left - wide, top + deep]], (width, height))
+
     def mask(self, pose: ArrayLike) -> NDArray[np.bool_]:
         """The silhouette of one pose (D,), of shape (H, W): h(x, y, d) of Liu 2011, eq. 2."""
         return unpack(self.draw(pose), self.camera.size[0])
 
-    def added(self, transforms: Array, quads: NDArray[np.int64], silhouette: Bits, fixed: Bits) -> NDArray[np.int64]:
+    def added(self, transforms: Array, quads: NDArray[np.int64], silhouette: Bits, fixed: Bits,
+              shapes: Array | None = None) -> NDArray[np.int64]:
         """What drawing some quads adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
-        corners, counts = self.polygons(transforms, quads)
+        corners, counts = self.polygons(transforms, quads, shapes)
         out = np.empty((len(transforms), 2), np.int64)
         _added(corners, counts, self.camera.size[0], silhouette, fixed, out)
         return out
+
+
+def place(camera: Camera, distance: float, elevation: float) -> Array:
+    """T_camera_base (4, 4): the frame of Liu 2011's model, X toward the camera, Y to the image's right, Z up.
+
+    Its origin, the middle of the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation`
+    metres above it. Z is the world's up where the camera knows it, else the camera's own, as in the paper.
+    """
+    up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -1.0, 0.0])
+    if abs(up[2]) > 0.9:  # it looks straight down or up: its own frame
+        up = np.array([0.0, -1.0, 0.0])
+    x = np.array([0.0, 0.0, -1.0]) + up * up[2]
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(up, x), up], axis=1)
+    return rigid(R, R @ np.array([-distance, 0.0, elevation]))
 
 
 def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -112,16 +149,17 @@ def _popcount(typingctx, word):  # pragma: no cover
 
 
 @numba.njit(cache=True)
-def _project(transforms, all_quads, joints, quads, K, k, fisheye, near, corners, counts):  # pragma: no cover
+def _project(transforms, shapes, joints, quads, K, k, fisheye, near, corners, counts):  # pragma: no cover
     """Quads into the camera's frame, cut at the near plane, projected."""
     P = np.empty((4, 3))
     bent = k.any()
     for n in range(transforms.shape[0]):
+        shape = shapes[n if shapes.shape[0] > 1 else 0]
         for i in range(quads.size):
             q = quads[i]
             T = transforms[n, joints[q]]
             for v in range(4):
-                x, y, z = all_quads[q, v, 0], all_quads[q, v, 1], all_quads[q, v, 2]
+                x, y, z = shape[q, v, 0], shape[q, v, 1], shape[q, v, 2]
                 P[v, 0] = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
                 P[v, 1] = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
                 P[v, 2] = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]

@@ -122,9 +122,14 @@ class Skeleton:
         self.forward_some(poses, np.arange(len(self.joints)), out, np.eye(4) if root is None else np.asarray(root, float))
         return out
 
-    def forward_some(self, poses: Array, joints: NDArray[np.int64], transforms: Array, root: Array) -> None:
-        """Recompute, in place, only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are taken as they stand."""
-        _forward(poses, joints, *self._tree, np.ascontiguousarray(root[:3]), transforms)
+    def forward_some(self, poses: Array, joints: NDArray[np.int64], transforms: Array, root: Array, offsets: Array | None = None) -> None:
+        """Recompute, in place, only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are taken as they stand.
+
+        `offsets` (N, J, 3) gives every pose a skeleton of its own measures.
+        """
+        parents, own, first, axes, signs, turns = self._tree
+        offsets = own[None] if offsets is None else offsets
+        _forward(poses, joints, parents, offsets, first, axes, signs, turns, np.ascontiguousarray(root[:3]), transforms)
 
 
 @numba.njit(cache=True)
@@ -132,12 +137,13 @@ def _forward(poses, joints, parents, offsets, first, axes, signs, turns, root, o
     """Each joint: the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns."""
     T = np.empty((3, 4))
     for n in range(poses.shape[0]):
+        offset = offsets[n if offsets.shape[0] > 1 else 0]
         for j in joints:
             parent = parents[j]
             for r in range(3):
                 for c in range(4):
                     T[r, c] = root[r, c] if parent < 0 else out[n, parent, r, c]
-                T[r, 3] += T[r, 0] * offsets[j, 0] + T[r, 1] * offsets[j, 1] + T[r, 2] * offsets[j, 2]
+                T[r, 3] += T[r, 0] * offset[j, 0] + T[r, 1] * offset[j, 1] + T[r, 2] * offset[j, 2]
             for d in range(first[j], first[j + 1]):
                 axis, value = axes[d], signs[d] * poses[n, d]
                 if turns[d]:

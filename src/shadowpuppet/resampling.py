@@ -1,0 +1,100 @@
+"""Resampling: which particles live on. Every scheme has the same signature.
+
+    scheme(rng, log_weights, number) -> ancestors (number,), indices of particles
+
+`log_weights` (N,) need not be normalised. Schemes are listed in `SCHEMES`. Liu 2011's two strategies both keep the best particle first
+(`keeps_best`): `deterministic` (DRS, Algorithm 4) by its nature, `stratified` (SRS, Algorithm 3) through `with_best`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.geometry import Array
+
+Indices = NDArray[np.int64]
+Scheme = Callable[[np.random.Generator, Array, int], Indices]
+
+
+def normalise(log_weights: ArrayLike) -> Array:
+    """Weights (N,) that sum to one; the greatest exponent is taken off first. All -inf means all equal."""
+    log_weights = np.asarray(log_weights, float)
+    top = log_weights.max()
+    if not np.isfinite(top):
+        return np.full(len(log_weights), 1 / len(log_weights))
+    weights = np.exp(log_weights - top)
+    return weights / weights.sum()
+
+
+def _inverse(log_weights: ArrayLike, points: Array) -> Indices:
+    """psi = min{j : r <= L_j} for sorted points r in (0, 1] (Algorithm 3 with L of eq. 7)."""
+    cumulative = np.cumsum(normalise(log_weights))
+    cumulative[-1] = np.inf  # rounding must not lead past the end
+    return np.searchsorted(cumulative, points, side="left")
+
+
+def multinomial(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
+    """Independent draws by weight."""
+    return _inverse(log_weights, np.sort(1 - rng.random(number)))
+
+
+def stratified(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
+    """One draw in each of `number` equal strata of the cumulative weight (Kitagawa 1996), eq. 7."""
+    return _inverse(log_weights, (np.arange(number) + 1 - rng.random(number)) / number)
+
+
+def systematic(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
+    """One draw, shared by all strata."""
+    return _inverse(log_weights, (np.arange(number) + 1 - rng.random()) / number)
+
+
+def residual(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
+    """floor(number * weight) copies of each for certain, the rest drawn by what remains (Liu & Chen 1998)."""
+    expected = normalise(log_weights) * number
+    copies = np.floor(expected + 1e-9).astype(np.int64)  # a weight of exactly k / number must not lose a copy to rounding
+    certain = np.repeat(np.arange(len(copies)), copies)[:number]
+    rest = number - len(certain)
+    if rest == 0:
+        return certain
+    with np.errstate(divide="ignore"):
+        remaining = np.log(np.maximum(expected - copies, 0))
+    return np.sort(np.concatenate([certain, multinomial(rng, remaining, rest)]))
+
+
+def deterministic(rng: np.random.Generator, log_weights: ArrayLike, number: int, survival: float = 0.2) -> Indices:
+    """DRS (Liu 2011, Algorithm 4): the best `survival` * number particles live on in their order; copies of the best fill the rest."""
+    ranked = np.argsort(-np.asarray(log_weights, float), kind="stable")
+    survivors = ranked[: max(int(survival * number + 1e-9), 1)]
+    return np.concatenate([survivors, np.full(number - len(survivors), ranked[0])])
+
+
+def with_best(scheme: Scheme) -> Scheme:
+    """The scheme with the best particle put first, as in Algorithm 3: particle 1 is the best, the others are drawn."""
+
+    def kept(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
+        best = np.argmax(np.asarray(log_weights, float))
+        return np.concatenate([[best], scheme(rng, np.asarray(log_weights, float), number - 1)])
+
+    return kept
+
+
+SCHEMES: dict[str, Scheme] = {
+    "deterministic": deterministic,
+    "stratified": stratified,
+    "systematic": systematic,
+    "multinomial": multinomial,
+    "residual": residual,
+}
+
+
+def make_scheme(name: str, survival: float) -> Scheme:
+    """A scheme by name, that returns the best particle first. Raises `SettingsError` with the names there are."""
+    if name not in SCHEMES:
+        raise SettingsError(f"unknown resampling {name!r}; there are: {choices(SCHEMES)}")
+    if name == "deterministic":
+        return lambda rng, log_weights, number: deterministic(rng, log_weights, number, survival)
+    return with_best(SCHEMES[name])
