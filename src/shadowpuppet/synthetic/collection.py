@@ -10,11 +10,11 @@ from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, Viewpoint
 
 def demo_spec() -> Spec:
     """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
-    gestures = _gestures("wave_hands 3.4, bend_aside 3.4, bow_forward 2.6, reach 4.4")
+    gestures = _gestures("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
     return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=11, room=5))
 
 
-PAPER = "wave_hands 3.4, bend_aside 3.4, bow_forward 2.6"
+PAPER = "wave_hands 3.6, bend_aside 3.6, bow_forward 2.8"
 PROVING = (
     # name, kind and seed of the body, gestures, distance (m), fov (degrees), pitch (degrees), noise (grey levels), turn (degrees)
     ("man_paper", "man", 1, PAPER, 2.0, 60, 0, 2.5, 0),

@@ -101,14 +101,19 @@ def twist(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def reach(seconds: float, rng: np.random.Generator) -> Keys:
-    """The left hand toward the camera, then the right, then both."""
-    third, keys = seconds / 3, []
-    for n, arms in enumerate((left, right, both)):
-        aim = arms(
-            front=rng.uniform(74, 90), side=rng.uniform(-4, 14), elbow=rng.uniform(4, 22), supination=rng.uniform(0, 40), curl=15
+    """The left hand toward the camera, then the right, then both; fewer where there is no time (some 2 s each)."""
+    arms = (left, right, both)[-int(np.clip(seconds / 1.9, 1, 3)) :]
+    each, keys = seconds / len(arms), []
+    for n, chosen in enumerate(arms):
+        aim = chosen(
+            front=rng.uniform(74, 90),
+            side=rng.uniform(-4, 14),
+            elbow=rng.uniform(4, 22),
+            supination=rng.uniform(0, 40),
+            curl=15,
         )
-        turn = trunk(spine_twist=(-8, 8, 0)[n], spine_bow=3)
-        keys += [(third * (n + 0.42), aim | turn), (third * (n + 0.66), {**aim, **turn}), (third * (n + 0.98), {})]
+        turn = trunk(spine_twist={left: -8, right: 8, both: 0}[chosen], spine_bow=3)
+        keys += [(each * (n + 0.44), aim | turn), (each * (n + 0.62), {**aim, **turn}), (each * (n + 0.98), {})]
     return keys
 
 
@@ -145,7 +150,7 @@ LIMITS = {
 
 
 def random(seconds: float, rng: np.random.Generator) -> Keys:
-    """Smooth random motion of the upper body within `LIMITS`, below about 0.6 Hz, with pauses."""
+    """Smooth random motion of the upper body within `LIMITS`, below about 0.5 Hz, with pauses."""
     step = 0.16
     t = np.arange(0.7, max(seconds - 0.3, 0.9), step)
     pace = np.clip(1.4 + 1.6 * band_noise(t, 0.25, rng), 0.0, 1.6)
@@ -153,7 +158,7 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
     table = np.zeros((len(t), len(CHANNELS)))
     for column, channel in enumerate(CHANNELS):
         low, high = np.radians(LIMITS.get(_plain(channel), (0, 0)))
-        table[:, column] = low + (high - low) * (0.5 + 0.5 * np.tanh(0.9 * band_noise(own, 0.45, rng)))
+        table[:, column] = low + (high - low) * (0.5 + 0.5 * np.tanh(0.9 * band_noise(own, 0.3, rng)))
     for side in ("left", "right"):
         swing = [CHANNELS.index(f"{side}_side"), CHANNELS.index(f"{side}_front")]
         size = np.hypot(*table[:, swing].T)
