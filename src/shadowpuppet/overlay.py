@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
                   overlap: float = np.nan, ignore: ArrayLike | None = None) -> Image:
     """The three rows (3 H, W, 3), blue green red, of a frame.
 
-    Top: the model's cards over the darkened picture, brighter the more they face the camera. Middle: where model and silhouette
+    Top: the model over the darkened picture, its cards brighter the more they face the camera. Middle: where model and silhouette
     `mask` (H, W) agree (white), where there is only one of them, and what does not count, `ignore` (H, W), in greys. Bottom: the
     picture with the skeleton, the time (s), the status and the overlap. A `pose` (D,) that is not numbers is not drawn.
     Raises `ShadowPuppetError` where a picture has not the camera's size.
@@ -64,26 +64,17 @@ def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLik
 
 
 def draw_model(image: Image, picture: Picture, pose: Array) -> None:
-    """Draw the body's quads in the pose (D,) into an image (H, W, 3), shaded and outlined, nearer ones over farther ones.
-
-    Cards cross one another, so that each is drawn as four pieces, which mostly do not.
-    """
+    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, nearer shapes over farther ones."""
     import cv2
 
-    body = picture.body
-    pieces = _pieces(picture.transforms(pose[None])[0], body.quads, body.quad_joints)
-    pixels = _pixels(picture, pieces)
-    visible = np.asarray(np.isfinite(pixels).all((2, 3)))
-    pixels = _fixed(np.where(visible[..., None, None], pixels, 0))
-    colours = np.array([_side(part) for part in body.quad_parts], float)[:, None] * _shades(pieces)[..., None]
-    order = np.argsort(-pieces[..., 2].mean(2), axis=None, kind="stable")
+    from shadowpuppet.body import Quads
+
+    pieces = _of_quads(picture, pose) if isinstance(picture.body.shapes, Quads) else _of_hulls(picture, pose)
     width = max(1, round(image.shape[0] / 300))
-    for q, k in zip(*np.unravel_index(order, visible.shape)):
-        if visible[q, k]:
-            corners = pixels[q, k]
-            cv2.fillConvexPoly(image, corners, colours[q, k].tolist(), cv2.LINE_AA, SUBPIXEL)
-            # The first three corners of a piece lie on the card's edge, which is all that is outlined.
-            cv2.polylines(image, [corners[:3]], False, (25, 25, 25), width, cv2.LINE_AA, SUBPIXEL)
+    for piece in sorted(pieces, key=lambda piece: -piece.depth):
+        for corners, colour in piece.fills:
+            cv2.fillConvexPoly(image, _fixed(corners), colour, cv2.LINE_AA, SUBPIXEL)
+        cv2.polylines(image, [_fixed(piece.edge)], False, (25, 25, 25), width, cv2.LINE_AA, SUBPIXEL)
 
 
 def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
@@ -95,13 +86,15 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
     pixels = dict(zip(names, _pixels(picture, points)))
     seen = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
     bones = [(seen[a], seen[b], _side(b)) for a, b in BONES if a in seen and b in seen]
+    joints = {name for bone in BONES for name in bone}
+    dots = [_point(seen[name]) for name in names if name in seen and name in joints]
     unit = max(1.0, image.shape[0] / 240)
     for extra, dark in ((2, True), (0, False)):  # a dark rim, so that bones stand out from any clothes
         for a, b, colour in bones:
             cv2.line(image, _point(a), _point(b), BLACK if dark else colour, round(2 * unit) + extra, cv2.LINE_AA, SUBPIXEL)
-    for name in {name for bone in BONES for name in bone} & set(seen):
-        cv2.circle(image, _point(seen[name]), round(3 * unit) << SUBPIXEL, BLACK, -1, cv2.LINE_AA, SUBPIXEL)
-        cv2.circle(image, _point(seen[name]), round(2 * unit) << SUBPIXEL, WHITE, -1, cv2.LINE_AA, SUBPIXEL)
+    for radius, colour in ((3, BLACK), (2, WHITE)):
+        for dot in dots:
+            cv2.circle(image, dot, round(radius * unit) << SUBPIXEL, colour, -1, cv2.LINE_AA, SUBPIXEL)
 
 
 class OverlayWriter:
@@ -146,8 +139,45 @@ def _side(name: str) -> tuple[int, int, int]:
     return SIDES.get(name.split("_")[0], MIDDLE)
 
 
-def _pieces(transforms: Array, quads: Array, joints: NDArray[np.int64]) -> Array:
-    """Quads cut in four, (Q, 4, 4, 3) in the camera's frame; of each piece's corners the last is the quad's middle."""
+class _Piece(NamedTuple):
+    """Something flat to draw."""
+
+    depth: float
+    """Metres from the camera."""
+    fills: list[tuple[Array, tuple[float, ...]]]
+    """Convex polygons (K, 2), pixels, and their colours, one upon the other."""
+    edge: Array
+    """The line (K, 2), pixels, that is outlined."""
+
+
+def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
+    """Quads, each cut in four: cards cross one another, their quarters mostly do not."""
+    body = picture.body
+    quarters = _quarters(picture.transforms(pose[None])[0], body.shapes.arrays[0], body.shapes.joints[:, 0])
+    pixels, depths = _pixels(picture, quarters), quarters[..., 2].mean(2)
+    shades = _shades(quarters)
+    # Of a quarter's corners the first three lie on the card's edge, which is all that is outlined.
+    return [_Piece(depths[q, k], [(pixels[q, k], _shaded(part, shades[q, k]))], pixels[q, k, :3])
+            for q, part in enumerate(body.parts) for k in range(4) if np.isfinite(pixels[q, k]).all()]
+
+
+def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
+    """Hulls by their outlines, brighter toward the middle."""
+    body, T = picture.body, picture.transforms(pose[None])
+    corners, counts = picture.polygons(T, np.arange(len(body.parts)))
+    T = T[0, body.shapes.joints]
+    depths = (np.einsum("sej,sej->se", T[..., 2, :3], body.shapes.arrays[0]) + T[..., 2, 3]).mean(1)
+    pieces = []
+    for i in np.flatnonzero(counts[0]):
+        outline, part = corners[0, i, : counts[0, i]], body.parts[i]
+        middle = outline.mean(0)
+        fills = [(middle + size * (outline - middle), _shaded(part, 1 - 0.45 * size**2)) for size in (1.0, 0.8, 0.6, 0.4, 0.2)]
+        pieces.append(_Piece(depths[i], fills, np.concatenate([outline, outline[:1]])))
+    return pieces
+
+
+def _quarters(transforms: Array, quads: Array, joints: NDArray[np.int64]) -> Array:
+    """Quads cut in four, (Q, 4, 4, 3) in the camera's frame; of each quarter's corners the last is the quad's middle."""
     T = transforms[joints]
     corners = np.einsum("qij,qvj->qvi", T[..., :3], quads) + T[:, None, :, 3]
     after = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -161,6 +191,10 @@ def _shades(pieces: Array) -> Array:
     view = pieces.mean(2)
     sizes = np.linalg.norm(normals, axis=2) * np.linalg.norm(view, axis=2)
     return 0.4 + 0.6 * np.abs((normals * view).sum(2)) / np.maximum(sizes, 1e-12)
+
+
+def _shaded(part: str, shade: float) -> tuple[float, ...]:
+    return tuple(shade * value for value in _side(part))
 
 
 def _pixels(picture: Picture, points_camera: Array) -> Array:
@@ -180,19 +214,20 @@ def _point(pixel: Array) -> tuple[int, int]:
 
 def _label(out: Image, height: int, status: str, time: float, overlap: float) -> None:
     fit = "" if np.isnan(overlap) else f"  IoU {overlap:.2f}"
-    _write(out, f"{time:.2f} s  {status}{fit}", 3 * height, WHITE)
-    _write(out, "best estimate", height, WHITE)
-    end = _write(out, "model only", 2 * height, MODEL_ONLY)
-    _write(out, "silhouette only", 2 * height, SILHOUETTE_ONLY, end)
+    _write(out, "best estimate", 0, WHITE)
+    end = _write(out, "model only", height, MODEL_ONLY)
+    _write(out, "silhouette only", height, SILHOUETTE_ONLY, end)
+    _write(out, f"{time:.2f} s  {status}{fit}", 2 * height, WHITE)
 
 
-def _write(out: Image, text: str, bottom: int, colour: tuple[int, int, int], left: int = 0) -> int:
-    """Write a line of text above `bottom`, with a dark rim; returns where it ends."""
+def _write(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0) -> int:
+    """Write a line of text below `top`, with a dark rim; returns where it ends."""
     import cv2
 
     scale = max(0.35, out.shape[0] / 3 / 600)
-    (width, _), base = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
-    place = (left + round(10 * scale), bottom - base - round(4 * scale))
-    for thickness, ink in ((3, BLACK), (1, colour)):
-        cv2.putText(out, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, max(1, round(thickness * scale / 0.4)), cv2.LINE_AA)
-    return place[0] + width + round(10 * scale)
+    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
+    x, y = left + round(12 * scale), top + height + round(12 * scale)
+    # The rim is the same text moved, for OpenCV 5 draws thicker text wider.
+    for dx, dy, ink in ((-1, -1, BLACK), (1, -1, BLACK), (-1, 1, BLACK), (1, 1, BLACK), (0, 0, colour)):
+        cv2.putText(out, text, (x + dx, y + dy), cv2.FONT_HERSHEY_SIMPLEX, scale, ink, 1, cv2.LINE_AA)
+    return x + width + round(10 * scale)

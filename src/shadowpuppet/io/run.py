@@ -206,12 +206,13 @@ def _npz(motion: Motion) -> bytes:
 
 def _read_npz(path: Path) -> Motion:
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays: dict[str, Any] = {f.name: data[f.name] for f in fields(Motion)}
-        arrays["body_name"] = str(arrays["body_name"])
-        return Motion(**arrays)
-    except KeyError as error:
-        problem = f"no array {error.args[0]!r}" if error.args else "an array is missing"
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            missing = [f.name for f in fields(Motion) if f.name not in data]
+            arrays: dict[str, Any] = {f.name: data[f.name] for f in fields(Motion) if not missing}
+        if not missing:
+            arrays["body_name"] = str(arrays["body_name"])
+            return Motion(**arrays)
+        problem = f"no array {missing[0]!r}"
     except (OSError, EOFError, ValueError, TypeError, zlib.error, zipfile.BadZipFile, ShadowPuppetError) as error:
         problem = str(error)
     raise FormatError(f"{path}: not a motion ({problem}); without this file the run is read from joints.csv and angles.csv")

@@ -1,0 +1,297 @@
+"""Run folders: what is written is read, however the run ended; other people's folders stay; what is malformed is said."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.motion import STATUSES, Motion, MotionFrame
+
+DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand")
+INFO = {"recording": Path("recordings/demo"), "method": "monocular", "preset": None, "seed": 3,
+        "sizes": {"head_width": np.float64(0.17)}}
+PLACES = [f"{joint}{kind}_{axis}" for joint in JOINTS for kind in ("", "_sd") for axis in "xyz"]
+
+
+def a_frame(i: int, status: str = "tracked") -> MotionFrame:
+    rng = np.random.default_rng(i)
+    sd = {"pose_sd": rng.random(2), "joint_sd": rng.random((2, 3))} if i % 2 else {}
+    return MotionFrame(i / 15, status, rng.normal(size=2), rng.normal(size=(2, 3)), cost=900.5, overlap=rng.random(), **sd)
+
+
+FIELDS = [field.name for field in dataclasses.fields(Motion)]
+
+
+def writer(folder: Path, **info) -> RunWriter:
+    return RunWriter(folder, "cardbox", DOFS, JOINTS, INFO | info)
+
+
+def write(folder: Path, statuses=("tracked", "lost", "uncertain", "absent", "predicted")) -> Path:
+    with writer(folder) as run:
+        for i, status in enumerate(statuses):
+            run.write(a_frame(i, status))
+        run.metrics["timings"] = {"silhouette_s": 0.25, "unknown": np.nan}
+    return folder
+
+
+def assert_same(a: Motion, b: Motion, atol: float = 0.0) -> None:
+    for field in dataclasses.fields(Motion):
+        left, right = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(left, np.ndarray) and left.dtype.kind == "f":
+            np.testing.assert_allclose(left, right, rtol=0, atol=0.0051 if field.name == "cost" and atol else atol)
+        else:
+            np.testing.assert_array_equal(left, right)
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.sampled_from(STATUSES), max_size=5))
+def test_what_is_written_is_read_exactly_and_from_the_tables_nearly(tmp_path, statuses):
+    run = read_run(write(tmp_path / "run", statuses))
+    assert run.complete
+    assert run.motion.status.tolist() == statuses
+    for i, status in enumerate(statuses):
+        frame = a_frame(i)
+        kept = status not in ("lost", "absent")
+        np.testing.assert_array_equal(run.motion.joints[i], frame.joints if kept else np.full((2, 3), np.nan))
+        np.testing.assert_array_equal(run.motion.pose_sd[i], frame.pose_sd if kept and i % 2 else [np.nan] * 2)
+    (tmp_path / "run" / "motion.npz").unlink()
+    assert_same(read_run(tmp_path / "run").motion, run.motion, atol=5.1e-7)
+
+
+def test_the_files_are_as_documented(tmp_path):
+    folder = write(tmp_path / "new" / "run")
+    assert {path.name for path in folder.iterdir()} == {"angles.csv", "joints.csv", "metrics.json", "motion.npz", "run.toml"}
+    joints, angles = ((folder / name).read_text().splitlines() for name in ("joints.csv", "angles.csv"))
+    assert joints[0].split(",") == ["time", *PLACES, "status", "cost", "overlap"]
+    assert angles[0] == "time,torso_y,torso_bow,torso_y_sd,torso_bow_sd"
+    assert joints[2].split(",")[:13] == ["0.066667", *[""] * 12]
+    assert joints[2].split(",")[13] == "lost"
+    assert joints[1].split(",")[4:7] == ["", "", ""]
+    info = tomllib.loads((folder / "run.toml").read_text())
+    assert info["versions"].keys() >= {"python", "numpy", "shadowpuppet"}
+    versions = info.pop("versions")
+    assert versions["numpy"] == np.__version__
+    assert info == {"complete": True, "frames": 5, "recording": "recordings/demo", "method": "monocular", "seed": 3,
+                    "body": "cardbox", "sizes": {"head_width": 0.17}}
+    assert json.loads((folder / "metrics.json").read_text()) == {
+        "complete": True, "frames": 5, "status": dict.fromkeys(STATUSES, 1),
+        "timings": {"silhouette_s": 0.25, "unknown": None}}
+    with np.load(folder / "motion.npz", allow_pickle=False) as arrays:
+        assert {f.name for f in dataclasses.fields(Motion)} == set(arrays)
+
+
+@dataclasses.dataclass
+class Settings:
+    arm: dict | Settings
+    stages: tuple[str, ...] = ("torso", "left_arm")
+    limits: bool = True
+    seed: np.integer = dataclasses.field(default_factory=lambda: np.int64(7))
+    region: Path | None = None
+
+
+def test_every_setting_is_kept(tmp_path):
+    with writer(tmp_path / "run", settings=Settings(Settings({"sigma": 0.1}))):
+        pass
+    plain = {"stages": ["torso", "left_arm"], "limits": True, "seed": 7}
+    assert read_run(tmp_path / "run").settings == {"arm": {"arm": {"sigma": 0.1}, **plain}, **plain}
+
+
+def test_what_no_file_can_hold_and_what_the_writer_says_itself_is_refused(tmp_path):
+    with pytest.raises(ShadowPuppetError, match=r"info\.settings\.body: found <object"):
+        writer(tmp_path / "run", settings={"body": object()})
+    with pytest.raises(ShadowPuppetError, match="info: found 'complete', which the run's writer fills in itself"):
+        writer(tmp_path / "run", complete=True)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_an_interrupted_run_has_all_its_frames(tmp_path, error):
+    def work() -> None:
+        with writer(tmp_path / "run") as run:
+            for i in range(4):
+                run.write(a_frame(i))
+            run.metrics["timings"] = {"tracking_s": 1.0}
+            raise error
+
+    with pytest.raises(error):
+        work()
+    found = read_run(tmp_path / "run")
+    assert not found.complete
+    assert len(found.motion) == 4
+    assert (found.metrics["complete"], found.metrics["timings"]) == (False, {"tracking_s": 1.0})
+
+
+def test_a_frame_that_does_not_fit_ends_the_run_but_keeps_it(tmp_path):
+    def work() -> None:
+        with writer(tmp_path / "run") as run:
+            run.write(a_frame(0))
+            run.write(a_frame(1)._replace(pose=[1.0]))
+
+    with pytest.raises(ShadowPuppetError, match="pose: found shape"):
+        work()
+    assert len(read_run(tmp_path / "run").motion) == 1
+    assert len((tmp_path / "run" / "joints.csv").read_text().splitlines()) == 2
+
+
+CHILD = """
+import os, signal, sys
+sys.path.insert(0, {tests!r})
+from test_run import a_frame, writer
+{before}
+with writer({folder!r}) as run:
+    for i in range({frames}):
+        run.write(a_frame(i))
+    {after}
+"""
+
+
+def child(folder: Path, frames: int, before: str = "", after: str = "") -> subprocess.CompletedProcess:
+    code = CHILD.format(tests=str(Path(__file__).parent), folder=str(folder), frames=frames, before=before, after=after)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system cannot kill")
+def test_a_killed_run_is_read_from_its_tables(tmp_path):
+    folder = write(tmp_path / "run")  # an earlier one, of which nothing must come through
+    assert child(folder, 7, after="os.kill(os.getpid(), signal.SIGKILL)").returncode == -signal.SIGKILL
+    assert sorted(path.name for path in folder.iterdir()) == ["angles.csv", "joints.csv", "run.toml"]
+    whole = read_run(write(tmp_path / "whole", ["tracked"] * 7))
+    found = read_run(folder)
+    assert not found.complete
+    assert found.metrics == {}
+    assert_same(found.motion, whole.motion, atol=5.1e-7)
+
+
+@pytest.mark.parametrize(("joints_cut", "angles_cut"), [(0, 0), (1, 0), (0, 9), (30, 0), (400, 0), (0, 60), (60, 9)])
+def test_tables_that_break_off_give_the_frames_before(tmp_path, joints_cut, angles_cut):
+    folder = write(tmp_path / "run", ["tracked"] * 7)
+    (folder / "motion.npz").unlink()
+    left = []
+    for name, cut in (("joints.csv", joints_cut), ("angles.csv", angles_cut)):
+        data = (folder / name).read_bytes()
+        (folder / name).write_bytes(data[: len(data) - cut])
+        left.append(data[: len(data) - cut].count(b"\n") - 1)
+    if left[0] != left[1] and max(joints_cut, angles_cut) > 9:
+        with pytest.raises(FormatError, match=r"line \d: found \d+ cells|found other times"):
+            read_run(folder)  # a complete run must be whole
+    info = (folder / "run.toml").read_text()
+    (folder / "run.toml").write_text(info.replace("complete = true", "complete = false"))
+    assert len(read_run(folder).motion) == min(left) > 1
+
+
+def test_a_full_disk_is_said_and_nothing_lost(tmp_path):
+    resource = pytest.importorskip("resource")
+    del resource
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))"
+    ended = child(tmp_path / "run", 1000, before=limit)
+    assert ended.returncode == 1
+    said = ended.stderr.strip().splitlines()[-1]
+    assert "run: the run cannot be written (file too large); the " in said
+    frames = int(said.split("; the ")[1].split()[0])
+    assert frames > 20
+    assert len(read_run(tmp_path / "run").motion) in (frames, frames - 1)
+
+
+def test_a_folder_that_is_no_run_is_left_alone(tmp_path):
+    (tmp_path / "holidays.jpg").touch()
+    with pytest.raises(ShadowPuppetError, match=r"found holidays.jpg in it but no run.toml of a run, expected a new or e"), \
+            writer(tmp_path) as run:
+        run.write(a_frame(0))
+    (tmp_path / "run.toml").write_text("[race]\nmiles = 3\n")
+    with pytest.raises(ShadowPuppetError, match=r"but no run.toml of a run"), writer(tmp_path):
+        pass
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["holidays.jpg", "run.toml"]
+
+
+def test_an_earlier_run_is_replaced_by_the_first_frame_and_other_files_stay(tmp_path):
+    folder = write(tmp_path / "run")
+    before = read_run(folder)
+    for name in ("notes.txt", "overlay.mp4"):
+        (folder / name).touch()
+    with pytest.raises(ValueError, match="no silhouette"), writer(folder):
+        raise ValueError("no silhouette")
+    assert_same(read_run(folder).motion, before.motion)
+    write(folder, ["tracked"])
+    assert len(read_run(folder).motion) == 1
+    assert (folder / "notes.txt").exists()
+    assert not (folder / "overlay.mp4").exists()
+
+
+def test_a_new_folder_goes_where_nothing_was_tracked(tmp_path):
+    with pytest.raises(ValueError, match="no silhouette"), writer(tmp_path / "run"):
+        raise ValueError("no silhouette")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_place_that_cannot_be_written_is_said(tmp_path):
+    (tmp_path / "file").touch()
+    said = r"the run cannot be written \((file exists|not a directory)\)"
+    for place in (tmp_path / "file", tmp_path / "file" / "run"):
+        with pytest.raises(ShadowPuppetError, match=said), writer(place):
+            pass
+
+
+def replaced(old: str, new: str):
+    def change(path: Path) -> None:
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+    return change
+
+
+def put(content: bytes):
+    return lambda path: path.write_bytes(content)
+
+
+@pytest.mark.parametrize(("name", "change", "said"), [
+    ("run.toml", Path.unlink, "found no run.toml in it, expected the folder of a run"),
+    ("run.toml", replaced("complete = true", "complete = 1"), "run.toml: complete: found 1, expected true or false"),
+    ("run.toml", replaced("body", "bodies"), "run.toml: body: found None, expected the name of a body"),
+    ("run.toml", replaced("seed", "settings"), "run.toml: settings: found 3, expected a table"),
+    ("run.toml", put(b"complete = "), "run.toml: not valid TOML"),
+    ("motion.npz", put(b"PK\x03\x04 cut off"), r"not a motion \(.*\); without this file the run is read from j"),
+    ("motion.npz", put(b""), r"motion.npz: not a motion \("),
+    ("motion.npz", lambda path: np.savez(path, times=np.zeros(3)), r"motion.npz: not a motion \(no array 'body_name'\)"),
+    ("motion.npz", lambda path: np.savez(path, **dict.fromkeys(FIELDS, np.array([{}], object))), r"not a motion \(Object arr"),
+    ("metrics.json", put(b"[1]"), "metrics.json: found list, expected an object"),
+    ("metrics.json", put(b'{"a": '), "metrics.json: not valid JSON"),
+    ("metrics.json", put(b"\xff\xff"), "metrics.json: not valid JSON"),
+    ("joints.csv", replaced("uncertain", "asleep"), "csv: line 4, column 'status': found 'asleep', expected one of tracked, "),
+    ("joints.csv", replaced(",overlap", ",over"), "joints.csv: no column 'overlap'; columns there: time, neck_x"),
+    ("joints.csv", replaced("0.066667", "0.06x"), "joints.csv: line 3, column 'time': found '0.06x'"),
+    ("joints.csv", replaced(",lost,", ",tracked,"), None),
+    ("joints.csv", replaced(",tracked,", ",lost,"), "run: joints.csv and angles.csv: poses: found values in frame 0"),
+    ("angles.csv", replaced("0.066667", "0.07"), "angles.csv: column 'time': found other times than in joints.csv"),
+    ("angles.csv", replaced("torso_y_sd", "torso_z_sd"), "angles.csv: no column 'torso_y_sd'"),
+    ("angles.csv", Path.unlink, r"angles.csv: cannot be read \(no such file"),
+])
+def test_what_is_malformed_is_said(tmp_path, name, change, said):
+    folder = write(tmp_path / "run")
+    if name.endswith("csv"):
+        (folder / "motion.npz").unlink()
+    change(folder / name)
+    if said is None:
+        read_run(folder)
+        return
+    with pytest.raises(FormatError, match=said):
+        read_run(folder)
+
+
+def test_measures_can_be_added_later(tmp_path):
+    run = read_run(write(tmp_path / "run"))
+    write_metrics(run.folder, run.metrics | {"errors": {"mean_mm": np.float64(41.5)}})
+    found = read_run(run.folder).metrics
+    assert found["errors"] == {"mean_mm": 41.5}
+    assert found["timings"] == run.metrics["timings"]

@@ -1,0 +1,202 @@
+"""The overlay: its middle row is the cost in colours, its outer rows show the pose where it is, or none where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shadowpuppet import overlay
+from shadowpuppet.body import BODIES, CardboxSizes, make_body
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetError, VideoError
+from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.overlay import OverlayWriter, draw_model, matching, overlay_frame
+from shadowpuppet.rasterize import Picture, unpack
+from shadowpuppet.video import open_frames
+
+SIZES = CardboxSizes(*(1.8 * share for share in (
+    0.09, 0.13, 0.05, 0.23, 0.19, 0.23, 0.2, 0.12, 0.11, 0.09, 0.14, 0.14, 0.17, 0.06, 0.25, 0.05, 0.04, 0.02)))
+CAMERA = Camera("cam", (160, 120), [[138, 0, 79.5], [0, 138, 59.5], [0, 0, 1]], T_camera_world=rigid(np.eye(3), [0.1, 0.2, 0.3]))
+AXES = [[0, 1, 0], [0, 0, -1], [-1, 0, 0]]
+"""X toward the camera, Y to the image's right, Z up."""
+LABEL = 16
+"""Rows that a label may take."""
+
+
+def a_picture(distance: float = 2.0, body: str = "cardbox") -> Picture:
+    return Picture(make_body(body, SIZES), CAMERA, rigid(AXES, [0.0, 0.3, distance]))
+
+
+def a_pose(picture: Picture, **angles: float) -> Array:
+    level = {"left_shoulder_abduction": 1.5, "right_shoulder_abduction": 1.2, "left_elbow_flexion": 0.6}
+    return picture.body.skeleton.pose(**level | angles)
+
+
+def a_scene(rng, picture: Picture) -> tuple[np.ndarray, np.ndarray]:
+    """A picture, and a mask that is not quite that of a pose."""
+    width, height = picture.camera.size
+    mask = np.roll(picture.mask(a_pose(picture)), 5, axis=1)
+    return rng.integers(0, 256, (height, width, 3), np.uint8), mask
+
+
+def rows(frame: np.ndarray) -> list[np.ndarray]:
+    return np.split(frame, 3)
+
+
+def test_the_middle_row_is_the_cost_in_colours(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    ignore = np.zeros_like(mask)
+    ignore[100:] = True
+    pose = a_pose(picture)
+    model = picture.mask(pose)
+    middle = rows(overlay_frame(image, mask, picture, pose, status="tracked", time=1.0, ignore=ignore))[1][LABEL:]
+    model, mask, ignore = model[LABEL:], mask[LABEL:], ignore[LABEL:]
+    for colour, where in {overlay.MODEL_ONLY: model & ~mask, overlay.SILHOUETTE_ONLY: ~model & mask, overlay.WHITE: model & mask,
+                          overlay.BLACK: ~model & ~mask}.items():
+        np.testing.assert_array_equal((middle == colour).all(2), where & ~ignore)
+        assert where.any()
+
+
+@given(st.integers(0, 2**36 - 1))
+def test_matching_tells_all_cases_apart(bits):
+    model, mask, ignore = np.array([bits >> i & 1 for i in range(36)], bool).reshape(3, 3, 4)
+    cases = (model + 2 * mask).ravel().tolist()
+    found = dict(zip(cases, map(tuple, matching(model, mask).reshape(-1, 3).tolist())))
+    assert len(set(found.values())) == len(found) == len(set(cases))
+    np.testing.assert_array_equal(matching(model, mask, ignore)[~ignore], matching(model, mask)[~ignore])
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_the_model_is_drawn_where_its_silhouette_is(body):
+    picture = a_picture(body=body)
+    pose = a_pose(picture, torso_twist=0.5, torso_bow=0.3)
+    image = np.zeros((120, 160, 3), np.uint8)
+    draw_model(image, picture, pose)
+    drawn, mask = image.any(2), picture.mask(pose)
+    thick = mask.copy()
+    for axis in (0, 1):  # outlines are a pixel or two wide
+        thick |= np.roll(thick, 1, axis) | np.roll(thick, -1, axis) | np.roll(thick, 2, axis) | np.roll(thick, -2, axis)
+    assert mask.sum() > 1000
+    assert not (mask & ~drawn).any()
+    assert not (drawn & ~thick).any()
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("behind", [False, True])
+def test_what_is_nearer_hides_what_is_behind(body, behind):
+    picture = a_picture(body=body)
+    arm_before_chest = {"left_shoulder_abduction": -0.35, "left_shoulder_forward": 0.5, "left_elbow_flexion": 0.3}
+    pose = a_pose(picture, **arm_before_chest, torso_twist=np.pi if behind else 0.0)
+    arm, torso = (unpack(picture.draw(pose, picture.body.shapes_of(*parts)), 160)
+                  for parts in (["left_forearm"], ["torso"]))
+    image = np.zeros((120, 160, 3), np.uint8)
+    draw_model(image, picture, pose)
+    both = image[arm & torso].astype(float)
+    hues = np.array([overlay.SIDES["left"], overlay.MIDDLE], float)
+    nearest = (both @ (hues / np.linalg.norm(hues, axis=1, keepdims=True)).T).argmax(1)
+    assert len(nearest) > 40
+    assert (nearest == behind).mean() > 0.85
+
+
+def test_the_skeleton_is_drawn_over_the_raw_picture(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    pose = a_pose(picture)
+    bottom = rows(overlay_frame(image, mask, picture, pose, status="tracked", time=0.0))[2]
+    points = picture.body.points(pose[None], picture.T_camera_base)[0]
+    near = np.zeros(mask.shape, bool)
+    for name, point in zip(picture.body.landmark_names, points):
+        x, y = np.round(overlay._pixels(picture, point)).astype(int)
+        if name.endswith(("elbow", "wrist")):
+            assert tuple(bottom[y, x]) == overlay.WHITE
+        near[max(y - 40, 0) : y + 41, max(x - 40, 0) : x + 41] = True
+    near[:LABEL] = True
+    np.testing.assert_array_equal(bottom[~near], image[~near])
+
+
+def test_without_a_pose_nothing_is_drawn(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    top, middle, bottom = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), status="absent", time=3.5))
+    np.testing.assert_array_equal(bottom[LABEL:], image[LABEL:])
+    np.testing.assert_array_equal(middle[LABEL:], matching(np.zeros_like(mask), mask)[LABEL:])
+    assert (top[LABEL:] <= image[LABEL:].max() * 0.41).all()
+
+
+def test_status_time_and_overlap_are_written(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    pose = a_pose(picture)
+    said = {"status": "tracked", "time": 1.0, "overlap": 0.9}
+    frames = [overlay_frame(image, mask, picture, pose, **said | change)
+              for change in ({}, {"status": "lost"}, {"time": 1.5}, {"overlap": 0.8}, {"overlap": np.nan})]
+    assert len({frame.tobytes() for frame in frames}) == len(frames)
+    for frame in frames:
+        np.testing.assert_array_equal(frame[2 * 120 + LABEL :], frames[0][2 * 120 + LABEL :])
+        np.testing.assert_array_equal(frame[: 2 * 120], frames[0][: 2 * 120])
+
+
+def test_grey_pictures_do(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    grey = image[..., 0]
+    a, b = (overlay_frame(i, mask.astype(np.uint8) * 255, picture, a_pose(picture), status="tracked", time=0.0)
+            for i in (grey, np.stack([grey] * 3, 2)))
+    np.testing.assert_array_equal(a, b)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 1000), st.floats(-1, 3), st.sampled_from(list(BODIES)))
+def test_any_pose_at_any_distance_is_drawn(seed, distance, body):
+    """Across the image's border, close to the camera and behind it."""
+    picture = a_picture(distance, body)
+    pose = np.random.default_rng(seed).normal(size=12) * 2
+    frame = overlay_frame(np.zeros((120, 160), np.uint8), np.zeros((120, 160), bool), picture, pose, status="tracked", time=0.0)
+    assert frame.shape == (360, 160, 3)
+    middle = rows(frame)[1][LABEL:]
+    np.testing.assert_array_equal((middle == overlay.MODEL_ONLY).all(2), picture.mask(pose)[LABEL:])
+
+
+@pytest.mark.parametrize(("shapes", "said"), [
+    (((60, 80, 3), (120, 160), (120, 160)), "overlay: image: found 80 x 60 pixels, the camera has 160 x 120"),
+    (((120, 160), (160, 120), (120, 160)), "overlay: mask: found 120 x 160 pixels"),
+    (((120, 160), (120, 160), (1, 160)), "overlay: ignore: found 160 x 1 pixels"),
+])
+def test_a_picture_of_another_size_is_said(shapes, said):
+    picture = a_picture()
+    image, mask, ignore = (np.zeros(shape, np.uint8) for shape in shapes)
+    with pytest.raises(ShadowPuppetError, match=said):
+        overlay_frame(image, mask, picture, a_pose(picture), status="tracked", time=0.0, ignore=ignore)
+
+
+def test_a_film_of_overlays(tmp_path, rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    with OverlayWriter(tmp_path / "overlay.mp4", 15, picture) as film:
+        for i in range(4):
+            film.write(image, mask, a_pose(picture, torso_bend=0.1 * i), status="tracked", time=i / 15, overlap=0.9)
+    frames = list(open_frames(tmp_path / "overlay.mp4"))
+    assert [round(frame.time * 15) for frame in frames] == [0, 1, 2, 3]
+    assert frames[0].image.shape == (360, 160, 3)
+    middle = rows(frames[0].image)[1][LABEL:].astype(int)
+    white = (picture.mask(a_pose(picture)) & mask)[LABEL:]
+    assert middle[white].mean() > 220
+
+
+def test_an_interrupted_film_can_be_played(tmp_path, rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+
+    def work() -> None:
+        with OverlayWriter(tmp_path / "overlay.mp4", 15, picture) as film:
+            film.write(image, mask, a_pose(picture), status="tracked", time=0.0)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert len(list(open_frames(tmp_path / "overlay.part.mp4"))) == 1
+    with pytest.raises(VideoError, match=r"found the ending '.txt'"):
+        OverlayWriter(tmp_path / "overlay.txt", 15, picture)
