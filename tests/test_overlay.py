@@ -160,6 +160,13 @@ def test_any_pose_at_any_distance_is_drawn(seed, distance, body):
     np.testing.assert_array_equal((middle == overlay.MODEL_ONLY).all(2), picture.mask(pose)[LABEL:])
 
 
+def test_pixels_far_outside_stay_far_outside_in_fixed_point_numbers():
+    found = overlay._fixed(np.array([1e12, -1e12, 100.25]))
+    assert found[0] > 1 << 18
+    assert found[1] < -(1 << 18)
+    assert found[2] == 1604
+
+
 @pytest.mark.parametrize(("shapes", "said"), [
     (((60, 80, 3), (120, 160), (120, 160)), "overlay: image: found 80 x 60 pixels, the camera has 160 x 120"),
     (((120, 160), (160, 120), (120, 160)), "overlay: mask: found 120 x 160 pixels"),

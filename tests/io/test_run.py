@@ -251,6 +251,10 @@ def replaced(old: str, new: str):
     return change
 
 
+def without_last_line(path: Path) -> None:
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+
+
 def put(content: bytes):
     return lambda path: path.write_bytes(content)
 
@@ -275,6 +279,8 @@ def put(content: bytes):
     ("joints.csv", replaced(",tracked,", ",lost,"), "run: joints.csv and angles.csv: poses: found values in frame 0"),
     ("angles.csv", replaced("0.066667", "0.07"), "angles.csv: column 'time': found other times than in joints.csv"),
     ("angles.csv", replaced("torso_y_sd", "torso_z_sd"), "angles.csv: no column 'torso_y_sd'"),
+    ("angles.csv", without_last_line, "angles.csv: column 'time': found other times than in joints.csv"),
+    ("joints.csv", without_last_line, "angles.csv: column 'time': found other times than in joints.csv"),
     ("angles.csv", Path.unlink, r"angles.csv: cannot be read \(no such file"),
 ])
 def test_what_is_malformed_is_said(tmp_path, name, change, said):

@@ -43,9 +43,9 @@ def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
     path = Path(path)
     if unit not in METRES:
         raise ShadowPuppetError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
-    bad = [name for name in table.names if not name.isprintable()]
+    bad = [name for name in table.names if "\t" in name or name.splitlines() != [name]]
     if bad:
-        raise ShadowPuppetError(f"{path}: marker name: found {bad[0]!r}, expected printable words")
+        raise ShadowPuppetError(f"{path}: marker name: found {bad[0]!r}, expected one without tabs and line ends")
     count, rate = len(table.times), _rate(table)
     values = (rate, rate, count, len(table.names), unit, rate, 1, count)
     axes = [f"{axis}{n}" for n in range(1, len(table.names) + 1) for axis in "XYZ"]
