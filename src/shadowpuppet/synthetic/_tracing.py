@@ -18,8 +18,10 @@ PLACED = 22
 FAR = 1e9
 STEP = 0.85
 """Share of the distance bound that a step takes: lofts' distances are first-order estimates."""
-HIT = 2.5e-4
-"""A ray that comes this close to the surface (m) hits it."""
+HIT, EDGE_HIT = 2.5e-4, 1e-3
+"""A ray that comes this close to the surface (m) hits it: rays of pixel centres, and the others at edges."""
+MELT = 0.06
+"""Width of the smooth union of limb and trunk at the joint, metres."""
 TILE = 8
 """Pixels along the side of the tiles that list the parts in reach of their rays."""
 FAST = {"reassoc", "contract", "nsz", "arcp"}
@@ -68,7 +70,7 @@ def _join(total, limb, x, y, z, group, joints):
     if total >= FAR:
         return limb
     dx, dy, dz = x - joints[group, 0], y - joints[group, 1], z - joints[group, 2]
-    k = 0.06 * (1.0 - np.sqrt(dx * dx + dy * dy + dz * dz) / joints[group, 3])
+    k = MELT * (1.0 - np.sqrt(dx * dx + dy * dy + dz * dz) / joints[group, 3])
     return blend(total, limb, k) if k > 1e-4 else min(total, limb)
 
 
@@ -85,7 +87,7 @@ def distance(x, y, z, parts, placed, table, code, joints):
             group, limb = code[p, 0], FAR
         k = placed[p, 19]
         dx, dy, dz = x - placed[p, 12], y - placed[p, 13], z - placed[p, 14]
-        far = limb + placed[p, 15] + k
+        far = min(limb + k, total + MELT) + placed[p, 15]  # beyond it the part changes nothing
         if dx * dx + dy * dy + dz * dz > far * far:
             continue
         d = part_distance(x, y, z, p, placed, table)
@@ -123,14 +125,14 @@ def list_parts(direction, sine, cosine, eye, spheres, lists, span):
 
 
 @kernel
-def march(eye, rx, ry, rz, start, stop, parts, placed, table, code, joints):
+def march(eye, rx, ry, rz, start, stop, hit, parts, placed, table, code, joints):
     """Where along a unit ray (m) the surface is met, FAR where it is missed, and the part met."""
     t = start
     for _ in range(96):
         d, near = distance(eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz, parts, placed, table, code, joints)
-        if d < HIT:
+        if d < hit:
             return t, near
-        t += STEP * d
+        t += max(STEP * d, 2.0 * hit)
         if t > stop:
             break
     return FAR, -1
@@ -183,19 +185,8 @@ def find_surface(eye, rays, tiles, lists, span, placed, table, code, joints, dep
             tile = (v // TILE) * tiles + u // TILE
             depth[v, u], near[v, u] = FAR, -1
             if lists[tile, 0] > 0:
-                depth[v, u], near[v, u] = march(
-                    eye,
-                    rays[v, u, 0],
-                    rays[v, u, 1],
-                    rays[v, u, 2],
-                    span[tile, 0],
-                    span[tile, 1],
-                    lists[tile],
-                    placed,
-                    table,
-                    code,
-                    joints,
-                )
+                rx, ry, rz, start, stop = rays[v, u, 0], rays[v, u, 1], rays[v, u, 2], span[tile, 0], span[tile, 1]
+                depth[v, u], near[v, u] = march(eye, rx, ry, rz, start, stop, HIT, lists[tile], placed, table, code, joints)
 
 
 @kernel
@@ -211,33 +202,34 @@ def _edge(v, u, depth, near, code):
 
 
 @kernel
-def _nearest(v, u, depth):
-    """The least depth of a pixel and its eight neighbours."""
-    nearest = FAR
+def _range(v, u, depth):
+    """The least and greatest depth met at a pixel and its eight neighbours."""
+    least, greatest = FAR, 0.0
     for vv in range(max(v - 1, 0), min(v + 2, depth.shape[0])):
         for uu in range(max(u - 1, 0), min(u + 2, depth.shape[1])):
-            nearest = min(nearest, depth[vv, uu])
-    return nearest
+            if depth[vv, uu] < FAR:
+                least, greatest = min(least, depth[vv, uu]), max(greatest, depth[vv, uu])
+    return least, greatest
 
 
 @kernel
 def colour_surface(
     eye, rays, tiles, lists, span, placed, table, code, joints, depth, near, colours, lights, stripes, offsets, picture, alpha
 ):
-    """Fill picture (H, W, 3), premultiplied by alpha (H, W), of the surface; edges are traced at `offsets` (K, 2), pixels."""
+    """Add to picture (H, W, 3), premultiplied by alpha (H, W), the surface; edges are traced at `offsets` (K, 2), pixels."""
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
             tile = (v // TILE) * tiles + u // TILE
-            alpha[v, u] = 0.0
-            picture[v, u] = 0.0
-            edge = lists[tile, 0] > 0 and _edge(v, u, depth, near, code)
+            if lists[tile, 0] == 0:
+                continue
+            edge = _edge(v, u, depth, near, code)
             if not edge and near[v, u] < 0:
                 continue
             count = offsets.shape[0] if edge else 1
-            start, group, material, light = span[tile, 0], -1, 0, 0.0
-            if edge:
-                start = max(start, _nearest(v, u, depth) - 0.1)
+            group, material, light = -1, 0, 0.0
+            least, greatest = _range(v, u, depth)
+            start, stop = max(span[tile, 0], least - 0.1), min(span[tile, 1], greatest + 0.1)
             for k in range(count):
                 rx, ry, rz, t, p = rays[v, u, 0], rays[v, u, 1], rays[v, u, 2], depth[v, u], near[v, u]
                 if edge:
@@ -246,7 +238,7 @@ def colour_surface(
                     rx += du * (rays[v, u1, 0] - rays[v, u0, 0]) + dv * (rays[v1, u, 0] - rays[v0, u, 0])
                     ry += du * (rays[v, u1, 1] - rays[v, u0, 1]) + dv * (rays[v1, u, 1] - rays[v0, u, 1])
                     rz += du * (rays[v, u1, 2] - rays[v, u0, 2]) + dv * (rays[v1, u, 2] - rays[v0, u, 2])
-                    t, p = march(eye, rx, ry, rz, start, span[tile, 1], lists[tile], placed, table, code, joints)
+                    t, p = march(eye, rx, ry, rz, start, stop, EDGE_HIT, lists[tile], placed, table, code, joints)
                 if p < 0:
                     continue
                 if code[p, 0] != group:

@@ -66,7 +66,7 @@ class Renderer:
         traced = eye, self.rays, self.across, lists, span, placed, self.table, s.code, self._joins(figure, index)
         depth, near = np.empty((height, width)), np.empty((height, width), np.int64)
         _tracing.find_surface(*traced, depth, near)
-        alpha, picture = np.empty((height, width)), np.empty((height, width, 3))
+        alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
         _tracing.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
         return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha)
 
