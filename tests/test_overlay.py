@@ -21,7 +21,7 @@ SIZES = CardboxSizes(*(1.8 * share for share in (
 CAMERA = Camera("cam", (160, 120), [[138, 0, 79.5], [0, 138, 59.5], [0, 0, 1]], T_camera_world=rigid(np.eye(3), [0.1, 0.2, 0.3]))
 AXES = [[0, 1, 0], [0, 0, -1], [-1, 0, 0]]
 """X toward the camera, Y to the image's right, Z up."""
-LABEL = 16
+LABEL = 20
 """Rows that a label may take."""
 
 

@@ -225,9 +225,11 @@ def _write(out: Image, text: str, top: int, colour: tuple[int, int, int], left: 
     import cv2
 
     scale = max(0.35, out.shape[0] / 3 / 600)
-    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
+    thickness, rim = max(1, round(1.5 * scale)), max(1, round(scale))
+    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
     x, y = left + round(12 * scale), top + height + round(12 * scale)
     # The rim is the same text moved, for OpenCV 5 draws thicker text wider.
     for dx, dy, ink in ((-1, -1, BLACK), (1, -1, BLACK), (-1, 1, BLACK), (1, 1, BLACK), (0, 0, colour)):
-        cv2.putText(out, text, (x + dx, y + dy), cv2.FONT_HERSHEY_SIMPLEX, scale, ink, 1, cv2.LINE_AA)
+        place = (x + rim * dx, y + rim * dy)
+        cv2.putText(out, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, thickness, cv2.LINE_AA)
     return x + width + round(10 * scale)

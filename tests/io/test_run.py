@@ -235,6 +235,20 @@ def test_a_new_folder_goes_where_nothing_was_tracked(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_what_others_put_beside_a_run_that_had_no_frame_stays_and_is_in_nobody_s_way(tmp_path):
+    def work() -> None:
+        with writer(tmp_path / "run"):
+            (tmp_path / "run" / "person.toml").touch()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["person.toml", "run.toml"]
+    with pytest.raises(FormatError, match="run: the run ended before its first frame"):
+        read_run(tmp_path / "run")
+    assert len(read_run(write(tmp_path / "run")).motion) == 5
+
+
 def test_a_place_that_cannot_be_written_is_said(tmp_path):
     (tmp_path / "file").touch()
     said = r"the run cannot be written \((file exists|not a directory)\)"

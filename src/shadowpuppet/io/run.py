@@ -79,15 +79,18 @@ class RunWriter:
         self.info = for_toml(plain(info, "info")) | {"body": body_name, "versions": versions()}
         self._motion = MotionBuilder(body_name, dof_names, joint_names)
         self._tables: list[TextIO] = []
+        self._earlier = False
 
     def __enter__(self) -> Self:
         """Make the folder, or refuse it."""
         with self._told():
             self.folder.mkdir(parents=True, exist_ok=True)
-            _check_folder(self.folder)
+            self._earlier = _check_folder(self.folder)
             probe = self.folder / "run.toml.part"  # a folder that cannot be written is better known before hours of work
             probe.touch()
             probe.unlink()
+        if not self._earlier:
+            self._write_info(complete=False)  # what others add before the first frame then lies in a run's folder
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -96,11 +99,17 @@ class RunWriter:
             self._start()
             self._finish(complete=True)
         elif not self._tables:
-            with contextlib.suppress(OSError):
-                self.folder.rmdir()  # only where it is empty
+            self._leave()
         else:
             with contextlib.suppress(ShadowPuppetError):
                 self._finish(complete=False)
+
+    def _leave(self) -> None:
+        """Leave no folder of a run that had no frame, but what others put into it."""
+        with contextlib.suppress(OSError):
+            if not self._earlier and [path.name for path in self.folder.iterdir()] == ["run.toml"]:
+                (self.folder / "run.toml").unlink()
+                self.folder.rmdir()
 
     def write(self, frame: MotionFrame) -> None:
         """Add a frame. Raises `ShadowPuppetError` where it does not fit the run or the disk."""
@@ -186,15 +195,16 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _check_folder(folder: Path) -> None:
-    """Raise `ShadowPuppetError` where a folder has files, but not a run's."""
+def _check_folder(folder: Path) -> bool:
+    """Whether there is an earlier run in a folder. Raises `ShadowPuppetError` where there are files, but not a run's."""
     names = sorted(path.name for path in folder.iterdir())
     if not names:
-        return
+        return False
     info = folder / "run.toml"
     if not info.exists() or not {"complete", "versions"} <= set(read_toml(info, FormatError)):
         raise ShadowPuppetError(f"{folder}: found {shorten(names, 60)} in it but no run.toml of a run, expected a new or empty "
                                 "folder, or that of an earlier run, which is replaced")
+    return True
 
 
 def _npz(motion: Motion) -> bytes:
@@ -219,6 +229,8 @@ def _read_npz(path: Path) -> Motion:
 
 
 def _read_tables(folder: Path, body_name: str, cut: bool) -> Motion:
+    if cut and not (folder / "joints.csv").exists():
+        raise FormatError(f"{folder}: the run ended before its first frame, so that there is nothing to read")
     joints, angles = (read_table(folder / name, cut) for name in FILES[:2])
     frames, names = _common_frames(joints, angles, cut), joint_names(joints)
     dofs = tuple(name for name in angles.columns if name != "time" and not name.endswith("_sd"))
