@@ -152,7 +152,7 @@ def mask_quality(masks: Iterable[Mask]) -> MaskQuality:
         last = [*last[-2:], mask]
         if len(last) == 3:
             before, now, after = last
-            blinks.append(int(np.count_nonzero((before == after) & (now != before))))
+            blinks.append(int(np.count_nonzero((now ^ before) & (now ^ after))))
     return _summary(looks, blinks, last[0].size if last else 0)
 
 
@@ -168,11 +168,12 @@ def _check(mask: Mask, shape: tuple[int, ...] | None, n: int) -> None:
 def _look(mask: Mask) -> _Look:
     import cv2
 
-    pixels = mask.astype(np.uint8)
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    # A margin joins all of the outside, so that what else is not silhouette is a hole.
+    pixels = np.pad(mask[y : y + height, x : x + width].view(np.uint8), 1)
     _, _, parts, _ = cv2.connectedComponentsWithStats(pixels, connectivity=8)
     areas = np.sort(parts[1:, cv2.CC_STAT_AREA])[::-1]
-    # A margin joins all of the outside, so that what else is not silhouette is a hole.
-    _, _, gaps, _ = cv2.connectedComponentsWithStats(1 - np.pad(pixels, 1), connectivity=4)
+    _, _, gaps, _ = cv2.connectedComponentsWithStats(1 - pixels, connectivity=4)
     holes = gaps[2:, cv2.CC_STAT_AREA]
     largest = max(int(areas[0]) if len(areas) else 0, 1)
     sides = (mask[:, 0], mask[:, -1], mask[0], mask[-1])

@@ -7,42 +7,58 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.silhouette.outlines import REACH, Contrast, Mask, Outline, at_half_contrast
+from shadowpuppet.silhouette.outlines import REACH, Contrast, Mask, Outline, at_half_contrast, disc
 
 Window = tuple[slice, slice]
 """Rows and columns."""
+LIMB = 0.02
+"""Least share of the largest part's pixels that another part has which belongs to it: a hand..."""
+GAP = 0.06
+"""... and how near it must be, over the root of the largest part's area (half a neck)."""
 SMALL_HOLE = 0.004
 """Holes of up to this share of the person's area are filled."""
 
 
 def clean(label: Mask, contrast: Callable[[Window], Contrast], outline: Outline) -> Mask:
     """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely); empty where nobody is."""
-    mask = largest_part(label)
+    mask = coarse_person(label)
     out = np.zeros_like(mask)
     if mask.any():
         window = window_around(mask, outline.width + REACH + 1)
         inside = at_half_contrast(np.ascontiguousarray(mask[window]), contrast(window), outline)
-        out[window] = without_holes(most(inside, inside > 0))
+        out[window] = without_holes(person(inside, inside > 0))
     return out
 
 
-def largest_part(label: Mask) -> Mask:
-    """Pixels labelled 1 or 2, without specks, that hang together with the most pixels labelled 2."""
+def coarse_person(label: Mask) -> Mask:
+    """Pixels labelled 1 or 2, without specks, that hang together with the most that are labelled 2."""
     import cv2
 
     likely = cv2.medianBlur((label > 0).astype(np.uint8), 3)
     likely = np.asarray(cv2.morphologyEx(likely, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8)
-    return most(likely, (label == 2) & (likely > 0))
+    return person(likely, (label == 2) & (likely > 0))
 
 
-def most(mask: Mask, sure: NDArray[np.bool_]) -> Mask:
-    """The connected part of a mask with the most `sure` pixels; empty where there is none."""
+def person(mask: Mask, sure: NDArray[np.bool_]) -> Mask:
+    """The connected part with the most `sure` pixels, and parts that nearly touch it, as a head does where the neck is lost.
+
+    Empty where no pixel is sure.
+    """
     import cv2
 
-    n, parts = cv2.connectedComponents(mask, connectivity=8)
-    counts = np.bincount(parts[sure], minlength=n)
+    _, labels = cv2.connectedComponents(mask, connectivity=8)
+    parts = np.asarray(labels, np.intp)
+    counts = np.bincount(parts[sure])
+    if counts[1:].sum() == 0:
+        return np.zeros_like(mask)
     counts[0] = 0
-    return (parts == counts.argmax()).astype(np.uint8) if counts.any() else np.zeros_like(mask)
+    kept = (parts == counts.argmax()).astype(np.uint8)
+    others = np.flatnonzero((counts >= LIMB * counts.max()) & (counts < counts.max()))
+    if len(others):
+        near = cv2.dilate(kept, disc(max(1, round(GAP * counts.max() ** 0.5))))
+        touching = np.intersect1d(others, parts[near > 0])
+        kept |= np.isin(parts, touching)
+    return kept
 
 
 def window_around(mask: Mask, margin: int) -> Window:

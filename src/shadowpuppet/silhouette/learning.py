@@ -10,9 +10,9 @@ import numpy as np
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
 from shadowpuppet.silhouette.background import Background, Image
-from shadowpuppet.silhouette.cleanup import largest_part
+from shadowpuppet.silhouette.cleanup import coarse_person
 from shadowpuppet.silhouette.keys import Choice, choose_key
-from shadowpuppet.silhouette.outlines import SHARP, Outline, outline_width
+from shadowpuppet.silhouette.outlines import SHARP, Outline, disc, outline_width
 from shadowpuppet.silhouette.rules import SAMPLES, KeyRule, MixtureRule, NeighbourRule, PlainRule
 from shadowpuppet.silhouette.segmenter import Segmenter, plain_rule
 from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -80,7 +80,7 @@ def _key_rule(background: Background, frames: list[Image], settings: SilhouetteS
     floor = settings.noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR])
     if frames:
         floor = np.maximum(floor, LONG_TAIL * scene.film_noise(frames, mean))
-    across = cv2.dilate(mean, np.ones((3, 3))) - cv2.erode(mean, np.ones((3, 3)))
+    across = cv2.dilate(mean, disc(1)) - cv2.erode(mean, disc(1))
     sigma = np.hypot(np.maximum(background.smooth_sigma, np.maximum(floor, 1e-3)), EDGES * across)
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
@@ -107,5 +107,5 @@ def _coloured(background: Background, frames: list[Image]) -> bool:
 
 
 def _outline_width(segmenter: Segmenter, frames: list[Image]) -> int:
-    people = ((largest_part(segmenter.rule(frame)), segmenter.contrast(frame)) for frame in frames)
+    people = ((coarse_person(segmenter.rule(frame)), segmenter.contrast(frame)) for frame in frames)
     return outline_width((mask, contrast) for mask, contrast in people if mask.any())

@@ -61,20 +61,21 @@ class PlainRule:
 
     lowest: Image
     highest: Image
-    """Both of shape (H, W); where `lowest` exceeds `highest`, every value is foreground."""
+    """Both of shape (H, W); `lowest` exceeds `highest` where every value is foreground."""
 
     @classmethod
     def of(cls, mean: NDArray[np.float64], sigma: NDArray[np.float64], factor: float) -> PlainRule:
         """The rule for a mean and a standard deviation of brightness (H, W)."""
         reach = factor * sigma
-        values = np.floor(mean - reach) + np.arange(3)[:, None, None]
-        # The rule itself decides between neighbours, so that rounding cannot make the range differ from it.
-        lowest = values[0] + np.count_nonzero(np.abs(mean - values) >= reach, axis=0)
-        values = np.ceil(mean + reach) - np.arange(3)[:, None, None]
-        highest = values[0] - np.count_nonzero(np.abs(mean - values) >= reach, axis=0)
-        empty = lowest > highest
-        lowest, highest = np.where(empty, 1, np.clip(lowest, 0, 255)), np.where(empty, 0, np.clip(highest, 0, 255))
-        return cls(lowest.astype(np.uint8), highest.astype(np.uint8))
+        steps = np.arange(3)[:, None, None]
+
+        def beyond(values: np.ndarray) -> np.ndarray:
+            # The rule itself decides between neighbours, so that rounding cannot make the range differ from it.
+            return np.cumprod(np.abs(mean - values) >= reach, axis=0).sum(axis=0)
+
+        lowest, highest = np.floor(mean - reach), np.ceil(mean + reach)
+        lowest, highest = lowest + beyond(lowest + steps), highest - beyond(highest - steps)
+        return cls(np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8))
 
     def __call__(self, image: Image) -> Mask:
         """Labels (H, W), 0 or 2, of a picture (H, W, 3) or (H, W)."""
