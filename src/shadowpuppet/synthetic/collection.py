@@ -11,7 +11,7 @@ from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, Viewpoint
 def demo_spec() -> Spec:
     """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
     gestures = _gestures("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
-    return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=11, room=5))
+    return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=7, room=2))
 
 
 PAPER = "wave_hands 3.6, bend_aside 3.6, bow_forward 2.8"

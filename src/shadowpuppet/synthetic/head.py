@@ -82,7 +82,7 @@ def _hair(skull: Array, size: tuple[float, float, float], joint: Array, thick: f
     cap = ball(
         "head",
         joint,
-        skull + np.array([0, 0.12 * deep, 0.05 * high]),
+        skull + np.array([0, 0.13 * deep + 0.9 * thick, 0.05 * high]),
         (wide + 0.7 * thick, 0.94 * deep + thick, 0.42 * high + 0.6 * thick),
         blend=0.006,
         **hair,

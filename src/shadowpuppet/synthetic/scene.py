@@ -122,7 +122,7 @@ class Room:
             along = end - start
             t = np.clip(((self._seen - start)[..., :2] @ along[:2]) / max(along[:2] @ along[:2], 1e-9), 0, 1)
             off = self._seen - start - t[..., None] * along
-            soft = 0.02 + 0.10 * np.abs(off[..., 2])
+            soft = 0.03 + 0.15 * np.abs(off[..., 2])
             gap = (np.hypot(off[..., 0], off[..., 1]) - radius) / soft
             clear *= 1 - np.clip(0.5 - 0.5 * gap, 0, 1) ** 2 * (3 - 2 * np.clip(0.5 - 0.5 * gap, 0, 1)) * (off[..., 2] < 0)
         return 1 - clear
@@ -151,7 +151,7 @@ def exposed(picture: Array, noise: float, rng: np.random.Generator) -> np.ndarra
     """
     import cv2
 
-    blurred = cv2.GaussianBlur(picture, (0, 0), 0.45)
+    blurred = cv2.GaussianBlur(picture, (0, 0), 0.4)
     level = 255 * np.clip(blurred, 0, 1)
     if noise > 0:
         level = level + noise * (0.5 + 0.5 * np.sqrt(level / 128)) * rng.standard_normal(level.shape, np.float32)

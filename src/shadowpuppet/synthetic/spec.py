@@ -75,7 +75,7 @@ class Scene:
     """Seed of clothes, hair and skin."""
     room: Annotated[int, Field(ge=0)] = 1
     """Seed of wall, floor and lamps."""
-    shadow: Annotated[float, Field(ge=0, le=1)] = 0.35
+    shadow: Annotated[float, Field(ge=0, le=1)] = 0.2
     """How dark the person's shadow is on floor and wall."""
     noise: Annotated[float, Field(ge=0, le=40)] = 2.5
     """Sensor noise: standard deviation in grey levels at middle grey."""
