@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -85,6 +86,23 @@ def test_a_full_disk_is_said(tmp_path, name, lossless):
     assert not (tmp_path / name).exists()
 
 
+def test_after_a_failure_nothing_more_is_written(tmp_path):
+    film = write_frames(tmp_path / "a.mkv", 10, lossless=True)
+    film.write(noise(1)[0])
+    container = film._container
+    calls = []
+
+    def mux(packets):
+        calls.append(packets)
+        raise OSError(28, "No space left on device")
+
+    film._container = SimpleNamespace(mux=mux, close=container.close)
+    with pytest.raises(VideoError, match=r"what was written so far is in a.part.mkv"), film:
+        film.write(noise(1)[0])
+    assert len(calls) == 1
+    assert len(list(open_frames(film.partial))) == 1
+
+
 def test_the_first_picture_says_whether_a_film_is_grey(tmp_path):
     grey = [image[..., 0] for image in noise(3)]
     for name, lossless in KINDS:
@@ -134,8 +152,9 @@ def test_what_cannot_be_written_is_said(tmp_path, name, rate, lossless, said):
 
 def test_bad_pictures_and_bad_places_are_said(tmp_path):
     image = noise(1)[0]
+    film = write_frames(tmp_path / "nowhere" / "a.mp4", 10)
     with pytest.raises(VideoError, match="no such file or directory"):
-        write(tmp_path / "nowhere" / "a.mp4", [image])
+        film.write(image)  # not many pictures later, when the encoder gives its first
     with pytest.raises(VideoError, match="no frame was given"):
         write(tmp_path / "a.mp4", [])
     with pytest.raises(VideoError, match=r"picture 1 has the shape \(48, 64\), those before it \(48, 64, 3\)"):

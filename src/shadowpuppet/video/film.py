@@ -48,33 +48,38 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
         false = abs(stream.frames - duration * mean_rate) > 1 + 0.01 * stream.frames  # of an .mp4 whose writer was interrupted
         count = None if false else stream.frames or None
 
+    step = 1 / (mean_rate if math.isfinite(mean_rate) else rate or ASSUMED_RATE)
+
     def read() -> Iterator[Frame]:
-        return _frames(path, film, grey, rate)
+        return _frames(path, film, step, grey, rate)
 
     film = FrameSource(str(path), size, rate or mean_rate, count, duration, read)
     return film
 
 
-def _frames(path: Path, film: FrameSource, grey: bool, rate: float | None) -> Iterator[Frame]:
-    step = 1 / (film.rate if math.isfinite(film.rate) else ASSUMED_RATE)
-    clock, convert, n, broken = _Clock(path, step), _converter(grey), 0, ""
-    time = previous = longest = 0.0
+def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None) -> Iterator[Frame]:
+    clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), _converter(grey), 0, 0.0, ""
     with _opened(path) as (container, stream):
         try:
             for frame in _decoded(container, stream):
-                time, image = n / rate if rate else clock(frame), convert(frame)
-                check_size(path, n, time, image, film.size)
-                yield Frame(time, image)
-                longest, previous, n = max(longest, time - previous), time, n + 1
+                before, time, image = clock.last, clock(frame), convert(frame)
+                shown = n / rate if rate else time
+                check_size(path, n, shown, image, film.size)
+                if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
+                    _say(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
+                yield Frame(shown, image)
+                longest, n = max(longest, time - before), n + 1
         except _Break as cause:
             broken = str(cause)
-    missing = film.duration - time > 1.5 * max(longest, step)  # False where the duration is not a number
-    if not broken and missing and not rate and n != film.count:
+    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # not where there is no duration
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
         of = f" of {film.count}" if film.count else ""
-        warnings.warn(f"{path}: broken off at frame {n}{of} ({time + step:.3f} s): {broken}; the {n} frames before it are given",
-                      ShadowPuppetWarning, stacklevel=2)
+        _say(f"{path}: broken off at frame {n}{of} ({clock.last + step:.3f} s): {broken}; the {n} frames before it are given")
+
+
+def _say(warning: str) -> None:
+    warnings.warn(warning, ShadowPuppetWarning, stacklevel=3)
 
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
@@ -119,28 +124,46 @@ def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFr
     """Frames in order of presentation; raises `_Break` after the last whole one where the film is damaged."""
     import av.error
 
-    packets, broken = container.demux(stream), ""
+    packets, broken, last = container.demux(stream), "", None
     while not broken:
         try:
             if (packet := next(packets, None)) is None:
                 return
-            frames = packet.decode()
+            if packet.is_corrupt and last:  # a part of one, at the end of what is left of a file
+                frames, broken = _held(stream, last), "a cut picture"
+            else:
+                frames = packet.decode()
         except (OSError, av.error.FFmpegError) as error:
-            frames, broken = [], reason(error)
-            with contextlib.suppress(av.error.FFmpegError):
-                frames = stream.codec_context.decode(None)  # decoder threads still hold frames from before the break
+            frames, broken = _held(stream, last), reason(error)
         for frame in frames:
             if frame.is_corrupt:
                 raise _Break("a damaged picture")
             yield frame
+            last = frame
     raise _Break(broken)
+
+
+def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:
+    """Frames that the decoder still holds at a break, as far as they follow on the `last` one; its threads may be beyond it."""
+    import av.error
+
+    frames: list[VideoFrame] = []
+    with contextlib.suppress(av.error.FFmpegError):
+        for frame in stream.codec_context.decode(None):
+            step = frame.pts - last.pts if last and frame.pts is not None and last.pts is not None else 0
+            if last and 0 < 1.5 * last.duration < step:
+                break
+            frame.time_base = stream.time_base  # which only packets know
+            frames.append(frame)
+            last = frame
+    return frames
 
 
 class _Clock:
     """Seconds after the first frame, increasing: the container's where they can be used, else filled in, with a warning."""
 
-    def __init__(self, path: Path, step: float) -> None:
-        self.path, self.step, self.told = path, step, False
+    def __init__(self, path: Path, step: float, quiet: bool = False) -> None:
+        self.path, self.step, self.told = path, step, quiet
         self.zero, self.last, self.shift = None, -step, 0.0
         self.last_dts, self.bad_pts, self.bad_dts = -math.inf, 0, 0
 
@@ -174,7 +197,7 @@ class _Clock:
 
     def _tell(self, time: float, what: str) -> None:
         if not self.told:
-            warnings.warn(f"{self.path}: the frame at {time:.3f} s {what}", ShadowPuppetWarning, stacklevel=4)
+            _say(f"{self.path}: the frame at {time:.3f} s {what}")
         self.told = True
 
 

@@ -100,9 +100,9 @@ class FrameWriter:
     def _open(self, image: Image) -> None:
         import av
 
-        # What is written so far can be read at any time, even after a kill: short fragments or clusters, flushed.
-        options = {"cluster_time_limit": "1000"} if self.path.suffix == ".mkv" else {"movflags": "hybrid_fragmented"}
-        self._container = container = av.open(f"file:{self.partial}", "w", options={**options, "flush_packets": "1"})
+        # What is written so far can be read at any time, even after a kill: flushed, and .mp4 and .mov in fragments.
+        options = {"flush_packets": "1"} | ({} if self.path.suffix == ".mkv" else {"movflags": "hybrid_fragmented"})
+        self._container = container = av.open(f"file:{self.partial}", "w", options=options)
         if self.lossless:
             codec, settings = "ffv1", {"level": "3", "slicecrc": "1", "g": "1"}
         else:
