@@ -101,7 +101,8 @@ class MaskQuality:
                    "camera with more pixels")
 
     def _unsteady(self) -> Iterator[str]:
-        remedy = "the person hardly differs from the background; try another method, more light, or other clothes"
+        remedy = ("the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
+                  "of the empty scene, more light, or other clothes")
         if self.area_jumps > MANY_JUMPS:
             yield (f"the area of the silhouette changes by over {_percent(JUMP)} at once in {_percent(self.area_jumps)} of the "
                    f"frames, as parts are lost and found: {remedy}")
