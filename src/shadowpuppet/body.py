@@ -1,15 +1,15 @@
-"""Bodies: flat shapes on a skeleton, made from named sizes.
+"""Bodies: shapes on a skeleton, made from named sizes.
 
 `cardbox` is Liu 2011's model (III-A): two or three crossed rectangles a part. `boxes` is the volumetric model that the paper compares
-it with (Fig. 1): a closed box a part, on the same skeleton, with the same sizes. Both are quads fixed to joints, so that one
-rasterizer draws either.
+it with (Fig. 1): a closed box a part. `rounded` is ours: smooth hulls of ellipsoids, whose outline does not change as a limb rolls.
+All three stand on the same skeleton and are made from the same sizes; each shape's picture is one convex polygon.
 
 The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the left of a person who faces the camera), Z up.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
 SIDES = ("left", "right")
 
@@ -94,39 +94,70 @@ SUBSETS = {"O1": CardboxSizes.names()[:8], "O2": CardboxSizes.names()[8:12], "O3
 
 
 @dataclass(frozen=True, eq=False)
+class Quads:
+    """Flat convex quads, each fixed to a joint."""
+
+    joints: NDArray[np.int64]
+    """Joint of each, of shape (S, 1)."""
+    corners: Array
+    """In the joint's frame, of shape (S, 4, 3), metres."""
+
+    @property
+    def arrays(self) -> tuple[Array, ...]:
+        """What depends on a person's sizes, and linearly so."""
+        return (self.corners,)
+
+
+@dataclass(frozen=True, eq=False)
+class Hulls:
+    """Convex hulls of a few ellipsoids each, every ellipsoid fixed to a joint."""
+
+    joints: NDArray[np.int64]
+    """Joint of each ellipsoid, of shape (S, E)."""
+    centres: Array
+    """In the joint's frame, of shape (S, E, 3), metres."""
+    radii: Array
+    """Along the axes of the joint's frame, of shape (S, E, 3), metres."""
+
+    @property
+    def arrays(self) -> tuple[Array, ...]:
+        """What depends on a person's sizes, and linearly so."""
+        return self.centres, self.radii
+
+
+@dataclass(frozen=True, eq=False)
 class Body:
-    """Quads fixed to the joints of a skeleton, and named points on it."""
+    """Shapes fixed to the joints of a skeleton, and named points on it."""
 
     name: str
     skeleton: Skeleton
-    quads: Array
-    """Corners in their joint's frame, of shape (Q, 4, 3), metres; each quad is flat and convex."""
-    quad_joints: NDArray[np.int64]
-    """Joint that each quad is fixed to, of shape (Q,)."""
-    quad_parts: tuple[str, ...]
-    """Body part that each quad belongs to, Q names."""
+    shapes: Quads | Hulls
+    """S shapes."""
+    parts: tuple[str, ...]
+    """Body part that each shape belongs to, S names."""
     landmarks: Mapping[str, tuple[str, tuple[float, float, float]]]
     """Points that a motion reports: name to joint and place in its frame, metres."""
+    hem: Array
+    """The two ends of the waist's lower edge in the pelvis' frame, of shape (2, 3), metres: the model ends here."""
 
     @cached_property
     def landmark_names(self) -> tuple[str, ...]:
         """Names of the landmarks, L of them."""
         return tuple(self.landmarks)
 
-    def quads_of(self, *parts: str) -> NDArray[np.int64]:
-        """Indices of the quads of some parts. Raises `ShadowPuppetError` for a part that the body lacks."""
-        unknown = set(parts) - set(self.quad_parts)
+    def shapes_of(self, *parts: str) -> NDArray[np.int64]:
+        """Indices of the shapes of some parts. Raises `ShadowPuppetError` for a part that the body lacks."""
+        unknown = set(parts) - set(self.parts)
         if unknown:
-            raise ShadowPuppetError(f"body {self.name!r}: unknown part {choices(unknown)}; there are: {choices(set(self.quad_parts))}")
-        return np.array([i for i, part in enumerate(self.quad_parts) if part in parts], np.int64)
+            raise ShadowPuppetError(f"body {self.name!r}: unknown part {choices(unknown)}; there are: {choices(set(self.parts))}")
+        return np.array([i for i, part in enumerate(self.parts) if part in parts], np.int64)
 
-    def points(self, poses: ArrayLike, root: ArrayLike | None = None) -> Array:
-        """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to."""
-        transforms = self.skeleton.forward(poses, root)
-        joints = [self.skeleton.joint_index(joint) for joint, _ in self.landmarks.values()]
-        local = np.array([place for _, place in self.landmarks.values()], float)
-        T = transforms[:, joints]
-        return np.einsum("nlij,lj->nli", T[..., :3], local) + T[..., 3]
+    def points(self, poses: ArrayLike, root: ArrayLike | None = None, names: Iterable[str] | None = None) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to; all, or those named."""
+        chosen = [self.landmarks[name] for name in (self.landmark_names if names is None else names)]
+        T = self.skeleton.forward(poses, root)[:, [self.skeleton.joint_index(joint) for joint, _ in chosen]]
+        local = np.array([place for _, place in chosen], float)
+        return (T[..., :3] @ local[:, :, None])[..., 0] + T[..., 3]
 
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
@@ -142,31 +173,41 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
     joints = [Joint(shoulder, "torso", (0.0, y, z)), Joint(elbow, shoulder, (0.0, 0.0, -sizes.upper_arm_length))]
     dofs = [
-        Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190])),
-        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100])),
-        Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95])),
-        Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150])),
+        Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190]), rest=0.8, spread=(2.0, 2.0)),
+        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100]), rest=0.2, spread=(0.2, 0.7)),
+        Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95]), spread=(1.0, 1.0)),
+        Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150]), spread=(1.2, 1.2)),
     ]
     return joints, dofs
 
 
-def upper_body_skeleton(sizes: CardboxSizes) -> Skeleton:
+RISE = 0.012
+"""How far a shoulder rises, or comes forward, as the arm does, metres a radian: about 2 cm in a level arm, by the clavicle's elevation of
+some 8 degrees (Ludewig et al. 2009)."""
+
+
+def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleton:
     """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm.
 
-    The pelvis shifts along Y and twists; the torso stands on it and turns about the middle of its lower edge.
+    The pelvis shifts along Y and twists; the torso stands on it and turns about the middle of its lower edge. With `clavicles`, the
+    shoulders follow the arms a little, as in people but not in the paper.
     """
     joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
-        Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90])),
-        Dof("torso_bow", "torso", "y", *np.radians([-10, 90])),
-        Dof("torso_bend", "torso", "x", *np.radians([-50, 50])),
+        Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90]), spread=(0.25, 0.25)),
+        Dof("torso_bow", "torso", "y", *np.radians([-10, 90]), spread=(0.06, 0.06)),
+        Dof("torso_bend", "torso", "x", *np.radians([-50, 50]), spread=(0.25, 0.25)),
     ]
     for side in SIDES:
         arm_joints, arm_dofs = _arm(side, sizes)
         joints += arm_joints
         dofs += arm_dofs
-    return Skeleton(tuple(joints), tuple(dofs))
+    couplings = [coupling for side in SIDES for coupling in (
+        Coupling(f"{side}_shoulder", f"{side}_shoulder_abduction", (0.0, 0.0, RISE)),
+        Coupling(f"{side}_shoulder", f"{side}_shoulder_forward", (RISE, 0.0, 0.0)),
+    )]
+    return Skeleton(tuple(joints), tuple(dofs), tuple(couplings) if clavicles else ())
 
 
 FOREARM, TO_TIP, HAND_POINT = 0.1535, 0.254, 0.019
@@ -240,27 +281,69 @@ def _parts(sizes: CardboxSizes) -> list[_Part]:
     return parts
 
 
-def _body(name: str, sizes: CardboxSizes, shapes: Mapping[str, list]) -> Body:
+def _hem(sizes: CardboxSizes) -> Array:
+    return np.array([[0.0, -sizes.waist_width / 2, -sizes.waist_height], [0.0, sizes.waist_width / 2, -sizes.waist_height]])
+
+
+def _of_quads(name: str, sizes: CardboxSizes, shapes: Mapping[str, list]) -> Body:
     skeleton = upper_body_skeleton(sizes)
     joint_of = {part.name: part.joint for part in _parts(sizes)}
     quads = [(part, quad) for part, part_quads in shapes.items() for quad in part_quads]
-    joints = np.array([skeleton.joint_index(joint_of[part]) for part, _ in quads], np.int64)
+    joints = np.array([[skeleton.joint_index(joint_of[part])] for part, _ in quads], np.int64)
     corners = np.array([quad for _, quad in quads], float)
-    return Body(name, skeleton, corners, joints, tuple(part for part, _ in quads), _landmarks(sizes))
+    return Body(name, skeleton, Quads(joints, corners), tuple(part for part, _ in quads), _landmarks(sizes), _hem(sizes))
 
 
 def cardbox(sizes: CardboxSizes) -> Body:
     """Liu 2011's cardbox model: 15 cards (III-A). The torso's third card lies across it at mid-height."""
     shapes = {p.name: [p.front_card(), p.side_card()] + ([p.level_card()] if p.name == "torso" else []) for p in _parts(sizes)}
-    return _body("cardbox", sizes, shapes)
+    return _of_quads("cardbox", sizes, shapes)
 
 
 def boxes(sizes: CardboxSizes) -> Body:
     """The volumetric model of Liu 2011, Fig. 1, for comparison: a closed box of six faces for each of the same seven parts."""
-    return _body("boxes", sizes, {part.name: part.faces() for part in _parts(sizes)})
+    return _of_quads("boxes", sizes, {part.name: part.faces() for part in _parts(sizes)})
 
 
-BODIES = {"cardbox": cardbox, "boxes": boxes}
+def rounded(sizes: CardboxSizes) -> Body:
+    """Hulls of ellipsoids, with a neck, sloping shoulders and hands, for the same 18 sizes. Not in the paper.
+
+    Two crossed cards look 0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so that width tells nearness.
+    """
+    s, skeleton = sizes, upper_body_skeleton(sizes, clavicles=True)
+    chin = s.torso_height + s.neck_gap
+    neck, arm = 0.35 * s.head_width, s.upper_arm_width / 2
+
+    def ellipsoid(joint: str, x: float, y: float, z: float, depth: float, width: float, height: float):
+        return skeleton.joint_index(joint), (x, y, z), (depth, width, height)
+
+    skull = chin + s.head_height
+    parts = {
+        "head": [ellipsoid("torso", 0, 0, skull - s.head_height * 0.35, s.head_depth / 2, s.head_width / 2, s.head_height * 0.35),
+                 ellipsoid("torso", 0, 0, skull - s.head_height * 0.70, s.head_depth * 0.42, s.head_width * 0.40, s.head_height * 0.30)],
+        "neck": [ellipsoid("torso", 0, 0, skull - s.head_height * 0.6, neck, neck, neck), ellipsoid("torso", 0, 0, s.torso_height, neck, neck, neck)],
+        "shoulders": [ellipsoid(f"{side}_shoulder", 0, 0, 0, arm, arm, arm) for side in SIDES]
+        + [ellipsoid("torso", 0, 0, s.torso_height + neck * 0.5, neck, neck, neck)],
+        "torso": [ellipsoid("torso", 0, 0, 0.65 * s.torso_height, s.torso_top_depth / 2, 0.44 * s.shoulder_width, 0.3 * s.torso_height),
+                  ellipsoid("torso", 0, 0, 0.1 * s.torso_height, s.torso_bottom_depth / 2, s.torso_bottom_width / 2, 0.1 * s.torso_height)],
+        "waist": [ellipsoid("pelvis", 0, 0, 0.1 * s.torso_height, s.torso_bottom_depth / 2, s.torso_bottom_width / 2, 0.1 * s.torso_height),
+                  ellipsoid("pelvis", 0, 0, -0.9 * s.waist_height, s.waist_depth / 2, s.waist_width / 2, 0.1 * s.waist_height)],
+    }
+    for side in SIDES:
+        shoulder, elbow, fore, wrist = f"{side}_shoulder", f"{side}_elbow", s.elbow_width / 2, 0.36 * s.elbow_width
+        at_wrist, palm = -WRIST_SHARE * s.forearm_length, s.hand_width / 2
+        parts[f"{side}_upper_arm"] = [ellipsoid(shoulder, 0, 0, 0, arm, arm, arm), ellipsoid(elbow, 0, 0, 0, 0.9 * fore, 0.9 * fore, 0.9 * fore)]
+        parts[f"{side}_forearm"] = [ellipsoid(elbow, 0, 0, -0.06 * s.forearm_length, fore, fore, fore),
+                                    ellipsoid(elbow, 0, 0, at_wrist, wrist, wrist, wrist)]
+        parts[f"{side}_hand"] = [ellipsoid(elbow, 0, 0, -0.75 * s.forearm_length, palm, palm, palm),
+                                 ellipsoid(elbow, 0, 0, -s.forearm_length + palm / 2, palm / 2, palm / 2, palm / 2)]
+    shapes = [part if len(part) == 3 else [*part, part[-1]] for part in parts.values()]
+    joints, centres, radii = (np.array([[e[i] for e in shape] for shape in shapes]) for i in range(3))
+    return Body("rounded", skeleton, Hulls(joints.astype(np.int64), centres.astype(float), radii.astype(float)), tuple(parts),
+                _landmarks(sizes), _hem(sizes))
+
+
+BODIES = {"cardbox": cardbox, "boxes": boxes, "rounded": rounded}
 
 
 def make_body(name: str, sizes: CardboxSizes) -> Body:

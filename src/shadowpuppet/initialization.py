@@ -14,7 +14,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation
-from shadowpuppet.rasterize import Picture, count, pack, place
+from shadowpuppet.rasterize import Picture, count, place
 from shadowpuppet.settings import InitializationSettings
 
 Mask = NDArray[np.bool_]
@@ -25,12 +25,12 @@ SOLE = 0.025
 """What shoes add to the height that is given, metres."""
 
 PROPORTIONS: Mapping[str, tuple[float, float]] = {
-    "head_width": (0.0905, 0.06), "head_height": (0.140, 0.06), "neck_gap": (0.018, 0.80),
+    "head_width": (0.095, 0.06), "head_height": (0.143, 0.06), "neck_gap": (0.022, 0.80),
     "shoulder_width": (0.215, 0.15), "torso_bottom_width": (0.184, 0.25), "torso_height": (0.236, 0.10),
     "waist_width": (0.210, 0.20), "waist_height": (0.123, 0.20),
-    "head_depth": (0.114, 0.06), "torso_top_depth": (0.100, 0.40), "torso_bottom_depth": (0.155, 0.30), "waist_depth": (0.150, 0.30),
+    "head_depth": (0.114, 0.06), "torso_top_depth": (0.120, 0.40), "torso_bottom_depth": (0.155, 0.30), "waist_depth": (0.150, 0.30),
     "upper_arm_length": (0.1605, 0.05), "upper_arm_width": (0.068, 0.30), "forearm_length": (0.254, 0.05),
-    "elbow_width": (0.065, 0.30), "hand_width": (0.030, 0.50), "shoulder_inset": (0.007, 4.0),
+    "elbow_width": (0.070, 0.30), "hand_width": (0.030, 0.50), "shoulder_inset": (0.007, 4.0),
 }  # fmt: skip
 """Every size as a fraction of the stature, and its relative standard deviation among adults.
 
@@ -115,40 +115,39 @@ class Fit:
 class _Bodies:
     """Many people at once: joints and corners of the cardbox are linear in the sizes, so that a body a hypothesis need not be built."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
         base = np.full(len(CardboxSizes.names()), 0.1)
-        self.body = BODIES["cardbox"](CardboxSizes.from_array(base))
-        offsets, quads = self._measures(base)
-        step = 0.01
-        slopes = [self._measures(base + step * unit) for unit in np.eye(len(base))]
-        self._offsets = np.array([(o - offsets) / step for o, _ in slopes])
-        self._quads = np.array([(q - quads) / step for _, q in slopes])
+        self.make = BODIES[name]
+        self.body = self.make(CardboxSizes.from_array(base))
+        self.slopes = []
+        still, step = self._measures(base), 0.01
+        moved = [self._measures(base + step * unit) for unit in np.eye(len(base))]
+        for i, array in enumerate(still):
+            self.slopes.append(np.array([measures[i] - array for measures in moved]) / step)
 
-    @staticmethod
-    def _measures(sizes: Array) -> tuple[Array, Array]:
-        body = BODIES["cardbox"](CardboxSizes.from_array(sizes))
-        return np.array([joint.offset for joint in body.skeleton.joints]), body.quads
+    def _measures(self, sizes: Array) -> tuple[Array, ...]:
+        body = self.make(CardboxSizes.from_array(sizes))
+        return np.array([joint.offset for joint in body.skeleton.joints]), *body.shapes.arrays
 
     def costs(self, camera: Camera, root: Array, observation: Observation, poses: Array, sizes: Array, shift: Array) -> Array:
         """Eq. 2 (N,), pixels, of poses (N, D) with sizes (N, 18), the base moved by `shift` (N, 2) along X and Z."""
-        picture = Picture(self.body, camera, root)
-        offsets = np.tensordot(sizes, self._offsets, 1)
+        picture, skeleton = Picture(self.body, camera, root), self.body.skeleton
+        offsets, *arrays = (np.ascontiguousarray(np.tensordot(sizes, slope, 1)) for slope in self.slopes)
         offsets[:, 0, [0, 2]] += shift
-        transforms = np.empty((len(poses), len(self.body.skeleton.joints), 3, 4))
-        every = np.arange(len(self.body.skeleton.joints))
-        self.body.skeleton.forward_some(np.ascontiguousarray(poses), every, transforms, root, offsets)
-        shapes = np.ascontiguousarray(np.tensordot(sizes, self._quads, 1))
-        added = picture.added(transforms, np.arange(len(self.body.quads)), observation.silhouette, observation.ignore, shapes)
+        transforms = np.empty((len(poses), len(skeleton.joints), 3, 4))
+        skeleton.forward_some(np.ascontiguousarray(poses), np.arange(len(skeleton.joints)), transforms, root, offsets)
+        added = picture.added(transforms, np.arange(len(self.body.parts)), observation.silhouette, observation.ignore, tuple(arrays))
         return observation.area + added[:, 0] - 2.0 * added[:, 1]
 
 
 class _Hypotheses:
     """Sizes, place and poses of one person in several pictures as one vector, some of which are drawn at a time."""
 
-    def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: Guess, prior: SizePrior, weight: float) -> None:
+    def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: Guess, prior: SizePrior, weight: float,
+                 body: str) -> None:
         self.camera, self.masks, self.guess, self.prior = camera, masks, guess, prior
         self.weight = weight * camera.size[0] * camera.size[1] / (320 * 240)
-        self.bodies = _Bodies()
+        self.bodies, self.body, self.strain = _Bodies(body), body, 0.0
         self.root = place(camera, guess.distance, guess.elevation)
         self.n, (self.k, self.d) = len(CardboxSizes.names()), poses.shape
         self.vector = np.concatenate([guess.sizes.to_array(), np.zeros(2), poses.ravel()])
@@ -165,12 +164,12 @@ class _Hypotheses:
 
     def observe(self) -> list[Observation]:
         """The pictures, less the legs under the present guess; but where the crotch is seen, it counts."""
-        picture, out = self.current().picture(self.camera), []
+        picture, out = self.current().picture(self.camera, self.body), []
         for mask, pose in zip(self.masks, self.poses(), strict=True):
             legs = picture.legs(pose)
             between = picture.legs(pose, spread=0.0) & _middle(legs)
             parted = (between.any(1) & ~(mask & between).any(1)).any()
-            out.append(Observation.of(mask, pack(mask & (legs & ~between if parted else legs))))
+            out.append(Observation.of(mask, mask & (legs & ~between if parted else legs)))
         return out
 
     def poses(self) -> Array:
@@ -189,6 +188,7 @@ class _Hypotheses:
         poses = vectors[:, self.n + 2 :].reshape(len(vectors), self.k, self.d)
         total = self.weight * self.prior.penalty(sizes)
         for k in pictures:
+            total += self.strain * self.bodies.body.skeleton.strain(poses[:, k])
             total += self.bodies.costs(self.camera, self.root, observations[k], poses[:, k], sizes, shift)
         return total
 
@@ -235,7 +235,7 @@ class _Hypotheses:
 
     def overlaps(self) -> list[float]:
         """Intersection over union in every picture."""
-        picture, out = self.current().picture(self.camera), []
+        picture, out = self.current().picture(self.camera, self.body), []
         for observation, pose in zip(self.observe(), self.poses(), strict=True):
             drawn = picture.draw(pose) & ~observation.ignore
             seen = observation.silhouette & ~observation.ignore
@@ -255,7 +255,7 @@ def _middle(legs: Mask) -> Mask:
 
 
 def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping[str, Mask], *, height: float | None = None,
-                   distance: float | None = None, settings: InitializationSettings | None = None) -> Fit:
+                   distance: float | None = None, body: str = "cardbox", settings: InitializationSettings | None = None) -> Fit:
     """Algorithm 1: sizes from masks (H, W) of a person in the known postures `POSTURES`.
 
     Height (m, shoes on) or distance (m) fixes the scale; the average height is taken without either. The person may stand anywhere
@@ -277,7 +277,7 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     for k, mask in enumerate(masks):
         head = np.flatnonzero(mask[: np.flatnonzero(mask.any(1))[0] + max(mask.shape[0] // 20, 3)].any(0))
         poses[k, side] = (head.mean() - camera.matrix[0, 2]) / camera.matrix[0, 0] * guess.distance
-    hypotheses = _Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings.prior_weight)
+    hypotheses = _Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings.prior_weight, body)
     curves: dict[str, list[float]] = {subset: [] for subset in SUBSETS}
     view_of = dict(zip(SUBSETS, POSTURES, strict=True))
     for sweep in range(settings.sweeps):
@@ -294,6 +294,26 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
             curves[subset] += hypotheses.search(rng, columns, [k], settings, settings.sigma / 2**sweep)
     overlaps = dict(zip(names, hypotheses.overlaps(), strict=True))
     return Fit(hypotheses.current(), {k: tuple(v) for k, v in curves.items() if v}, overlaps, hypotheses.poses().copy())
+
+
+def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, known: int = 0,
+           free_distance: bool = False, body: str = "cardbox", settings: InitializationSettings | None = None, strain: float = 10.0) -> Fit:
+    """Sizes, place and poses fitted together to masks (H, W) with poses (K, D) to begin with; the first `known` poses stay.
+
+    What straight arms do not tell apart (shoulder, upper arm, forearm), bent ones do.
+    """
+    settings = settings or InitializationSettings()
+    hypotheses = _Hypotheses(camera, masks, np.array(poses, float), guess, SizePrior(guess.height), settings.prior_weight, body)
+    hypotheses.strain = strain * camera.size[0] * camera.size[1] / (320 * 240)
+    every, dofs = range(len(masks)), np.arange(poses.shape[1])
+    curves: list[float] = []
+    for sweep in range(settings.sweeps):
+        columns = hypotheses.columns(CardboxSizes.names(), distance=free_distance)
+        curves += hypotheses.search(rng, columns, every, settings, settings.sigma / 2 ** (sweep + 1))
+        for k in every[known:]:
+            hypotheses.search(rng, hypotheses.pose_columns(k, dofs), [k], settings, 0.1 / 2**sweep)
+    overlaps = {str(k): overlap for k, overlap in enumerate(hypotheses.overlaps())}
+    return Fit(hypotheses.current(), {"all": tuple(curves)}, overlaps, hypotheses.poses().copy())
 
 
 def _first_guess(camera: Camera, names: Sequence[str], masks: Sequence[Mask], height: float | None, distance: float | None) -> Guess:

@@ -21,53 +21,63 @@ class Observation:
     """Pixels that do not count, whatever is drawn there. They are set in the silhouette too, so that they never differ."""
 
     @classmethod
-    def of(cls, mask: ArrayLike, ignore: Bits | None = None) -> Observation:
-        """From a mask (H, W), and the bits of the pixels that do not count."""
+    def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None) -> Observation:
+        """From a mask (H, W), and a mask of the pixels that do not count."""
         silhouette = pack(mask)
-        if ignore is None:
-            ignore = np.zeros_like(silhouette)
-        return cls(silhouette | ignore, ignore)
+        skipped = np.zeros_like(silhouette) if ignore is None else pack(ignore)
+        return cls(silhouette | skipped, skipped)
+
+    @classmethod
+    def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array) -> Observation:
+        """From a mask (H, W), less what it has where the legs of `pose` (D,) may be: the model ends at the waist.
+
+        Empty pixels there still count, so that the waist does not grow over them.
+        """
+        mask = np.asarray(mask, bool)
+        return cls.of(mask, mask & picture.legs(pose))
 
     @property
     def area(self) -> int:
         """Pixels of the silhouette that count."""
         return count(self.silhouette & ~self.ignore)
 
+    def cost_and_overlap(self, drawn: Bits) -> tuple[float, float]:
+        """Pixels that differ from a drawn silhouette (eq. 2), and intersection over union with it."""
+        drawn, seen = drawn & ~self.ignore, self.silhouette & ~self.ignore
+        return float(count(drawn ^ seen)), count(drawn & seen) / max(count(drawn | seen), 1)
 
-class Stage:
-    """What some DOF move: the joints to recompute, and the quads to draw again over all others."""
+
+class PartialCost:
+    """Eq. 2 for poses that differ in some DOF only: what these move is drawn over all else, which is drawn once."""
 
     def __init__(self, picture: Picture, dofs: NDArray[np.int64], hidden: Iterable[str] = ()) -> None:
-        body, skeleton = picture.body, picture.body.skeleton
+        """`dofs`: indices of the DOF that vary; `hidden`: parts that are not drawn at all."""
+        body, skeleton, hidden = picture.body, picture.body.skeleton, set(hidden)
         owners = {skeleton.dofs[d].joint for d in dofs}
-        moved: list[str] = []
+        moved: set[str] = set()
         for joint in skeleton.joints:  # parents come first, so that one pass finds all that hangs on a moved joint
             if joint.name in owners or joint.parent in moved:
-                moved.append(joint.name)
+                moved.add(joint.name)
         self.picture, self.dofs = picture, dofs
-        self.miss = 1.0
-        self.joints = np.array([skeleton.joint_index(name) for name in moved], np.int64)
-        gone = set(hidden)
-        drawn = np.array([part not in gone for part in body.quad_parts])
-        moves = np.isin(body.quad_joints, self.joints)
-        self.moving = np.flatnonzero(moves & drawn)
-        self.still = np.flatnonzero(~moves & drawn)
+        self.joints = np.array([i for i, name in enumerate(skeleton.joint_names) if name in moved], np.int64)
+        drawn = np.array([part not in hidden for part in body.parts])
+        moves = np.isin(body.shapes.joints, self.joints).any(1)
+        self.moving, self.still = np.flatnonzero(moves & drawn), np.flatnonzero(~moves & drawn)
 
     def transforms(self, poses: Array, around: Array) -> Array:
-        """Joint transforms (N, J, 3, 4) into the camera's frame; joints that the stage does not move stand as in the pose `around` (D,)."""
-        base = self.picture.transforms(around[None])
-        out = np.repeat(base, len(poses), axis=0)
+        """Joint transforms (N, J, 3, 4) into the camera's frame; joints that do not move stand as in the pose `around` (D,)."""
+        out = np.repeat(self.picture.transforms(around[None]), len(poses), axis=0)
         self.picture.body.skeleton.forward_some(poses, self.joints, out, self.picture.T_camera_base)
         return out
 
     def costs(self, observation: Observation, around: Array) -> Callable[[Array], Array]:
-        """Eq. 2 as a function of whole poses (N, D) that differ from `around` in this stage's DOF only: pixels (N,)."""
+        """Eq. 2 as a function of whole poses (N, D), all like `around` (D,) but for the DOF that vary: pixels (N,)."""
         fixed = self.picture.draw(around, self.still) | observation.ignore
         base = count(fixed ^ observation.silhouette)
 
         def cost(poses: Array) -> Array:
             added = self.picture.added(self.transforms(poses, around), self.moving, observation.silhouette, fixed)
-            return base + added[:, 0] - (1.0 + self.miss) * added[:, 1]
+            return base + added[:, 0] - 2.0 * added[:, 1]
 
         return cost
 
@@ -75,5 +85,5 @@ class Stage:
 def silhouette_costs(picture: Picture, observation: Observation, poses: ArrayLike) -> Array:
     """Eq. 2: pixels (N,) in which the drawn body and the silhouette differ, of whole poses (N, D)."""
     poses = np.ascontiguousarray(poses, float)
-    stage = Stage(picture, np.arange(len(picture.body.skeleton.dofs)))
-    return stage.costs(observation, poses[0])(poses)
+    every = PartialCost(picture, np.arange(len(picture.body.skeleton.dofs)))
+    return every.costs(observation, poses[0])(poses)

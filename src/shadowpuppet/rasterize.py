@@ -6,6 +6,7 @@ vectorised. A pixel belongs to a polygon if its centre, at integer coordinates, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numba
@@ -14,10 +15,12 @@ from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body import Body
+from shadowpuppet.body import Body, Quads
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 
+_DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
+"""Directions in which a hull's outline is taken: the corners of its polygon."""
 Bits = NDArray[np.uint64]
 NEAR = 0.05
 """What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
@@ -57,28 +60,41 @@ class Picture:
         """Joint transforms (N, J, 3, 4) into the camera's frame, of poses (N, D)."""
         return self.body.skeleton.forward(poses, self.T_camera_base)
 
-    def polygons(self, transforms: Array, quads: NDArray[np.int64], shapes: Array | None = None) -> tuple[Array, NDArray[np.int64]]:
-        """Pictures of some quads: corners (N, Q, 5, 2) in pixels and their number (N, Q), 0 where all is behind the camera.
+    def polygons(self, transforms: Array, which: NDArray[np.int64], arrays: tuple[Array, ...] | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """Pictures of some shapes: corners (N, S, K, 2) in pixels and their number (N, S), 0 where all is behind the camera.
 
-        `shapes` (N, all quads, 4, 3) gives every pose quads of its own measures.
+        `arrays` are those of `Body.shapes`, each with a leading axis N, for poses of bodies of different sizes.
         """
-        shapes = self.body.quads[None] if shapes is None else shapes
-        camera, corners = self.camera, np.empty((len(transforms), len(quads), 5, 2))
-        counts = np.empty((len(transforms), len(quads)), np.int64)
-        _project(transforms, shapes, self.body.quad_joints, quads, camera.matrix, camera.distortion, camera.fisheye, NEAR, corners, counts)
+        camera, shapes = self.camera, self.body.shapes
+        arrays = tuple(array[None] for array in shapes.arrays) if arrays is None else arrays
+        lens = camera.matrix, camera.distortion, camera.fisheye, NEAR
+        corners = np.empty((len(transforms), len(which), 5 if isinstance(shapes, Quads) else len(_DIRECTIONS), 2))
+        counts = np.empty((len(transforms), len(which)), np.int64)
+        if isinstance(shapes, Quads):
+            _project_quads(transforms, *arrays, shapes.joints[:, 0].copy(), which, *lens, corners, counts)
+        else:
+            _project_hulls(transforms, *arrays, shapes.joints, which, *lens, _DIRECTIONS, corners, counts)
         return corners, counts
+
+    def points(self, poses: Array, names: Iterable[str] | None = None) -> Array:
+        """Landmarks (N, L, 3), metres, in the camera's frame, of poses (N, D); all, or those named."""
+        return self.body.points(poses, self.T_camera_base, names)
+
+    def points_world(self, poses: ArrayLike) -> Array:
+        """Landmarks (N, L, 3), metres, in the world, of poses (N, D), in the order of the body's `landmark_names`."""
+        return self.body.points(poses, inverse(self.camera.T_camera_world) @ self.T_camera_base)
 
     def empty(self) -> Bits:
         """An empty mask's bits."""
         width, height = self.camera.size
         return np.zeros((-(-width // 64), height), np.uint64)
 
-    def draw(self, pose: ArrayLike, quads: NDArray[np.int64] | None = None) -> Bits:
-        """The silhouette of one pose (D,) as bits; of all quads, or of some."""
+    def draw(self, pose: ArrayLike, which: NDArray[np.int64] | None = None) -> Bits:
+        """The silhouette of one pose (D,) as bits; of all shapes, or of some."""
         poses = np.ascontiguousarray(np.asarray(pose, float)[None])
-        quads = np.arange(len(self.body.quads)) if quads is None else quads
+        which = np.arange(len(self.body.parts)) if which is None else which
         bits = self.empty()
-        corners, counts = self.polygons(self.transforms(poses), quads)
+        corners, counts = self.polygons(self.transforms(poses), which)
         _draw(corners[0], counts[0], self.camera.size[0], bits)
         return bits
 
@@ -88,10 +104,8 @@ class Picture:
         The model ends at the waist; what is seen below says nothing about it.
         """
         width, height = self.camera.size
-        waist = [part == "waist" for part in self.body.quad_parts]
-        corners = self.body.quads[waist]
-        T = self.transforms(np.asarray(pose, float)[None])[0, self.body.quad_joints[waist][0]]
-        low = corners[corners[..., 2] == corners[..., 2].min()] @ T[:, :3].T + T[:, 3]
+        T = self.transforms(np.asarray(pose, float)[None])[0, self.body.skeleton.joint_index("pelvis")]
+        low = self.body.hem @ T[:, :3].T + T[:, 3]
         if low[:, 2].min() < NEAR:
             return np.zeros((height, width), bool)
         pixels = self.camera.project(transform(inverse(self.camera.T_camera_world), low))
@@ -104,10 +118,10 @@ class Picture:
         """The silhouette of one pose (D,), of shape (H, W): h(x, y, d) of Liu 2011, eq. 2."""
         return unpack(self.draw(pose), self.camera.size[0])
 
-    def added(self, transforms: Array, quads: NDArray[np.int64], silhouette: Bits, fixed: Bits,
-              shapes: Array | None = None) -> NDArray[np.int64]:
-        """What drawing some quads adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
-        corners, counts = self.polygons(transforms, quads, shapes)
+    def added(self, transforms: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits,
+              arrays: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
+        """What drawing some shapes adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
+        corners, counts = self.polygons(transforms, which, arrays)
         out = np.empty((len(transforms), 2), np.int64)
         _added(corners, counts, self.camera.size[0], silhouette, fixed, out)
         return out
@@ -129,12 +143,10 @@ def place(camera: Camera, distance: float, elevation: float) -> Array:
 
 
 def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """One convex polygon (K <= 5 corners, (K, 2) pixels) drawn into an empty mask (H, W)."""
-    corners = np.asarray(corners, float)
-    padded = np.zeros((1, 5, 2))
-    padded[0, : len(corners)] = corners
+    """One convex polygon of corners (K, 2), pixels, drawn into an empty mask (H, W)."""
+    corners = np.ascontiguousarray(corners, float)
     bits = np.zeros((-(-size[0] // 64), size[1]), np.uint64)
-    _draw(padded, np.array([len(corners)]), size[0], bits)
+    _draw(corners[None], np.array([len(corners)]), size[0], bits)
     return unpack(bits, size[0])
 
 
@@ -149,14 +161,14 @@ def _popcount(typingctx, word):  # pragma: no cover
 
 
 @numba.njit(cache=True)
-def _project(transforms, shapes, joints, quads, K, k, fisheye, near, corners, counts):  # pragma: no cover
+def _project_quads(transforms, shapes, joints, which, K, k, fisheye, near, corners, counts):  # pragma: no cover
     """Quads into the camera's frame, cut at the near plane, projected."""
     P = np.empty((4, 3))
     bent = k.any()
     for n in range(transforms.shape[0]):
         shape = shapes[n if shapes.shape[0] > 1 else 0]
-        for i in range(quads.size):
-            q = quads[i]
+        for i in range(which.size):
+            q = which[i]
             T = transforms[n, joints[q]]
             for v in range(4):
                 x, y, z = shape[q, v, 0], shape[q, v, 1], shape[q, v, 2]
@@ -177,6 +189,51 @@ def _project(transforms, shapes, joints, quads, K, k, fisheye, near, corners, co
                     x, y = _bend(x, y, k, fisheye)
                 out[v, 0], out[v, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
             counts[n, i] = m
+
+
+@numba.njit(cache=True)
+def _project_hulls(transforms, centres, radii, joints, which, K, k, fisheye, near, directions, corners, counts):  # pragma: no cover
+    """Outlines of hulls of ellipsoids: in each direction n the farthest point of any of the ellipses that the ellipsoids look like.
+
+    An ellipse of centre c and semi-axes s_i reaches c + sum s_i (s_i . n) / h in direction n, h = sqrt(sum (s_i . n)^2).
+    """
+    count = centres.shape[2]
+    c, axes = np.empty((count, 2)), np.empty((count, 3, 2))
+    bent = k.any()
+    for n in range(transforms.shape[0]):
+        m = n if centres.shape[0] > 1 else 0
+        for i in range(which.size):
+            q = which[i]
+            ahead = False
+            for e in range(count):
+                T, p = transforms[n, joints[q, e]], centres[m, q, e]
+                x = T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2] + T[0, 3]
+                y = T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3]
+                z = T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3]
+                ahead |= z > near
+                z = max(z, near)
+                c[e, 0], c[e, 1] = x / z, y / z
+                for a in range(3):
+                    r = radii[m, q, e, a] / z
+                    axes[e, a, 0] = r * (T[0, a] - c[e, 0] * T[2, a])
+                    axes[e, a, 1] = r * (T[1, a] - c[e, 1] * T[2, a])
+            counts[n, i] = directions.shape[0] if ahead else 0
+            for d in range(directions.shape[0]):
+                u, v = directions[d, 0], directions[d, 1]
+                best, x, y = -np.inf, 0.0, 0.0
+                for e in range(count):
+                    s0 = axes[e, 0, 0] * u + axes[e, 0, 1] * v
+                    s1 = axes[e, 1, 0] * u + axes[e, 1, 1] * v
+                    s2 = axes[e, 2, 0] * u + axes[e, 2, 1] * v
+                    h = np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+                    value = c[e, 0] * u + c[e, 1] * v + h
+                    if value > best:
+                        best = value
+                        x = c[e, 0] + (axes[e, 0, 0] * s0 + axes[e, 1, 0] * s1 + axes[e, 2, 0] * s2) / h
+                        y = c[e, 1] + (axes[e, 0, 1] * s0 + axes[e, 1, 1] * s1 + axes[e, 2, 1] * s2) / h
+                if bent:
+                    x, y = _bend(x, y, k, fisheye)
+                corners[n, i, d, 0], corners[n, i, d, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
 
 
 @numba.njit(cache=True)

@@ -5,11 +5,16 @@ Every field is a flag of the command line and a line of TOML; unknown names are 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
+from shadowpuppet.errors import SettingsError, choices
+
+Settings = TypeVar("Settings")
 STRICT = ConfigDict(extra="forbid")
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -36,7 +41,7 @@ class PartSettings:
 class MonocularSettings:
     """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
-    body: Literal["cardbox", "boxes"] = "cardbox"
+    body: Literal["cardbox", "boxes", "rounded"] = "rounded"
     """The body's model."""
     resampling: Literal["deterministic", "stratified", "systematic", "multinomial", "residual"] = "deterministic"
     """DRS (Algorithm 4), SRS (Algorithm 3), or another scheme in SRS's place."""
@@ -44,57 +49,89 @@ class MonocularSettings:
     """The torso's stage."""
     arm: PartSettings = PartSettings(survival=0.4, sigma_rotation=0.25, sigma_cost=4000.0)
     """Each arm's stage."""
-    stages: tuple[str, ...] = ("torso", "left_arm", "right_arm")
+    stages: Annotated[tuple[str, ...], Field(min_length=1)] = ("torso", "left_arm", "right_arm")
     """The filter's stages, in order; parts joined by + are moved at once ("torso+left_arm+right_arm" is a flat filter)."""
-    cycles: Annotated[int, Field(ge=1, le=100)] = 1
+    cycles: Annotated[int, Field(ge=1, le=100)] = 3
     """Estimation cycles a frame."""
-    cooling: Annotated[float, Field(gt=0, le=1)] = 1.0
+    cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
     """The noise of each cycle is that of the last times this."""
+    explore: Annotated[int, Field(ge=0, le=100_000)] = 200
+    """Poses from all over a part's range that are tried beside the particles, in each frame's first cycle."""
     rank_by: Literal["last", "new"] = "last"
     """Costs that rank and weigh before resampling: as known from the last picture, or measured again in the new one (eq. 8 as it is
     printed), which doubles the evaluations."""
-    limits: bool = True
-    """Whether joint limits are kept."""
-    torso_arms: Literal["last", "hidden"] = "last"
+    torso_arms: Literal["last", "hidden"] = "hidden"
     """How the torso's stage draws the arms: as last estimated, carried along, or not at all."""
     estimate: Literal["best", "mean"] = "best"
     """A cycle's estimate: the particle of least cost, or the weighted mean of all."""
-    depth_weight: NonNegative = 0.0
-    """Pull of elbows and hands toward `depth_keep` times their last depth offset from the shoulder (pixels per m^2)."""
-    depth_keep: Share = 0.9
-    """See `depth_weight`."""
-    explore: Annotated[int, Field(ge=0, le=100_000)] = 0
-    """Poses from all over an arm's range that are tried beside the particles, in each frame's first cycle."""
-    motion_weight: NonNegative = 0.0
-    """Pull of elbows and hands to where they were (pixels per m^2)."""
-    posture_weight: NonNegative = 0.0
-    """Pull of the posture to rest (pixels per squared deviation)."""
-    flat_noise: Positive = 0.5
-    """x"""
-    miss: Positive = 1.0
-    """x"""
-    jump: NonNegative = 0.0
-    """x"""
-    reach: NonNegative = 0.2
-    """x"""
-    temperature: Positive = 20.0
-    """mean"""
+    motion_weight: NonNegative = 600.0
+    """Pull of shoulders, elbows and hands to where they were (pixels per m^2, at 320 x 240). Holds what the picture does not show,
+    above all an arm's depth."""
+    motion_reach: Positive = 0.3
+    """From about this distance on (m) the pull grows no more: what plainly moved farther is found there."""
+    posture_weight: NonNegative = 10.0
+    """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.strain`)."""
+    limits: bool = True
+    """Whether joint limits are kept."""
     ignore_legs: bool = True
-    """Leave out of the cost what lies below the waist, where the model has no legs."""
+    """Leave out of the cost what is seen below the waist, where the model has no legs."""
 
 
 PRESETS: dict[str, dict] = {
     "default": {},
     "liu2011": {
+        "body": "cardbox",
+        "resampling": "deterministic",
         "torso": {"particles": 200, "survival": 0.2, "sigma_rotation": 0.1, "sigma_translation": 0.02, "sigma_cost": 8000.0},
         "arm": {"particles": 200, "survival": 0.4, "sigma_rotation": 0.25, "sigma_cost": 4000.0},
         "cycles": 1,
         "cooling": 1.0,
+        "explore": 0,
+        "torso_arms": "last",
         "estimate": "best",
-        "depth_weight": 0.0,
+        "motion_weight": 0.0,
+        "posture_weight": 0.0,
     },
 }
-"""Named settings; what a preset leaves out is the default's."""
+"""Named settings: "default", the best we know, and "liu2011", Table I's filter; what a preset leaves out is the default's."""
+
+
+def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None, source: str = "settings") -> MonocularSettings:
+    """A preset with some values replaced; tables (`torso`, `arm`) may be given in part.
+
+    Raises `SettingsError` for an unknown preset, an unknown name or an impossible value, with what is possible.
+    """
+    if preset not in PRESETS:
+        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(PRESETS)}")
+    return validate(MonocularSettings, _merge(_plain(MonocularSettings()), PRESETS[preset], overrides or {}), source)
+
+
+def validate(kind: type[Settings], values: Mapping[str, Any], source: str = "settings") -> Settings:
+    """Settings of a kind from plain values; a `SettingsError` names the first bad one, what was found and what is possible."""
+    try:
+        return TypeAdapter(kind).validate_python(dict(values))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(key) for key in first["loc"])
+        if first["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
+            owner = kind
+            for key in first["loc"][:-1]:
+                owner = type(getattr(owner(), str(key)))
+            raise SettingsError(f"{source}: unknown setting {place!r}; there are: {choices(f.name for f in fields(owner))}") from None  # pyright: ignore[reportArgumentType]
+        raise SettingsError(f"{source}: {place}: found {first['input']!r}; {first['msg'][:1].lower()}{first['msg'][1:]}") from None
+
+
+def _plain(settings: Any) -> dict[str, Any]:
+    return {f.name: _plain(value) if is_dataclass(value := getattr(settings, f.name)) else value for f in fields(settings)}
+
+
+def _merge(*tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables laid over one another, the last on top, inner tables too."""
+    out: dict[str, Any] = {}
+    for table in tables:
+        for key, value in table.items():
+            out[key] = _merge(out[key], value) if isinstance(value, Mapping) and isinstance(out.get(key), Mapping) else value
+    return out
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)

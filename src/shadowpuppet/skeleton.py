@@ -38,18 +38,33 @@ class Dof:
     """Limits, radians or metres."""
     high: float = np.inf
     kind: Literal["rotation", "translation"] = "rotation"
+    rest: float = 0.0
+    """Its usual value."""
+    spread: tuple[float, float] = (np.inf, np.inf)
+    """How far from it is still usual, below and above: deviations of a distribution with heavy tails."""
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A shift of a joint, in its parent's frame, that follows a DOF (a "mimic joint")."""
+
+    joint: str
+    dof: str
+    shift: tuple[float, float, float]
+    """Metres for each radian (or metre) of the DOF."""
 
 
 @dataclass(frozen=True)
 class Skeleton:
     """Joints, parents before children, and degrees of freedom, grouped by joint in the order in which they act.
 
-    The transform of a joint is its parent's, times its offset, times its DOF one after another.
+    The transform of a joint is its parent's, times its offset and couplings, times its DOF one after another.
     A pose is an array (D,) in the order of `dofs`; functions take arrays of poses (N, D).
     """
 
     joints: tuple[Joint, ...]
     dofs: tuple[Dof, ...]
+    couplings: tuple[Coupling, ...] = ()
 
     def __post_init__(self) -> None:
         seen: set[str] = set()
@@ -77,8 +92,9 @@ class Skeleton:
         return np.array([dof.low for dof in self.dofs]), np.array([dof.high for dof in self.dofs])
 
     @cached_property
-    def _tree(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], NDArray[np.int64], Array, NDArray[np.bool_]]:
-        """What the kernel needs: parents (J,), offsets (J, 3), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,)."""
+    def _tree(self) -> tuple:
+        """What the kernel needs: parents (J,), offsets (J, 3), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,),
+        and of each coupling joint and DOF (C, 2) and shift (C, 3)."""
         parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
         offsets = np.array([j.offset for j in self.joints], float)
         owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
@@ -86,7 +102,9 @@ class Skeleton:
         axes = np.array([AXES[dof.axis][0] for dof in self.dofs], np.int64)
         signs = np.array([AXES[dof.axis][1] for dof in self.dofs], float)
         turns = np.array([dof.kind == "rotation" for dof in self.dofs], bool)
-        return parents, offsets, first, axes, signs, turns
+        pairs = [(self.joint_index(c.joint), self.dof_indices([c.dof])[0]) for c in self.couplings]
+        shifts = np.array([c.shift for c in self.couplings], float).reshape(-1, 3)
+        return parents, offsets, first, axes, signs, turns, np.array(pairs, np.int64).reshape(-1, 2), shifts
 
     def joint_index(self, name: str) -> int:
         """Index of a joint. Raises `ShadowPuppetError` with the names there are."""
@@ -102,6 +120,20 @@ class Skeleton:
         if unknown:
             raise ShadowPuppetError(f"unknown degree of freedom {unknown[0]!r}; there are: {choices(self.dof_names)}")
         return np.array([self.dof_names.index(name) for name in names], np.int64)
+
+    @cached_property
+    def _usual(self) -> tuple[Array, Array, Array]:
+        return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
+
+    def strain(self, poses: ArrayLike) -> Array:
+        """How unusual poses (N, D) are: squared deviations from rest, summed (N,); each DOF adds at most 9, three deviations' worth.
+
+        The bound leaves a posture that is plainly seen alone, and still decides where the picture says little.
+        """
+        rest, below, above = self._usual
+        off = np.asarray(poses, float) - rest
+        squared = (off / np.where(off < 0, below, above)) ** 2
+        return (squared / (1 + squared / 9)).sum(1)
 
     def pose(self, **angles: float) -> Array:
         """One pose (D,) from named values, zero elsewhere."""
@@ -127,13 +159,13 @@ class Skeleton:
 
         `offsets` (N, J, 3) gives every pose a skeleton of its own measures.
         """
-        parents, own, first, axes, signs, turns = self._tree
+        parents, own, *rest = self._tree
         offsets = own[None] if offsets is None else offsets
-        _forward(poses, joints, parents, offsets, first, axes, signs, turns, np.ascontiguousarray(root[:3]), transforms)
+        _forward(poses, joints, parents, offsets, *rest, np.ascontiguousarray(root[:3]), transforms)
 
 
 @numba.njit(cache=True)
-def _forward(poses, joints, parents, offsets, first, axes, signs, turns, root, out):  # pragma: no cover
+def _forward(poses, joints, parents, offsets, first, axes, signs, turns, coupled, shifts, root, out):  # pragma: no cover
     """Each joint: the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns."""
     T = np.empty((3, 4))
     for n in range(poses.shape[0]):
@@ -144,6 +176,11 @@ def _forward(poses, joints, parents, offsets, first, axes, signs, turns, root, o
                 for c in range(4):
                     T[r, c] = root[r, c] if parent < 0 else out[n, parent, r, c]
                 T[r, 3] += T[r, 0] * offset[j, 0] + T[r, 1] * offset[j, 1] + T[r, 2] * offset[j, 2]
+            for k in range(coupled.shape[0]):
+                if coupled[k, 0] == j:
+                    value, shift = poses[n, coupled[k, 1]], shifts[k]
+                    for r in range(3):
+                        T[r, 3] += value * (T[r, 0] * shift[0] + T[r, 1] * shift[1] + T[r, 2] * shift[2])
             for d in range(first[j], first[j + 1]):
                 axis, value = axes[d], signs[d] * poses[n, d]
                 if turns[d]:

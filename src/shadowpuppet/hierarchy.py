@@ -1,0 +1,108 @@
+"""The stages of the hierarchical filter: which DOF each one draws, how, and how it weighs them (Liu 2011, IV-B)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.first_pose import arm_parts, coarse_arms
+from shadowpuppet.geometry import Array
+from shadowpuppet.likelihood import Observation, PartialCost
+from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
+from shadowpuppet.rasterize import Picture
+from shadowpuppet.resampling import Scheme, make_scheme, normalise
+from shadowpuppet.settings import MonocularSettings
+
+PARTS = {"torso": "torso_", "left_arm": "left_", "right_arm": "right_"}
+"""Parts that a stage can name, and how the names of their DOF begin."""
+WANDER = 0.3
+"""Deviation of the torso's angles, rad, where a stage explores; an explored arm is a coarse one give or take 0.2 rad."""
+
+
+class FilterStage:
+    """One stage: its particles are the values (N, d) of its DOF; all other DOF are as estimated."""
+
+    def __init__(self, picture: Picture, settings: MonocularSettings, name: str) -> None:
+        """`name`: parts joined by +. Raises `SettingsError` for a part that there is not."""
+        self.picture, self.settings, self.parts = picture, settings, tuple(part.strip() for part in name.split("+"))
+        unknown = [part for part in self.parts if part not in PARTS]
+        if unknown:
+            raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(PARTS)}")
+        skeleton = picture.body.skeleton
+        owner = {d: part for d, dof in enumerate(skeleton.dofs) for part in self.parts if dof.name.startswith(PARTS[part])}
+        self.dofs = np.array(sorted(owner), np.int64)
+        self.moves_torso = "torso" in self.parts
+        hide = self.parts == ("torso",) and settings.torso_arms == "hidden"
+        self.partial = PartialCost(picture, self.dofs, arm_parts(picture, "left") + arm_parts(picture, "right") if hide else ())
+
+        of = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}
+        self.number = sum(part.particles for part in of.values())
+        self.resample: Scheme = make_scheme(settings.resampling, of[self.parts[0]].survival)
+        kinds = [skeleton.dofs[d].kind for d in self.dofs]
+        self.sigma = np.array([of[owner[d]].sigma_rotation if kind == "rotation" else of[owner[d]].sigma_translation
+                               for d, kind in zip(self.dofs.tolist(), kinds, strict=True)])
+        self.scale = picture.camera.size[0] * picture.camera.size[1] / (320 * 240)  # settings in pixels are for 320 x 240
+        self.sigma_cost = of[self.parts[0]].sigma_cost * self.scale
+        self.followed = [name for name in picture.body.landmarks if name.endswith(("_shoulder",) if self.moves_torso else ("_elbow", "_hand"))
+                         and (self.moves_torso or f"{name.split('_')[0]}_arm" in self.parts)]
+
+    def clamp(self, values: Array) -> Array:
+        """Values (N, d) within the joint limits, if these are kept."""
+        low, high = self.picture.body.skeleton.limits
+        return np.clip(values, low[self.dofs], high[self.dofs]) if self.settings.limits else values
+
+    def put(self, pose: Array, values: Array) -> Array:
+        """The pose (D,), or poses (N, D), with this stage's values (d,) or (N, d) in it."""
+        poses = np.repeat(pose[None], len(values), axis=0) if values.ndim == 2 else pose.copy()
+        poses[..., self.dofs] = values
+        return poses
+
+    def propose(self, cycle: int) -> Propose:
+        """Gaussian noise (Algorithms 3, 4), less of it in every cycle; in the first, poses from afar are tried beside."""
+        sigma = self.sigma * self.settings.cooling**cycle
+        explored = self.settings.explore if cycle == 0 and len(self.parts) == 1 else 0
+
+        def propose(rng: np.random.Generator, values: Array) -> Array:
+            drawn = diffuse(rng, values, sigma)
+            return self.clamp(np.concatenate([drawn, self.explore(rng, values[0], explored)]) if explored else drawn)
+
+        return propose
+
+    def explore(self, rng: np.random.Generator, best: Array, number: int) -> Array:
+        """Values (number, d) from all over: what the noise of one frame cannot reach from `best` (d,)."""
+        if self.moves_torso:
+            turns = self.sigma == self.settings.torso.sigma_rotation
+            spread = np.where(turns, WANDER, 5 * self.settings.torso.sigma_translation)
+            return np.where(turns, 0.0, best) + rng.standard_normal((number, len(best))) * spread
+        arms = coarse_arms()
+        return arms[rng.integers(len(arms), size=number)] + 0.2 * rng.standard_normal((number, len(best)))
+
+    def weigh(self, observation: Observation, around: Array, last: Array) -> Weigh:
+        """Costs (N,) and log weights (eq. 6) of values (N, d), all other DOF as in `around` (D,).
+
+        Beside eq. 2 a pose pays, in the default preset, for being unusual and for being far from the last frame's, `last` (D,).
+        """
+        settings, silhouette = self.settings, self.partial.costs(observation, around)
+        before = self._places(last[None]) if settings.motion_weight else None
+
+        def weigh(values: Array) -> tuple[Array, Array]:
+            poses = self.put(around, values)
+            costs = silhouette(poses)
+            if settings.posture_weight:
+                costs = costs + settings.posture_weight * self.scale * self.picture.body.skeleton.strain(poses)
+            if before is not None:
+                moved = ((self._places(poses) - before) ** 2).sum(2)
+                costs = costs + settings.motion_weight * self.scale * (moved / (1 + moved / settings.motion_reach**2)).sum(1)
+            return costs, -(costs**2) / (2 * self.sigma_cost**2)
+
+        return weigh
+
+    def estimate(self, particles: Particles) -> Array:
+        """Values (d,): the particle of least cost, or the mean weighed by cost."""
+        if self.settings.estimate == "best":
+            return particles.best
+        return normalise(-particles.costs / (20 * self.scale)) @ particles.poses
+
+    def _places(self, poses: Array) -> Array:
+        """Where the points (N, P, 3) are that the motion's pull holds: shoulders of the torso, elbow and hand of an arm."""
+        return self.picture.points(poses, self.followed)
