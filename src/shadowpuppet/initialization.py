@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body import BODIES, SUBSETS, CardboxSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices
+from shadowpuppet.first_pose import search
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.rasterize import Picture, count, place
@@ -94,7 +96,7 @@ class Guess:
     elevation: float
     """Of the torso's lower edge over the camera, metres."""
 
-    def picture(self, camera: Camera, body: str = "cardbox") -> Picture:
+    def picture(self, camera: Camera, body: str = "rounded") -> Picture:
         """How the camera sees this person."""
         return Picture(BODIES[body](self.sizes), camera, place(camera, self.distance, self.elevation))
 
@@ -143,11 +145,12 @@ class _Bodies:
 class _Hypotheses:
     """Sizes, place and poses of one person in several pictures as one vector, some of which are drawn at a time."""
 
-    def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: Guess, prior: SizePrior, weight: float,
-                 body: str) -> None:
+    def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: Guess, prior: SizePrior,
+                 settings: InitializationSettings, body: str) -> None:
         self.camera, self.masks, self.guess, self.prior = camera, masks, guess, prior
-        self.weight = weight * camera.size[0] * camera.size[1] / (320 * 240)
-        self.bodies, self.body, self.strain = _Bodies(body), body, 0.0
+        scale = camera.size[0] * camera.size[1] / (320 * 240)  # settings in pixels are for 320 x 240
+        self.weight, self.strain = settings.prior_weight * scale, settings.posture_weight * scale
+        self.bodies, self.body = _Bodies(body), body
         self.root = place(camera, guess.distance, guess.elevation)
         self.n, (self.k, self.d) = len(CardboxSizes.names()), poses.shape
         self.vector = np.concatenate([guess.sizes.to_array(), np.zeros(2), poses.ravel()])
@@ -193,7 +196,7 @@ class _Hypotheses:
         return total
 
     def search(self, rng: np.random.Generator, columns: NDArray[np.int64], pictures: Sequence[int], settings: InitializationSettings,
-               sigma: float) -> list[float]:
+               sigma: float, scale: bool = True) -> list[float]:
         """The inner loop of Algorithm 1: draw `columns` around the best so far until its cost settles; returns the cost by round."""
         observations = self.observe()
         best, least, curve = self.vector, np.inf, []
@@ -201,7 +204,8 @@ class _Hypotheses:
             vectors = np.repeat(best[None], settings.hypotheses, axis=0)
             noise = rng.standard_normal((settings.hypotheses - 1, len(columns))) * sigma
             vectors[1:, columns] += noise * (rng.random(noise.shape) < settings.share)
-            self._scale(vectors, best)
+            if scale:
+                self._scale(vectors, best)
             self._bound(vectors)
             costs = self.costs(vectors, pictures, observations)
             best, least = vectors[np.argmin(costs)], min(float(costs.min()), least)
@@ -255,7 +259,7 @@ def _middle(legs: Mask) -> Mask:
 
 
 def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping[str, Mask], *, height: float | None = None,
-                   distance: float | None = None, body: str = "cardbox", settings: InitializationSettings | None = None) -> Fit:
+                   distance: float | None = None, body: str = "rounded", settings: InitializationSettings | None = None) -> Fit:
     """Algorithm 1: sizes from masks (H, W) of a person in the known postures `POSTURES`.
 
     Height (m, shoes on) or distance (m) fixes the scale; the average height is taken without either. The person may stand anywhere
@@ -277,7 +281,7 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     for k, mask in enumerate(masks):
         head = np.flatnonzero(mask[: np.flatnonzero(mask.any(1))[0] + max(mask.shape[0] // 20, 3)].any(0))
         poses[k, side] = (head.mean() - camera.matrix[0, 2]) / camera.matrix[0, 0] * guess.distance
-    hypotheses = _Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings.prior_weight, body)
+    hypotheses = _Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings, body)
     curves: dict[str, list[float]] = {subset: [] for subset in SUBSETS}
     view_of = dict(zip(SUBSETS, POSTURES, strict=True))
     for sweep in range(settings.sweeps):
@@ -296,24 +300,61 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     return Fit(hypotheses.current(), {k: tuple(v) for k, v in curves.items() if v}, overlaps, hypotheses.poses().copy())
 
 
-def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, known: int = 0,
-           free_distance: bool = False, body: str = "cardbox", settings: InitializationSettings | None = None, strain: float = 10.0) -> Fit:
-    """Sizes, place and poses fitted together to masks (H, W) with poses (K, D) to begin with; the first `known` poses stay.
+def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], *, height: float | None = None,
+                distance: float | None = None, sizes: CardboxSizes | None = None, body: str = "rounded",
+                settings: InitializationSettings | None = None) -> Fit:
+    """Place and sizes without references, from masks (H, W) of the first seconds in any posture.
+
+    The sizes are the average person's of the height (m, shoes on), or those given; places are tried with coarse poses in the first
+    masks; then sizes, place and poses are fitted together, but for sizes that were given. Raises `TrackingError` where there is
+    nobody in the masks.
+    """
+    settings = settings or InitializationSettings()
+    seen = [np.asarray(mask, bool) for mask in masks if np.any(mask)]
+    if not seen:
+        raise TrackingError("nobody is found: the silhouettes of the first seconds are empty")
+    guesses = [guess for k in sorted({0, len(seen) // 2}) for guess in _places(camera, seen[k], height, distance, sizes)]
+    watched = [seen[k] for k in sorted({0, len(seen) // 2, len(seen) - 1})]
+    costs = [sum(search(guess.picture(camera, body), mask).cost for mask in watched) for guess in guesses]
+    guess = guesses[int(np.argmin(costs))]
+    poses = np.array([search(guess.picture(camera, body), mask).pose for mask in seen])
+    return refine(rng, camera, guess, seen, poses, free_sizes=sizes is None, free_distance=distance is None, body=body, settings=settings)
+
+
+def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,
+           free_distance: bool = False, body: str = "rounded", settings: InitializationSettings | None = None) -> Fit:
+    """Sizes, place and poses fitted to masks (H, W), in turn, with poses (K, D) to begin with.
 
     What straight arms do not tell apart (shoulder, upper arm, forearm), bent ones do.
     """
     settings = settings or InitializationSettings()
-    hypotheses = _Hypotheses(camera, masks, np.array(poses, float), guess, SizePrior(guess.height), settings.prior_weight, body)
-    hypotheses.strain = strain * camera.size[0] * camera.size[1] / (320 * 240)
+    hypotheses = _Hypotheses(camera, masks, np.array(poses, float), guess, SizePrior(guess.height), settings, body)
     every, dofs = range(len(masks)), np.arange(poses.shape[1])
-    curves: list[float] = []
+    columns = hypotheses.columns(CardboxSizes.names() if free_sizes else (), distance=free_distance)
+    curve: list[float] = []
     for sweep in range(settings.sweeps):
-        columns = hypotheses.columns(CardboxSizes.names(), distance=free_distance)
-        curves += hypotheses.search(rng, columns, every, settings, settings.sigma / 2 ** (sweep + 1))
-        for k in every[known:]:
-            hypotheses.search(rng, hypotheses.pose_columns(k, dofs), [k], settings, 0.1 / 2**sweep)
+        for k in every:
+            hypotheses.search(rng, hypotheses.pose_columns(k, dofs), [k], settings, 0.2 / 2**sweep)
+        curve += hypotheses.search(rng, columns, every, settings, settings.sigma / 2**sweep, scale=free_sizes)
     overlaps = {str(k): overlap for k, overlap in enumerate(hypotheses.overlaps())}
-    return Fit(hypotheses.current(), {"all": tuple(curves)}, overlaps, hypotheses.poses().copy())
+    return Fit(hypotheses.current(), {"all": tuple(curve)}, overlaps, hypotheses.poses().copy())
+
+
+def _places(camera: Camera, mask: Mask, height: float | None, distance: float | None, sizes: CardboxSizes | None) -> list[Guess]:
+    """People of plausible sizes at plausible places, with the crown at the mask's upper edge or, for raised arms, under it."""
+    top = np.flatnonzero(mask.any(1))[0]
+    centre = np.flatnonzero(mask.any(0)).mean()
+    known = height is not None or sizes is not None
+    heights = [height or AVERAGE_HEIGHT] if known or distance is None else list(np.arange(1.0, 2.1, 0.08))
+    distances = [distance] if distance is not None else list(0.8 * 1.07 ** np.arange(36))
+    up, out = place(camera, 0.0, 0.0)[:3, 2], []
+    ray = camera.rays(np.array([centre, top], float))
+    for tall, far in product(heights, distances):
+        of = sizes or sizes_from_height(tall)
+        crown = of.torso_height + of.neck_gap + of.head_height
+        for raised in (0.0, 0.1, 0.25, 0.4):
+            out.append(Guess(of, tall, far, float(ray / ray[2] * far @ up) - crown - raised * tall))
+    return out
 
 
 def _first_guess(camera: Camera, names: Sequence[str], masks: Sequence[Mask], height: float | None, distance: float | None) -> Guess:

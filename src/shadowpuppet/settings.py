@@ -148,6 +148,8 @@ class InitializationSettings:
     """The noise of each round is that of the last times this."""
     prior_weight: NonNegative = 15.0
     """Pull of the sizes to published proportions (pixels per squared deviation, at 320 x 240)."""
+    posture_weight: NonNegative = 10.0
+    """Pull to usual postures (pixels per squared deviation, at 320 x 240), where the postures are not known."""
     tolerance: Share = 0.005
     """A subset is done when its cost has not improved by this share within `patience` rounds."""
     patience: Annotated[int, Field(ge=1)] = 15
