@@ -62,14 +62,14 @@ class MonocularSettings:
     printed), which doubles the evaluations."""
     torso_arms: Literal["last", "hidden"] = "hidden"
     """How the torso's stage draws the arms: as last estimated, carried along, or not at all."""
-    estimate: Literal["best", "mean"] = "best"
+    estimate: Literal["best", "mean"] = "mean"
     """A cycle's estimate: the particle of least cost, or the weighted mean of all."""
-    motion_weight: NonNegative = 600.0
+    motion_weight: NonNegative = 200.0
     """Pull of shoulders, elbows and hands to where they were (pixels per m^2, at 320 x 240). Holds what the picture does not show,
     above all an arm's depth."""
     motion_reach: Positive = 0.3
     """From about this distance on (m) the pull grows no more: what plainly moved farther is found there."""
-    posture_weight: NonNegative = 10.0
+    posture_weight: NonNegative = 20.0
     """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.strain`)."""
     limits: bool = True
     """Whether joint limits are kept."""
