@@ -24,6 +24,8 @@ _DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) 
 Bits = NDArray[np.uint64]
 NEAR = 0.05
 """What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
+SNAP = 1e-9
+"""An edge this near (pixels) to a pixel's centre goes through it: rounding must not decide which of two neighbours gets the pixel."""
 
 
 def pack(mask: ArrayLike) -> Bits:
@@ -164,7 +166,7 @@ def _popcount(typingctx, word):  # pragma: no cover
 def _project_quads(transforms, shapes, joints, which, K, k, fisheye, near, corners, counts):  # pragma: no cover
     """Quads into the camera's frame, cut at the near plane, projected."""
     P = np.empty((4, 3))
-    bent = k.any()
+    bent = fisheye or k.any()
     for n in range(transforms.shape[0]):
         shape = shapes[n if shapes.shape[0] > 1 else 0]
         for i in range(which.size):
@@ -199,7 +201,7 @@ def _project_hulls(transforms, centres, radii, joints, which, K, k, fisheye, nea
     """
     count = centres.shape[2]
     c, axes = np.empty((count, 2)), np.empty((count, 3, 2))
-    bent = k.any()
+    bent = fisheye or k.any()
     for n in range(transforms.shape[0]):
         m = n if centres.shape[0] > 1 else 0
         for i in range(which.size):
@@ -291,7 +293,7 @@ def _spans(P, m, width, height, left, right):  # pragma: no cover
         if dy == 0:
             continue
         slope = (P[w, 0] - P[v, 0]) / dy
-        x = P[v, 0] + (r0 - P[v, 1]) * slope
+        x = P[v, 0] + (r0 - P[v, 1]) * slope - SNAP
         if (dy > 0) != (area > 0):
             for r in range(rows):
                 left[r] = max(left[r], x + r * slope)
