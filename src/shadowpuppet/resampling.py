@@ -33,7 +33,7 @@ def normalise(log_weights: ArrayLike) -> Array:
 def _inverse(log_weights: ArrayLike, points: Array) -> Indices:
     """psi = min{j : r <= L_j} for sorted points r in (0, 1] (Algorithm 3 with L of eq. 7)."""
     cumulative = np.cumsum(normalise(log_weights))
-    cumulative[-1] = np.inf  # rounding must not lead past the end
+    cumulative /= cumulative[-1]  # exactly 1 at the end: rounding must lead neither past it nor to a last particle without weight
     return np.searchsorted(cumulative, points, side="left")
 
 
