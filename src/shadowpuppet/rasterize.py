@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body import Body, Quads
 from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 
 _DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
@@ -62,20 +63,22 @@ class Picture:
         """Joint transforms (N, J, 3, 4) into the camera's frame, of poses (N, D)."""
         return self.body.skeleton.forward(poses, self.T_camera_base)
 
-    def polygons(self, transforms: Array, which: NDArray[np.int64], arrays: tuple[Array, ...] | None = None) -> tuple[Array, NDArray[np.int64]]:
+    def polygons(self, transforms: Array, which: NDArray[np.int64],
+                 arrays: tuple[Array, ...] | None = None) -> tuple[Array, NDArray[np.int64]]:
         """Pictures of some shapes: corners (N, S, K, 2) in pixels and their number (N, S), 0 where all is behind the camera.
 
         `arrays` are those of `Body.shapes`, each with a leading axis N, for poses of bodies of different sizes.
         """
-        camera, shapes = self.camera, self.body.shapes
+        shapes, K, k, fisheye = self.body.shapes, self.camera.matrix, self.camera.distortion, self.camera.fisheye
         arrays = tuple(array[None] for array in shapes.arrays) if arrays is None else arrays
-        lens = camera.matrix, camera.distortion, camera.fisheye, NEAR
         corners = np.empty((len(transforms), len(which), 5 if isinstance(shapes, Quads) else len(_DIRECTIONS), 2))
         counts = np.empty((len(transforms), len(which)), np.int64)
         if isinstance(shapes, Quads):
-            _project_quads(transforms, *arrays, shapes.joints[:, 0].copy(), which, *lens, corners, counts)
+            (quads,), joints = arrays, shapes.joints[:, 0].copy()
+            _project_quads(transforms, quads, joints, which, K, k, fisheye, NEAR, corners, counts)
         else:
-            _project_hulls(transforms, *arrays, shapes.joints, which, *lens, _DIRECTIONS, corners, counts)
+            centres, radii = arrays
+            _project_hulls(transforms, centres, radii, shapes.joints, which, K, k, fisheye, NEAR, _DIRECTIONS, corners, counts)
         return corners, counts
 
     def points(self, poses: Array, names: Iterable[str] | None = None) -> Array:
@@ -123,6 +126,8 @@ class Picture:
     def added(self, transforms: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits,
               arrays: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
         """What drawing some shapes adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
+        if not silhouette.shape == fixed.shape == (shape := self.empty().shape):  # the kernel would write past their ends
+            raise ShadowPuppetError(f"masks of {silhouette.shape} and {fixed.shape} words x rows, expected the camera's {shape}")
         corners, counts = self.polygons(transforms, which, arrays)
         out = np.empty((len(transforms), 2), np.int64)
         _added(corners, counts, self.camera.size[0], silhouette, fixed, out)
@@ -346,7 +351,7 @@ def _added(corners, counts, width, silhouette, fixed, out):  # pragma: no cover
             drawn, kept, seen = scratch[c, R0:R1], fixed[c, R0:R1], silhouette[c, R0:R1]
             for r in range(drawn.size):
                 v = drawn[r] & ~kept[r]
-                total += _popcount(v)
-                inside += _popcount(v & seen[r])
+                total += _popcount(v)  # pyright: ignore[reportCallIssue]
+                inside += _popcount(v & seen[r])  # pyright: ignore[reportCallIssue]
             drawn[:] = 0
         out[n, 0], out[n, 1] = total, inside
