@@ -53,7 +53,9 @@ class PartialCost:
     def __init__(self, picture: Picture, dofs: NDArray[np.int64], hidden: Iterable[str] = ()) -> None:
         """`dofs`: indices of the DOF that vary; `hidden`: parts that are not drawn at all."""
         body, skeleton, hidden = picture.body, picture.body.skeleton, set(hidden)
-        owners = {skeleton.dofs[d].joint for d in dofs}
+        names = {skeleton.dofs[d].name for d in dofs}
+        owners = {dof.joint for dof in skeleton.dofs if dof.name in names}
+        owners |= {coupling.joint for coupling in skeleton.couplings if coupling.dof in names}
         moved: set[str] = set()
         for joint in skeleton.joints:  # parents come first, so that one pass finds all that hangs on a moved joint
             if joint.name in owners or joint.parent in moved:
