@@ -15,6 +15,8 @@ from shadowpuppet.settings import MonocularSettings
 
 PARTS = {"torso": "torso_", "left_arm": "left_", "right_arm": "right_"}
 """Parts that a stage can name, and how the names of their DOF begin."""
+HELD = {"torso": ("left_shoulder", "right_shoulder"), "left_arm": ("left_elbow", "left_hand"), "right_arm": ("right_elbow", "right_hand")}
+"""Points of each part that the motion's pull holds."""
 WANDER = 0.3
 """Deviation of the torso's angles, rad, where a stage explores; an explored arm is a coarse one give or take 0.2 rad."""
 
@@ -24,7 +26,8 @@ class FilterStage:
 
     def __init__(self, picture: Picture, settings: MonocularSettings, name: str) -> None:
         """`name`: parts joined by +. Raises `SettingsError` for a part that there is not."""
-        self.picture, self.settings, self.parts = picture, settings, tuple(part.strip() for part in name.split("+"))
+        self.picture, self.settings = picture, settings
+        self.parts = tuple(dict.fromkeys(part.strip() for part in name.split("+")))
         unknown = [part for part in self.parts if part not in PARTS]
         if unknown:
             raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(PARTS)}")
@@ -38,13 +41,12 @@ class FilterStage:
         of = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}
         self.number = sum(part.particles for part in of.values())
         self.resample: Scheme = make_scheme(settings.resampling, of[self.parts[0]].survival)
-        kinds = [skeleton.dofs[d].kind for d in self.dofs]
-        self.sigma = np.array([of[owner[d]].sigma_rotation if kind == "rotation" else of[owner[d]].sigma_translation
-                               for d, kind in zip(self.dofs.tolist(), kinds, strict=True)])
+        self.turns = np.array([skeleton.dofs[d].kind == "rotation" for d in self.dofs])
+        self.sigma = np.array([of[owner[d]].sigma_rotation if turn else of[owner[d]].sigma_translation
+                               for d, turn in zip(self.dofs.tolist(), self.turns, strict=True)])
         self.scale = picture.camera.size[0] * picture.camera.size[1] / (320 * 240)  # settings in pixels are for 320 x 240
         self.sigma_cost = of[self.parts[0]].sigma_cost * self.scale
-        self.followed = [name for name in picture.body.landmarks if name.endswith(("_shoulder",) if self.moves_torso else ("_elbow", "_hand"))
-                         and (self.moves_torso or f"{name.split('_')[0]}_arm" in self.parts)]
+        self.held = [name for part in self.parts for name in HELD[part]]
 
     def clamp(self, values: Array) -> Array:
         """Values (N, d) within the joint limits, if these are kept."""
@@ -71,9 +73,8 @@ class FilterStage:
     def explore(self, rng: np.random.Generator, best: Array, number: int) -> Array:
         """Values (number, d) from all over: what the noise of one frame cannot reach from `best` (d,)."""
         if self.moves_torso:
-            turns = self.sigma == self.settings.torso.sigma_rotation
-            spread = np.where(turns, WANDER, 5 * self.settings.torso.sigma_translation)
-            return np.where(turns, 0.0, best) + rng.standard_normal((number, len(best))) * spread
+            spread = np.where(self.turns, WANDER, 5 * self.settings.torso.sigma_translation)
+            return np.where(self.turns, 0.0, best) + rng.standard_normal((number, len(best))) * spread
         arms = coarse_arms()
         return arms[rng.integers(len(arms), size=number)] + 0.2 * rng.standard_normal((number, len(best)))
 
@@ -104,5 +105,5 @@ class FilterStage:
         return normalise(-particles.costs / (20 * self.scale)) @ particles.poses
 
     def _places(self, poses: Array) -> Array:
-        """Where the points (N, P, 3) are that the motion's pull holds: shoulders of the torso, elbow and hand of an arm."""
-        return self.picture.points(poses, self.followed)
+        """Where the points (N, P, 3) are that the motion's pull holds, metres."""
+        return self.picture.points(poses, self.held)
