@@ -1,0 +1,72 @@
+"""Markerless motion capture from silhouettes: a jointed puppet is fitted to a person's shadow, on a CPU, with no neural network.
+
+Everything here is loaded when it is first used, so that `import shadowpuppet` takes no time.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shadowpuppet.body import CardboxSizes
+    from shadowpuppet.camera import Camera
+    from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+    from shadowpuppet.initialization import find_person, fit_references
+    from shadowpuppet.io.calibration import read_calibration, write_calibration
+    from shadowpuppet.io.joints import read_joints, write_joints
+    from shadowpuppet.io.person import Person, read_person, write_person
+    from shadowpuppet.io.recording import Recording, read_recording
+    from shadowpuppet.io.run import Run, read_run
+    from shadowpuppet.look import Look
+    from shadowpuppet.metrics import evaluate
+    from shadowpuppet.motion import JointTable, Motion
+    from shadowpuppet.options import Options, make_options
+    from shadowpuppet.pipeline import Listener, look_at, track_recording
+    from shadowpuppet.rasterize import Picture
+    from shadowpuppet.settings import MonocularSettings, make_settings
+    from shadowpuppet.silhouette import SilhouetteSettings, learn_background
+    from shadowpuppet.synthetic import synthesize
+    from shadowpuppet.tracking import MonocularTracker
+    from shadowpuppet.video import open_frames, write_frames
+
+    __version__: str
+
+_HOMES = {
+    "CardboxSizes": "body", "Camera": "camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
+    "find_person": "initialization", "fit_references": "initialization", "read_calibration": "io.calibration",
+    "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints", "Person": "io.person",
+    "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",
+    "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "metrics", "JointTable": "motion", "Motion": "motion",
+    "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
+    "Picture": "rasterize", "MonocularSettings": "settings", "make_settings": "settings", "SilhouetteSettings": "silhouette",
+    "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video",
+    "write_frames": "video",
+}  # fmt: skip
+"""Where each public name lives."""
+
+__all__ = [  # noqa: RUF022 - loaded by __getattr__
+    "CardboxSizes", "Camera", "JointTable", "Listener", "Look", "MonocularSettings", "MonocularTracker", "Motion", "Options", "Person",
+    "Picture", "Recording", "Run", "ShadowPuppetError", "ShadowPuppetWarning", "SilhouetteSettings", "__version__", "evaluate",
+    "find_person", "fit_references", "learn_background", "look_at", "make_options", "make_settings", "open_frames",
+    "read_calibration", "read_joints", "read_person", "read_recording", "read_run", "synthesize", "track_recording",
+    "write_calibration", "write_frames", "write_joints", "write_person",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name's home (PEP 562)."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("shadowpuppet")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'shadowpuppet' has no attribute {name!r}")
+    value = getattr(import_module(f"shadowpuppet.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """All public names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,184 @@
+"""The command line: parse, call one function, show."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+from cyclopts import App, CycloptsError, Parameter
+
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.flags import OTHER, RUN, DemoFlags, Flags, LookFlags, options_from
+
+MISTAKE, INTERRUPTED = 2, 130
+"""Exit codes: what the user gave cannot be used; Ctrl-C."""
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("shadowpuppet")
+
+
+app = App(name="shadowpuppet", version=_version, help_format="plaintext", help="Markerless motion capture from silhouettes.")
+Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it, or an earlier "
+                                                            "run's run.toml. Flags go before it.")]
+Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]
+AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
+Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
+All = Annotated[Flags | None, Parameter(name="*")]
+ForLook = Annotated[LookFlags | None, Parameter(name="*")]
+ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
+
+
+def output(help: str) -> Parameter:
+    """The flag -o."""
+    return Parameter(name=["--output", "-o"], group=RUN, help=help)
+
+
+@app.command
+def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
+          config: Config = None, quiet: Quiet = False, flags: All = None) -> None:
+    """Track a person: from video to joints.csv, angles.csv, motion.npz, run.toml and metrics.json.
+
+    First prints what it found, as `info` does.
+    More settings are listed by `shadowpuppet settings`; each is a flag, such as --tracker.arm.particles 300.
+    """
+    from shadowpuppet.pipeline import track_recording
+    from shadowpuppet.terminal import terminal
+
+    options = options_from(flags, config)
+    folder = folder or Path(f"run-{recording.resolve().stem}")
+    with terminal(quiet, folder) as shown:
+        summary = track_recording(recording, folder, options, shown)
+    if not quiet:
+        _show_run(folder, summary.metrics)
+
+
+@app.command
+def info(recording: Recording, /, *, config: Config = None, as_json: AsJson = False, flags: ForLook = None) -> None:
+    """Look at a recording, as `track` does before it begins: cameras, scale, background, silhouettes, the person."""
+    from shadowpuppet.pipeline import look_at
+    from shadowpuppet.terminal import show_json, terminal
+
+    with terminal(quiet=as_json) as shown:
+        shown.begin("looking")
+        look = look_at(recording, options_from(flags, config))
+        shown.look(look)
+    if as_json:
+        show_json(look)
+    if look.refusal:
+        raise ShadowPuppetError(f"{recording}: {look.refusal}")
+
+
+@app.command
+def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0, as_json: AsJson = False) -> None:
+    """Measure a run: joint errors against a truth, overlap, cost, jitter.
+
+    Parameters
+    ----------
+    run
+        Folder that `track` made.
+    truth
+        Joints (.csv or .trc) to compare with. [default: the recording's truth]
+    joints
+        Those compared, separated by commas. [default: shoulders, elbows and hands]
+    start
+        First frame of the truth that counts.
+    """
+    from shadowpuppet.evaluation import evaluate_run
+    from shadowpuppet.tables import error_table, measures_table
+    from shadowpuppet.terminal import show, show_json, terminal
+
+    with terminal():
+        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start)
+    if as_json:
+        show_json(metrics)
+    else:
+        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []))
+
+
+@app.command
+def demo(*, folder: Annotated[Path, output("Folder that gets recording/ and run/.")] = Path("shadowpuppet-demo"),
+         config: Config = None, quiet: Quiet = False, flags: ForDemo = None) -> None:
+    """Make a sample recording with known truth, track it, and name the pictures to open. Needs no data and no network."""
+    from dataclasses import replace
+
+    from shadowpuppet.demo import run_demo
+    from shadowpuppet.terminal import terminal
+
+    options = replace(options_from(flags, config), overlay=True)
+    with terminal(quiet, folder / "run") as shown:
+        summary = run_demo(folder, options, shown)
+    if not quiet:
+        _show_run(folder / "run", summary.metrics, "overlay.png")
+
+
+@app.command(name="fit-person")
+def measure_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
+                   config: Config = None, flags: ForLook = None) -> None:
+    """Measure a person once, from reference pictures or the film; `track --person` uses the sizes again."""
+    from shadowpuppet.pipeline import fit_person
+    from shadowpuppet.tables import curves_table, fit_table, sizes_table
+    from shadowpuppet.terminal import show, terminal
+
+    with terminal() as shown:
+        shown.begin("looking")
+        found, look = fit_person(recording, file, options_from(flags, config))
+        shown.doubt(look)
+    show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
+
+
+@app.command
+def settings(*, preset: str = "default") -> None:
+    """Print every setting with its explanation: a file for --config, and the names of the flags.
+
+    Parameters
+    ----------
+    preset
+        Settings to begin with: default or liu2011.
+    """
+    from shadowpuppet.options import make_options, options_text
+
+    print("# Settings of `shadowpuppet track`; a setting particles in the table [tracker.arm] is the flag --tracker.arm.particles.\n")
+    print(options_text(make_options({"preset": preset})))
+
+
+def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
+    """What came out, and where it lies."""
+    from shadowpuppet.tables import error_table, measures_table, pairs
+    from shadowpuppet.terminal import show
+
+    stages = ", ".join(f"{stage} {value:.1f}" for stage, value in metrics["ms_per_frame"].items())
+    names = [*pictures, *(name for name in ("overlay.mp4", "joints.csv", "angles.csv") if (folder / name).exists())]
+    errors = [error_table(metrics["errors"])] if "errors" in metrics else []
+    show(measures_table(metrics), *errors, pairs([("speed", f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"),
+                                                 ("made", "\n".join(str(folder / name) for name in names))]))
+
+
+def main(tokens: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit: 0, or 2 for a user's mistake, or 130 after Ctrl-C."""
+    sys.exit(run(tokens))
+
+
+def run(tokens: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    try:
+        app(list(tokens) if tokens is not None else None, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+    except (ShadowPuppetError, CycloptsError) as error:
+        return _fail(error)
+    except KeyboardInterrupt as interrupt:
+        print(f"interrupted{': ' if interrupt.args else ''}{' '.join(map(str, interrupt.args))}", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # as of `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def _fail(error: Exception) -> int:
+    print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+    return MISTAKE

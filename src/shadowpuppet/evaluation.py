@@ -1,0 +1,42 @@
+"""A run measured after it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from warnings import warn
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.run import read_run
+from shadowpuppet.metrics import evaluate
+
+
+def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Sequence[str] | None = None,
+                 start: int = 0) -> dict[str, Any]:
+    """`metrics.evaluate` of a run folder, against `truth` or that of its recording, where there is one.
+
+    `joints`: those compared; `start`: the truth's first frame that counts. Plane and depth are those of the run's camera.
+    Raises `FormatError` or `ShadowPuppetError` for files that cannot be used.
+    """
+    run = read_run(folder)
+    table = truth if truth is not None else _known_truth(run.info.get("truth"))
+    reference = None if table is None else read_joints(table)
+    measured = evaluate(run.motion, reference, joints, camera=_camera(run.folder), start=start)
+    return {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete, **measured}
+
+
+def _known_truth(path: object) -> str | None:
+    if isinstance(path, str) and not Path(path).exists():
+        warn(f"{path}: the recording's truth is not there any more; give it as TRUTH", ShadowPuppetWarning, stacklevel=3)
+        return None
+    return path if isinstance(path, str) else None
+
+
+def _camera(folder: Path) -> Camera | None:
+    """The run's camera; None, which is taken for level, where it is not known."""
+    path = folder / "calibration.toml"
+    return read_calibration(path)[0] if path.exists() else None

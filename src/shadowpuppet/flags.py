@@ -1,0 +1,85 @@
+"""Every option as a flag of the command line, made from the one place where it is documented."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, make_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+
+from cyclopts import Group, Parameter
+from pydantic import BeforeValidator
+
+from shadowpuppet.options import PATHS, Options, default_of, make_options, read_options, settings_of
+
+RUN, PERSON, PICTURES, OTHER = (Group(title, sort_key=n) for n, title in enumerate(("Run", "Person", "Pictures", "Other")))
+"""Headings of `--help`."""
+GROUPS = {
+    **dict.fromkeys(("preset", "seed", "overlay"), RUN),
+    **dict.fromkeys(("height", "distance", "person"), PERSON),
+    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size"), PICTURES),
+}
+HIDDEN = Parameter(show=False)
+"""Flags of the tables: many, and shown by `shadowpuppet settings`."""
+
+
+def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True) -> type:
+    """A dataclass with the settings of `kind`, all None as long as no flag is given; tables become dotted flags."""
+    made = []
+    for field, hint, told in settings_of(kind):
+        if field.name in without:
+            continue
+        if isinstance(hint, type) and is_dataclass(hint):
+            made.append((field.name, Annotated[flags_of(hint, shown=False) | None, HIDDEN], None))
+        else:
+            made.append((field.name, Annotated[_typed(hint) | None, _parameter(field, told, shown)], None))
+    # cyclopts takes classes of the standard library, as which it would see this one, for single values.
+    return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
+
+
+def given(flags: Any) -> dict[str, Any]:
+    """What flags said, as plain values."""
+    values = {f.name: getattr(flags, f.name) for f in fields(flags)} if flags is not None else {}
+    tables = {key: given(value) if is_dataclass(value) else value for key, value in values.items()}
+    return {key: str(value) if isinstance(value, Path) else value for key, value in tables.items() if value is not None}
+
+
+def options_from(flags: Any, config: Path | None) -> Options:
+    """Options from flags over a file over the defaults. Raises `SettingsError`."""
+    read = read_options(config) if config is not None else {}
+    make_options(read, str(config))  # so that what is wrong in the file is said with its name
+    return make_options(_over(read, given(flags)), "flags")
+
+
+def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    both = {key: _over(below[key], value) for key, value in above.items() if isinstance(value, Mapping) and key in below}
+    return {**below, **above, **both}
+
+
+def _typed(hint: Any) -> Any:
+    """The type that a flag has: what can be told in one word is text."""
+    metadata = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    if any(isinstance(item, BeforeValidator) for item in metadata) or any(_is_split(part) for part in get_args(hint)):
+        return str
+    return hint
+
+
+def _is_split(hint: Any) -> bool:
+    return get_origin(hint) is Annotated and any(isinstance(item, BeforeValidator) for item in get_args(hint)[1:])
+
+
+def _parameter(field: Any, told: str, shown: bool) -> Parameter:
+    default = default_of(field)
+    end = "" if default is None or isinstance(default, bool) else f" [default: {default}]"
+    return Parameter(help=told + end, show=shown, group=GROUPS.get(field.name), show_choices=False)
+
+
+if TYPE_CHECKING:
+    Flags = LookFlags = DemoFlags = Any
+else:
+    Flags = flags_of(Options)
+    """All of `Options`."""
+    LookFlags = flags_of(Options, without=("overlay",))
+    """Those that matter where nothing is tracked."""
+    DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
+    """Those that matter where the recording is known."""

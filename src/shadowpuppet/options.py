@@ -1,0 +1,159 @@
+"""All that can be set about a run, from flags and files."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import Field as DataclassField
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+from pydantic import BeforeValidator, Field
+from pydantic.dataclasses import dataclass
+
+from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.io.calibration import read_toml
+from shadowpuppet.settings import STRICT, InitializationSettings, MonocularSettings, make_settings, validate
+from shadowpuppet.silhouette.settings import SilhouetteSettings
+
+TABLES = ("tracker", "silhouette", "initialization")
+"""Options that are tables of settings."""
+PATHS = ("calibration", "background", "person")
+"""Options that are files; in a file of settings they are relative to it."""
+
+
+def _corners(value: object) -> object:
+    value = value.split(",") if isinstance(value, str) else value
+    if isinstance(value, (list, tuple)) and len(value) != 4:
+        raise ValueError(f"expected four numbers x0,y0,x1,y1, found {len(value)}")
+    return value
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class Options:
+    """What a run can be told; each is a flag of the command line and a line of TOML."""
+
+    preset: str = "default"
+    """Settings of the tracker to begin with: default (the best we know) or liu2011 (the paper's)."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of all randomness: the same seed gives the same run."""
+    height: Annotated[float, Field(ge=0.5, le=2.5)] | None = None
+    """Height of the person, metres, shoes on. Replaces what recording.toml says."""
+    distance: Annotated[float, Field(ge=0.2, le=30)] | None = None
+    """Distance from the camera to the middle of the body at the start, metres. Replaces what recording.toml says."""
+    person: Path | None = None
+    """Sizes of the person, as an earlier run or `fit-person` saved them (person.toml)."""
+    fov: Annotated[float, Field(gt=0, lt=180)] | None = None
+    """Horizontal field of view, degrees, of a camera without calibration."""
+    calibration: Path | None = None
+    """Calibration in place of the recording's own."""
+    camera: str | None = None
+    """The camera whose film is tracked, where the recording has several."""
+    background: Path | None = None
+    """Picture or film of the empty scene in place of the recording's own."""
+    masks: bool = False
+    """Take the recording's ready silhouettes (masks/) instead of making them."""
+    region: Annotated[tuple[int, int, int, int], BeforeValidator(_corners)] | None = None
+    """Region of interest x0,y0,x1,y1, pixels of the film: what is outside counts as background."""
+    max_size: Annotated[int, Field(ge=64, le=8192)] = 640
+    """Pixels that the longer side of a frame may have; larger frames are scaled down."""
+    overlay: bool = False
+    """Write overlay.mp4 too: model, matching result and raw picture, one below the other."""
+    tracker: MonocularSettings = MonocularSettings()
+    """The tracker."""
+    silhouette: SilhouetteSettings = SilhouetteSettings()
+    """How the person is told from the background."""
+    initialization: InitializationSettings = InitializationSettings()
+    """How the person's sizes are found."""
+
+
+def make_options(values: Mapping[str, Any] | None = None, source: str = "settings") -> Options:
+    """Options from plain values, as TOML has them; tables may be given in part, on top of the preset.
+
+    Raises `SettingsError` for an unknown name or an impossible value, with what is possible.
+    """
+    values = dict(values or {})
+    for table in TABLES:
+        if not isinstance(values.get(table, {}), Mapping):
+            raise SettingsError(f"{source}: {table}: found {values[table]!r}, expected a table [{table}]")
+    preset = values.get("preset", "default")
+    if not isinstance(preset, str):
+        raise SettingsError(f"{source}: preset: found {preset!r}, expected a name in quotes")
+    values["tracker"] = make_settings(preset, values.get("tracker", {}), f"{source}: tracker")
+    return validate(Options, values, source)
+
+
+def read_options(path: str | Path) -> dict[str, Any]:
+    """Plain values from a TOML file of settings, or from the run.toml of an earlier run. Raises `SettingsError`."""
+    path = Path(path)
+    data = read_toml(path, SettingsError)
+    if isinstance(data.get("settings"), dict) and "versions" in data:
+        data = data["settings"]
+    unknown = set(data) - {f.name for f in fields(Options)}
+    if unknown:
+        raise SettingsError(f"{path}: unknown setting {min(unknown)!r}; there are: {choices(f.name for f in fields(Options))}")
+    return data | {key: str(path.parent / data[key]) for key in PATHS if isinstance(data.get(key), str)}
+
+
+def plain_options(options: Options) -> dict[str, Any]:
+    """Options as `make_options` and TOML take them; what is not set is left out, and files are told by their whole path."""
+    values = {key: value for key, value in _plain(options).items() if value is not None}
+    return values | {key: str(Path(values[key]).resolve()) for key in PATHS if key in values}
+
+
+def options_text(options: Options) -> str:
+    """Every option with its explanation, as a TOML file of settings."""
+    return "\n".join(_lines(options, ""))
+
+
+def settings_of(kind: type) -> Iterator[tuple[DataclassField, Any, str]]:
+    """Every setting of a settings class: its field, its type, and what its docstring says."""
+    hints, told = get_type_hints(kind, include_extras=True), _docstrings(kind)
+    for field in fields(kind):
+        yield field, hints[field.name], told.get(field.name, "")
+
+
+def default_of(field: DataclassField) -> Any:
+    """What a setting is when it is left out; pydantic wraps some defaults."""
+    default = getattr(field.default, "default", field.default)
+    return field.default_factory() if default is MISSING and field.default_factory is not MISSING else default
+
+
+def _docstrings(kind: type) -> dict[str, str]:
+    """What is written under each field of a class."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    assert isinstance(tree, ast.ClassDef)
+    told = {}
+    for field, below in zip(tree.body, tree.body[1:]):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
+            told[field.target.id] = " ".join(str(ast.literal_eval(below.value)).split())
+    return told
+
+
+def _plain(value: Any) -> Any:
+    return {f.name: _plain(getattr(value, f.name)) for f in fields(value)} if is_dataclass(value) else value
+
+
+def _lines(settings: Any, title: str) -> Iterator[str]:
+    import tomli_w
+
+    inner = []
+    for field, _, told in settings_of(type(settings)):
+        value = getattr(settings, field.name)
+        if is_dataclass(value):
+            inner.append((field.name, value, told))
+            continue
+        yield from textwrap.wrap(told, 100, initial_indent="# ", subsequent_indent="# ")
+        if value is None:
+            yield f"# {field.name} ="
+        else:
+            text = tomli_w.dumps({field.name: list(value) if isinstance(value, tuple) else value})
+            yield re.sub(r"\n\s*|,\n", " ", text.rstrip()).replace(", ]", "]").replace("[ ", "[")
+    for name, value, told in inner:
+        place = f"{title}.{name}" if title else name
+        yield from ("", f"# {told}", f"[{place}]")
+        yield from _lines(value, place)

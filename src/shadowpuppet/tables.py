@@ -1,0 +1,152 @@
+"""What the command line shows: looks, errors, sizes, in words and tables of 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from shadowpuppet.body import CardboxSizes
+from shadowpuppet.fitting import Found
+from shadowpuppet.look import Look
+from shadowpuppet.metrics import FAR
+
+BARS = "▁▂▃▄▅▆▇█"
+
+
+def look_table(look: Look) -> RenderableType:
+    """What was found before the run."""
+    said = [("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
+            ("background", look.background), *([("key", look.key)] if look.key != "none" else []), ("silhouettes", _areas(look))]
+    if look.exact_overlap is not None:
+        said.append(("exact masks", _exact(look)))
+    if look.refusal is None:
+        said.append(("quality", _quality(look)))
+    if look.person is not None:
+        said.append(("person", _person(look.person)))
+    return pairs(said)
+
+
+def pairs(rows: Iterable[tuple[str, str]]) -> RenderableType:
+    """Names beside what they are."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(Text(name), Text(value))
+    return table
+
+
+def error_table(errors: Mapping[str, Any]) -> RenderableType:
+    """Joint errors, a row a joint."""
+    table = _table("joint errors, mm", ("joint", "mean", "rmse", "plane", "depth", "p95", "max", f"over {1000 * FAR:.0f}"))
+    rows = [*errors["joints"].items(), ("all", errors)]
+    keys = ("mean_mm", "rmse_mm", "plane_mm", "depth_mm", "p95_mm", "max_mm")
+    for name, row in rows:
+        if name == "all":
+            table.add_section()
+        table.add_row(name, *(f"{row[key]:.1f}" for key in keys), f"{100 * row['far']:.1f} %")
+    return table
+
+
+def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
+    """What is known without a truth, and beside it."""
+    fit, cost = metrics["overlap"], metrics["cost_px"]
+    frames = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
+    rows = [("frames", f"{metrics['frames']}: {frames}" if frames else "none")]
+    if fit["count"]:
+        rows.append(("overlap", f"{fit['mean']:.3f} (5 % of frames under {fit['p5']:.3f})"))
+    if cost["count"]:
+        rows.append(("cost", f"{cost['mean']:.0f} pixels (5 % of frames over {cost['p95']:.0f})"))
+    truth = metrics.get("truth_jitter_m_s2")
+    rows.append(("jitter", f"{_number(metrics['jitter_m_s2'])} m/s2" + (f", the truth's {_number(truth)}" if truth is not None else "")))
+    errors = metrics.get("errors")
+    if errors:
+        rows.append(("error", f"{errors['mean_mm']:.1f} mm (plane {errors['plane_mm']:.1f}, depth {errors['depth_mm']:.1f}); aligned "
+                              f"{errors['aligned_mean_mm']:.1f} mm; {100 * errors['far']:.1f} % off by over {1000 * FAR:.0f} mm"))
+        rows += [("lost", f"{errors['lost']} of {errors['frames']} frames count as far off")] if errors["lost"] else []
+    return pairs(rows)
+
+
+def sizes_table(sizes: CardboxSizes) -> RenderableType:
+    """The 18 sizes a1..a18."""
+    table = _table("sizes, mm", ("", "size", "mm", "", "size", "mm"), right=(2, 5))
+    rows = [(f"a{n}", name, f"{1000 * value:.0f}") for n, (name, value) in enumerate(zip(sizes.names(), sizes.to_array()), 1)]
+    half = (len(rows) + 1) // 2
+    for i in range(half):
+        table.add_row(*rows[i], *(rows[half + i] if half + i < len(rows) else ("", "", "")))
+    return table
+
+
+def curves_table(curves: Mapping[str, Sequence[float]]) -> RenderableType:
+    """Cost over the rounds of Algorithm 1, a line a subset."""
+    table = _table("cost by round, pixels", ("sizes", "rounds", "first", "last", "curve"), right=(1, 2, 3))
+    for name, curve in curves.items():
+        table.add_row(name, str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
+    return table
+
+
+def fit_table(found: Found, saved: Path) -> RenderableType:
+    """How well sizes fit, and where they were saved."""
+    overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
+    return pairs([("overlap", f"{overlaps}; film {found.start:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"),
+                  ("source", found.source), ("saved", str(saved))])
+
+
+def sparkline(values: Sequence[float], width: int = 30) -> str:
+    """Numbers as a line of bars."""
+    chosen = np.asarray(values, float)[np.unique(np.linspace(0, len(values) - 1, width).astype(int))]
+    span = float(np.ptp(chosen)) or 1.0
+    return "".join(BARS[int((value - chosen.min()) / span * (len(BARS) - 1))] for value in chosen)
+
+
+def _table(title: str, columns: Sequence[str], right: Sequence[int] | None = None) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0), header_style="dim")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if (i in right if right is not None else i) else "left", no_wrap=True)
+    return table
+
+
+def _camera(look: Look) -> str:
+    scaled = "" if look.worked_size == look.size else f", scaled to {look.worked_size[0]} x {look.worked_size[1]}"
+    how = "calibrated" if look.calibrated else "not calibrated"
+    return f"{look.camera}, {look.size[0]} x {look.size[1]} pixels{scaled}, {look.fov:.0f} degrees wide, {how}"
+
+
+def _film(look: Look) -> str:
+    count = f"{look.frames} frames" if look.frames else "frames not counted"
+    rate = f"{look.rate:.4g} frames/s" if np.isfinite(look.rate) else "rate unknown"
+    steady = f", times uneven by {1000 * look.jitter:.1f} ms" if look.jitter * look.rate > 0.01 else ""
+    return f"{count}, {rate}{steady}"
+
+
+def _areas(look: Look) -> str:
+    plain = f"; by the plain rule of eq. 1 {100 * look.plain_area:.1f} %" if look.plain_area is not None else ""
+    return f"{100 * look.area:.1f} % of the picture, in {look.quality.frames} frames{plain}"
+
+
+def _exact(look: Look) -> str:
+    plain = f"; those of the plain rule by {look.exact_overlap_plain:.3f}" if look.exact_overlap_plain is not None else ""
+    return f"these silhouettes overlap the ready ones by {look.exact_overlap:.3f}{plain}"
+
+
+def _quality(look: Look) -> str:
+    q = look.quality
+    sides = ", ".join(side for side, share in q.border.items() if share > 0.02) or "no side"
+    return (f"area changes by {100 * q.area_change:.1f} % a frame, {100 * q.flicker:.1f} % flickers; {q.specks:.1f} specks and "
+            f"{q.holes:.1f} holes a frame; touches {sides} of the picture")
+
+
+def _person(person: Mapping[str, Any]) -> str:
+    fits = ", ".join(f"{name} {value:.2f}" for name, value in person["overlaps"].items()) if person["source"] == "references" else ""
+    return (f"height {person['height']:.2f} m at {person['distance']:.2f} m; sizes from {person['source']}"
+            + (f" (overlap: {fits})" if fits else "") + f"; overlaps the film's first silhouette by {person['start_overlap']:.2f}")
+
+
+def _number(value: float) -> str:
+    return "unknown" if value is None or not np.isfinite(value) else f"{value:.2f}"

@@ -1,0 +1,107 @@
+"""What happens in a terminal while something runs: progress, warnings, and the look before the run."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+from rich.console import Console, RenderableType
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.look import Look
+from shadowpuppet.pipeline import Listener
+from shadowpuppet.tables import look_table
+
+
+class Terminal(Listener):
+    """Shows the look on standard output; progress and warnings on standard error, a line each."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        """`quiet`: nothing but warnings."""
+        self.quiet, self.frames = quiet, 0
+        self._console = Console(stderr=True, highlight=False)
+        self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TextColumn("{task.fields[speed]}"),
+                                  TimeRemainingColumn(), console=self._console, transient=True,
+                                  disable=quiet or not self._console.is_terminal)
+        self._task: TaskID | None = None
+        self._said: set[str] = set()
+
+    def begin(self, what: str, total: int | None = None) -> None:
+        """Show what begins."""
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+        self._task = self._progress.add_task(what, total=total, speed="")
+        self._progress.start()
+
+    def advance(self, frames: int) -> None:
+        """Show how many frames are done, and how fast."""
+        self.frames = frames
+        if self._task is not None and not self._progress.disable:
+            speed = self._progress.tasks[-1].finished_speed or self._progress.tasks[-1].speed
+            self._progress.update(self._task, completed=frames, speed=f"{speed:.0f} frames/s" if speed else "")
+
+    def look(self, look: Look) -> None:
+        """Show what was found, and what is in doubt."""
+        if not self.quiet:
+            self._progress.stop()
+            show(look_table(look))
+        self.doubt(look)
+
+    def doubt(self, look: Look) -> None:
+        """Say what may harm a run."""
+        for doubt in look.doubts:
+            self.warn(doubt)
+
+    def warn(self, message: str) -> None:
+        """Say a warning, once, in one line."""
+        line = f"warning: {' '.join(message.split())}"
+        if line not in self._said:
+            self._said.add(line)
+            self._console.print(line, markup=False, soft_wrap=True)
+
+    def stop(self) -> None:
+        """Take the bar away."""
+        self._progress.stop()
+
+    def _show_warning(self, message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None,
+                      line: str | None = None) -> None:
+        where = "" if issubclass(category, ShadowPuppetWarning) else f"{category.__name__} in {Path(filename).name}:{lineno}: "
+        self.warn(where + str(message))
+
+
+@contextmanager
+def terminal(quiet: bool = False, folder: Path | None = None) -> Iterator[Terminal]:
+    """A terminal to be told things; `folder` is where an interrupted run can be found."""
+    shown = Terminal(quiet)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ShadowPuppetWarning)
+        warnings.showwarning = shown._show_warning
+        try:
+            yield shown
+        except KeyboardInterrupt:
+            kept = f"the {shown.frames} frames so far are in {folder}" if shown.frames and folder else "nothing was written"
+            raise KeyboardInterrupt(kept) from None
+        finally:
+            shown.stop()
+
+
+def show(*parts: RenderableType) -> None:
+    """Print tables to standard output, with an empty line between them."""
+    console = Console(file=sys.stdout, highlight=False)
+    for n, part in enumerate(parts):
+        with console.capture() as shown:
+            console.print(part)
+        lines = [line.rstrip() for line in shown.get().splitlines()]  # rich fills columns with blanks, which files need not keep
+        print("\n" * bool(n) + "\n".join(lines))
+
+
+def show_json(value: Any) -> None:
+    """Print a value as JSON."""
+    from shadowpuppet.pipeline import json_text
+
+    print(json_text(value))
