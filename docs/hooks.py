@@ -1,0 +1,115 @@
+"""What the documentation takes from the code when it is built, so that it cannot grow old.
+
+In a page, a line of its own is replaced:
+
+    <!-- settings: TABLE -->   a table of `Options` ([tracker.torso]), a row a setting; without TABLE those that are in none
+    <!-- help: COMMAND -->     what `shadowpuppet COMMAND --help` prints
+    <!-- presets -->           what each preset changes
+    <!-- example: FILE -->     the code of examples/FILE
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import types
+from collections.abc import Iterator
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import tomli_w
+
+from shadowpuppet.options import Options, settings_of
+from shadowpuppet.settings import PRESETS
+
+MARKER = re.compile(r"^<!-- (settings|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
+QUOTES = '"""'
+SIGNS = {"ge": "from", "gt": "over", "le": "to", "lt": "under"}
+WORDS = {bool: "true, false", int: "whole number", float: "number", str: "text"}
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Called by MkDocs for every page."""
+    return MARKER.sub(lambda found: MAKERS[found[1]](*(found[2] or "").split()), markdown)
+
+
+def settings_table(table: str = "") -> str:
+    """A row for each setting of a table of options, `tracker` or `tracker.torso`; the defaults are the default preset's."""
+    of = Options()
+    for name in table.split(".") if table else ():
+        of = getattr(of, name)
+    rows = ["| setting | default | possible | what it does |", "|---|---|---|---|"]
+    for field, kind, told in settings_of(type(of)):
+        default = getattr(of, field.name)
+        if is_dataclass(default):
+            place = f"{table}.{field.name}".lstrip(".")
+            rows.append(f"| [`[{place}]`](#{place.replace('.', '')}) | | | {told} |")
+        else:
+            cells = (f"`{field.name}`", "" if default is None else f"`{_plain(default)}`", _possible(kind), told)
+            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows)
+
+
+def help_text(*command: str) -> str:
+    """The help of a command, as a terminal of 100 columns shows it."""
+    environment = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+    shown = subprocess.run([sys.executable, "-m", "shadowpuppet", *command, "--help"], capture_output=True, text=True, env=environment)
+    if shown.returncode:
+        raise RuntimeError(f"shadowpuppet {' '.join(command)} --help: {shown.stderr}")
+    return "```text\n" + "\n".join(line.rstrip() for line in shown.stdout.strip("\n").splitlines()) + "\n```"
+
+
+def presets() -> str:
+    """What each preset changes, as TOML."""
+    parts = []
+    for name, values in PRESETS.items():
+        parts.append(f"**`{name}`**" + ("" if values else ": the defaults above."))
+        if values:
+            parts.append("```toml\n" + tomli_w.dumps({"tracker": values}).strip() + "\n```")
+    return "\n\n".join(parts)
+
+
+def example(name: str) -> str:
+    """An example's code, without what it says of itself."""
+    code = (Path(__file__).parents[1] / "examples" / name).read_text("utf-8")
+    return f"```python\n{code.split(QUOTES)[2].strip()}\n```"
+
+
+MAKERS = {"settings": settings_table, "help": help_text, "presets": presets, "example": example}
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_plain(item) for item in value) + "]"
+    return f'"{value}"' if isinstance(value, str) else _number(value) if isinstance(value, float) else str(value)
+
+
+def _number(value: float) -> str:
+    return str(int(value)) if value == int(value) else f"{value:g}"
+
+
+def _possible(kind: Any) -> str:
+    """The values that a type allows, in words."""
+    return ", ".join(dict.fromkeys(_words(kind)))
+
+
+def _words(kind: Any) -> Iterator[str]:
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        bounds = [f"{SIGNS[sign]} {_number(value)}" for item in arguments[1:] for bound in getattr(item, "metadata", ())
+                  for sign in SIGNS if (value := getattr(bound, sign, None)) is not None]
+        yield " ".join(bounds) or _possible(arguments[0])
+    elif origin is Literal:
+        yield from (f"`{_plain(value)}`" for value in arguments)
+    elif origin in (Union, types.UnionType):
+        for argument in arguments:
+            yield from () if argument is type(None) else _words(argument)
+    elif origin is tuple:
+        yield "list" if Ellipsis in arguments else f"{len(arguments)} numbers"
+    else:
+        yield WORDS.get(kind, "path" if getattr(kind, "__name__", "") == "Path" else str(getattr(kind, "__name__", kind)))

@@ -1,0 +1,44 @@
+"""Every example runs, on a small made recording, and the README's is one of them."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shadowpuppet.synthetic import Gesture, Scene, Spec, Viewpoint, synthesize
+
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+MADE = {"01": ["sample-run/joints.csv", "sample-run/overlay.mp4"], "02": ["one_picture.png"], "04": ["masks.mkv"]}
+"""Files that examples leave behind, by their numbers."""
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory) -> Path:
+    view, scene = Viewpoint(size=(160, 120)), Scene(empty_seconds=1)
+    spec = Spec(motion=(Gesture(motion="wave_hands", seconds=3),), cameras=(view,), scene=scene, rate=6)
+    return synthesize(spec, tmp_path_factory.mktemp("examples") / "recording", np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_run_and_say_something(example, recording, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(example), *([str(recording)] if "argv" in example.read_text("utf-8") else [])])
+    runpy.run_path(str(example), run_name="__main__")
+    assert capsys.readouterr().out.strip()
+    for name in MADE.get(example.name[:2], []):
+        assert (tmp_path / name).stat().st_size > 0
+
+
+def test_examples_are_numbered_and_each_says_what_it_shows():
+    assert [path.name[:2] for path in EXAMPLES] == [f"{n:02}" for n in range(1, len(EXAMPLES) + 1)]
+    assert all(path.read_text("utf-8").startswith('"""') and len(path.read_text("utf-8").splitlines()) <= 70 for path in EXAMPLES)
+
+
+def test_the_readme_shows_the_first_example():
+    code = EXAMPLES[0].read_text("utf-8").split('"""')[2].strip()
+    assert code in (ROOT / "README.md").read_text("utf-8")

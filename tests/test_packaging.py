@@ -1,0 +1,150 @@
+"""What the project's own files promise: light imports, documentation that is true to the code, versions that agree."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import shadowpuppet
+from shadowpuppet.options import Options, settings_of
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "src" / "shadowpuppet"
+HEAVY = ("numpy", "scipy", "numba", "cv2", "av", "pydantic", "cyclopts", "rich", "matplotlib")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+
+
+def loaded_after(code: str) -> set[str]:
+    """Modules that a new interpreter has loaded after some code."""
+    code = f"{code}\nimport sys, json; print(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+# Imports
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    assert not loaded_after("import shadowpuppet; dir(shadowpuppet); shadowpuppet.__version__") & set(HEAVY)
+
+
+def test_help_and_reading_files_load_no_compiler_codec_or_plots():
+    for code in ("from shadowpuppet.cli import app; app.help_print", "from shadowpuppet import read_run, read_recording, read_joints"):
+        assert not loaded_after(code) & {"numba", "cv2", "av", "matplotlib"}
+
+
+def test_tracking_loads_no_files_films_or_terminal():
+    loaded = loaded_after("import shadowpuppet.tracking, shadowpuppet.initialization")
+    assert not loaded & {"cv2", "av", "matplotlib", "rich", "cyclopts", "shadowpuppet.io", "shadowpuppet.video", "shadowpuppet.cli"}
+
+
+@pytest.mark.parametrize("name", shadowpuppet.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(shadowpuppet, name) is not None
+    assert name in dir(shadowpuppet)
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        _ = shadowpuppet.no_such_thing
+
+
+# Versions and files
+
+
+def test_versions_agree():
+    cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE)
+    assert cited is not None
+    assert cited[1] == PROJECT["version"] == shadowpuppet.__version__
+
+
+def test_the_licence_is_the_one_that_is_told():
+    assert PROJECT["license"] == "BSD-3-Clause"
+    assert (ROOT / "LICENSE").read_text("utf-8").startswith("BSD 3-Clause License")
+
+
+def test_changes_of_this_version_are_told():
+    assert "## [Unreleased]" in (ROOT / "CHANGELOG.md").read_text("utf-8")
+
+
+# Documentation
+
+
+def docs(name: str) -> str:
+    return (ROOT / "docs" / name).read_text("utf-8")
+
+
+def test_the_architecture_names_every_module():
+    modules = {path.name if path.is_dir() else path.stem for path in PACKAGE.iterdir() if not path.name.startswith(("_", "."))}
+    modules -= {"py.typed", "py"}
+    named = set(re.findall(r"`(\w+)(?:\.py|/)`", docs("architecture.md")))
+    assert modules - named == set()
+    assert {name for name in named if not (PACKAGE / name).is_dir() and not (PACKAGE / f"{name}.py").is_file()} <= OUTSIDE
+
+
+OUTSIDE = {"tests", "benchmarks", "examples", "docs", "conftest", "src"}
+
+
+def test_the_manual_documents_every_public_name():
+    told = {entry.rsplit(".", 1)[-1] for entry in re.findall(r"^::: (\S+)$", docs("api.md"), re.MULTILINE)}
+    assert set(shadowpuppet.__all__) - told - {"__version__"} == set()
+
+
+def test_every_setting_is_explained():
+    def unexplained(kind, place):
+        for field, _, told in settings_of(kind):
+            default = getattr(kind(), field.name)
+            if hasattr(default, "__dataclass_fields__"):
+                yield from unexplained(type(default), f"{place}{field.name}.")
+            elif not told.endswith((".", ").")):
+                yield place + field.name
+
+    assert list(unexplained(Options, "")) == []
+
+
+def test_every_table_of_settings_is_in_the_manual():
+    tables = {f"{table}{'.' + part if part else ''}" for table, parts in
+              (("tracker", ("", "torso", "arm")), ("silhouette", ("",)), ("initialization", ("",))) for part in parts}
+    assert tables <= set(re.findall(r"<!-- settings: (\S+) -->", docs("settings.md")))
+
+
+def said() -> str:
+    """All text in the code, each f-string's with … for what is filled in."""
+    parts = []
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                parts.append("".join(str(v.value) if isinstance(v, ast.Constant) else "…" for v in node.values))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                parts.append(node.value)
+    return "\n".join(parts)
+
+
+def test_the_messages_that_the_manual_explains_are_those_of_the_code():
+    messages, text = re.findall(r"^\| \*(.+?)\* \|", docs("troubleshooting.md"), re.MULTILINE), said()
+    assert len(messages) > 20
+    missing = [message for message in messages if not all(part.strip() in text for part in message.split("…"))]
+    assert missing == []
+
+
+def test_every_command_is_in_the_manual():
+    from shadowpuppet.cli import app
+
+    commands = {name for name in app if not name.startswith("-")}
+    assert commands == set(re.findall(r"<!-- help: (\S+) -->", docs("commands.md")))
+
+
+def test_nothing_tells_of_this_machine():
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    if not tracked:
+        pytest.skip("not a checkout")
+    texts = {name: (ROOT / name).read_text("utf-8") for name in tracked if not name.endswith(".png") and (ROOT / name).exists()}
+    machine = re.compile("/" + r"(work|root|home|Users)/\w|index" + "-url")
+    assert [name for name, text in texts.items() if machine.search(text)] == []
