@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numba
 import numpy as np
-from numba.core import types
+from numba.core import config, types
 from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,12 +21,9 @@ from shadowpuppet.body import Body, Quads
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
+from shadowpuppet.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
 
-_DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
-"""Directions in which a hull's outline is taken: the corners of its polygon."""
 Bits = NDArray[np.uint64]
-NEAR = 0.05
-"""What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
 SNAP = 1e-9
 """An edge this near (pixels) to a pixel's centre goes through it: rounding must not decide which of two neighbours gets the pixel."""
 
@@ -59,6 +58,10 @@ class Picture:
     T_camera_base: Array
     """The body's frame in the camera's, of shape (4, 4), metres."""
 
+    @cached_property
+    def _lens(self) -> Lens:
+        return make_lens(self.camera)
+
     def transforms(self, poses: Array) -> Array:
         """Joint transforms (N, J, 3, 4) into the camera's frame, of poses (N, D)."""
         return self.body.skeleton.forward(poses, self.T_camera_base)
@@ -69,16 +72,16 @@ class Picture:
 
         `arrays` are those of `Body.shapes`, each with a leading axis N, for poses of bodies of different sizes.
         """
-        shapes, K, k, fisheye = self.body.shapes, self.camera.matrix, self.camera.distortion, self.camera.fisheye
+        shapes = self.body.shapes
         arrays = tuple(array[None] for array in shapes.arrays) if arrays is None else arrays
-        corners = np.empty((len(transforms), len(which), 5 if isinstance(shapes, Quads) else len(_DIRECTIONS), 2))
+        corners = np.empty((len(transforms), len(which), 5 if isinstance(shapes, Quads) else len(DIRECTIONS), 2))
         counts = np.empty((len(transforms), len(which)), np.int64)
         if isinstance(shapes, Quads):
             (quads,), joints = arrays, shapes.joints[:, 0].copy()
-            _project_quads(transforms, quads, joints, which, K, k, fisheye, NEAR, corners, counts)
+            project_quads(transforms, quads, joints, which, self._lens, corners, counts)
         else:
             centres, radii = arrays
-            _project_hulls(transforms, centres, radii, shapes.joints, which, K, k, fisheye, NEAR, _DIRECTIONS, corners, counts)
+            project_hulls(transforms, centres, radii, shapes.joints, which, self._lens, DIRECTIONS, corners, counts)
         return corners, counts
 
     def points(self, poses: Array, names: Iterable[str] | None = None) -> Array:
@@ -158,7 +161,7 @@ def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]
 
 
 @intrinsic
-def _popcount(typingctx, word):  # pragma: no cover
+def _ctpop(typingctx, word):  # pragma: no cover
     """Number of bits set in a 64-bit word: LLVM's ctpop, which vectorises."""
 
     def codegen(context, builder, signature, args):
@@ -167,111 +170,7 @@ def _popcount(typingctx, word):  # pragma: no cover
     return types.uint64(types.uint64), codegen
 
 
-@numba.njit(cache=True)
-def _project_quads(transforms, shapes, joints, which, K, k, fisheye, near, corners, counts):  # pragma: no cover
-    """Quads into the camera's frame, cut at the near plane, projected."""
-    P = np.empty((4, 3))
-    bent = fisheye or k.any()
-    for n in range(transforms.shape[0]):
-        shape = shapes[n if shapes.shape[0] > 1 else 0]
-        for i in range(which.size):
-            q = which[i]
-            T = transforms[n, joints[q]]
-            for v in range(4):
-                x, y, z = shape[q, v, 0], shape[q, v, 1], shape[q, v, 2]
-                P[v, 0] = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
-                P[v, 1] = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
-                P[v, 2] = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
-            out = corners[n, i]
-            m = 0
-            if min(P[0, 2], P[1, 2], P[2, 2], P[3, 2]) >= near:
-                for m in range(4):
-                    out[m, 0], out[m, 1] = P[m, 0] / P[m, 2], P[m, 1] / P[m, 2]
-                m = 4
-            else:
-                m = _clip(P, near, out)
-            for v in range(m):
-                x, y = out[v, 0], out[v, 1]
-                if bent:
-                    x, y = _bend(x, y, k, fisheye)
-                out[v, 0], out[v, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
-            counts[n, i] = m
-
-
-@numba.njit(cache=True)
-def _project_hulls(transforms, centres, radii, joints, which, K, k, fisheye, near, directions, corners, counts):  # pragma: no cover
-    """Outlines of hulls of ellipsoids: in each direction n the farthest point of any of the ellipses that the ellipsoids look like.
-
-    An ellipse of centre c and semi-axes s_i reaches c + sum s_i (s_i . n) / h in direction n, h = sqrt(sum (s_i . n)^2).
-    """
-    count = centres.shape[2]
-    c, axes = np.empty((count, 2)), np.empty((count, 3, 2))
-    bent = fisheye or k.any()
-    for n in range(transforms.shape[0]):
-        m = n if centres.shape[0] > 1 else 0
-        for i in range(which.size):
-            q = which[i]
-            ahead = False
-            for e in range(count):
-                T, p = transforms[n, joints[q, e]], centres[m, q, e]
-                x = T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2] + T[0, 3]
-                y = T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3]
-                z = T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3]
-                ahead |= z > near
-                z = max(z, near)
-                c[e, 0], c[e, 1] = x / z, y / z
-                for a in range(3):
-                    r = radii[m, q, e, a] / z
-                    axes[e, a, 0] = r * (T[0, a] - c[e, 0] * T[2, a])
-                    axes[e, a, 1] = r * (T[1, a] - c[e, 1] * T[2, a])
-            counts[n, i] = directions.shape[0] if ahead else 0
-            for d in range(directions.shape[0]):
-                u, v = directions[d, 0], directions[d, 1]
-                best, x, y = -np.inf, 0.0, 0.0
-                for e in range(count):
-                    s0 = axes[e, 0, 0] * u + axes[e, 0, 1] * v
-                    s1 = axes[e, 1, 0] * u + axes[e, 1, 1] * v
-                    s2 = axes[e, 2, 0] * u + axes[e, 2, 1] * v
-                    h = np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-                    value = c[e, 0] * u + c[e, 1] * v + h
-                    if value > best:
-                        best = value
-                        x = c[e, 0] + (axes[e, 0, 0] * s0 + axes[e, 1, 0] * s1 + axes[e, 2, 0] * s2) / h
-                        y = c[e, 1] + (axes[e, 0, 1] * s0 + axes[e, 1, 1] * s1 + axes[e, 2, 1] * s2) / h
-                if bent:
-                    x, y = _bend(x, y, k, fisheye)
-                corners[n, i, d, 0], corners[n, i, d, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
-
-
-@numba.njit(cache=True)
-def _clip(P, near, out):  # pragma: no cover
-    """Cut a quad (4, 3) at the near plane; x / z and y / z of the up to five corners left; returns their number."""
-    m = 0
-    for v in range(4):
-        w = (v + 1) & 3
-        if P[v, 2] >= near:
-            out[m, 0], out[m, 1] = P[v, 0] / P[v, 2], P[v, 1] / P[v, 2]
-            m += 1
-        if (P[v, 2] >= near) != (P[w, 2] >= near):
-            s = (near - P[v, 2]) / (P[w, 2] - P[v, 2])
-            for a in range(2):
-                out[m, a] = (P[v, a] + s * (P[w, a] - P[v, a])) / near
-            m += 1
-    return m
-
-
-@numba.njit(cache=True)
-def _bend(x, y, k, fisheye):  # pragma: no cover
-    """OpenCV's distortion. Straight edges between distorted corners stay straight: a card is small beside the lens's bend."""
-    if fisheye:
-        r = np.sqrt(x * x + y * y)
-        a = np.arctan(r)
-        b = a * a
-        s = a * (1 + b * (k[0] + b * (k[1] + b * (k[2] + b * k[3])))) / r if r > 1e-9 else 1.0
-        return s * x, s * y
-    r = x * x + y * y
-    s = (1 + r * (k[0] + r * (k[1] + r * k[4]))) / (1 + r * (k[5] + r * (k[6] + r * k[7])))
-    return x * s + 2 * k[2] * x * y + k[3] * (r + 2 * x * x), y * s + k[2] * (r + 2 * y * y) + 2 * k[3] * x * y
+_popcount: Any = np.bitwise_count if config.DISABLE_JIT else _ctpop  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @numba.njit(cache=True)
@@ -351,7 +250,7 @@ def _added(corners, counts, width, silhouette, fixed, out):  # pragma: no cover
             drawn, kept, seen = scratch[c, R0:R1], fixed[c, R0:R1], silhouette[c, R0:R1]
             for r in range(drawn.size):
                 v = drawn[r] & ~kept[r]
-                total += _popcount(v)  # pyright: ignore[reportCallIssue]
-                inside += _popcount(v & seen[r])  # pyright: ignore[reportCallIssue]
+                total += _popcount(v)
+                inside += _popcount(v & seen[r])
             drawn[:] = 0
         out[n, 0], out[n, 1] = total, inside
