@@ -161,7 +161,7 @@ class Skeleton:
         """
         parents, own, *rest = self._tree
         offsets = own[None] if offsets is None else offsets
-        _forward(poses, joints, parents, offsets, *rest, np.ascontiguousarray(root[:3]), transforms)
+        _forward(np.ascontiguousarray(poses, float), joints, parents, offsets, *rest, np.ascontiguousarray(root[:3]), transforms)  # pyright: ignore[reportCallIssue]
 
 
 @numba.njit(cache=True)
