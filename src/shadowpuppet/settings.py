@@ -87,7 +87,7 @@ PRESETS: dict[str, dict] = {
         "cycles": 1,
         "cooling": 1.0,
         "explore": 0,
-        "torso_arms": "last",
+        "torso_arms": "hidden",
         "estimate": "best",
         "motion_weight": 0.0,
         "posture_weight": 0.0,
