@@ -54,8 +54,8 @@ def settings_table(table: str = "") -> str:
 
 
 def help_text(*command: str) -> str:
-    """The help of a command, as a terminal of 100 columns shows it."""
-    environment = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+    """The help of a command, as a terminal of 80 columns shows it."""
+    environment = os.environ | {"COLUMNS": "80", "NO_COLOR": "1", "TERM": "dumb"}
     shown = subprocess.run([sys.executable, "-m", "shadowpuppet", *command, "--help"], capture_output=True, text=True, env=environment)
     if shown.returncode:
         raise RuntimeError(f"shadowpuppet {' '.join(command)} --help: {shown.stderr}")

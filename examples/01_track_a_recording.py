@@ -7,8 +7,10 @@ import numpy as np
 import shadowpuppet as sp
 from shadowpuppet.synthetic import Spec, synthesize
 
-recording = sys.argv[1] if len(sys.argv) > 1 else synthesize(Spec(), "sample", np.random.default_rng(1))
+made = len(sys.argv) < 2
+recording = synthesize(Spec(), "sample", np.random.default_rng(1)) if made else sys.argv[1]
 run = sp.track_recording(recording, "sample-run", sp.make_options({"seed": 1, "overlay": True}))
-hand = run.motion.table.select(["left_hand"]).positions[:, 0]  # (frames, 3): metres, world
-print(f"{len(run.motion)} frames, {run.motion.status_counts}, at {run.metrics['frames_per_s']} frames/s")
-print(f"the left hand moved through {np.nanmax(hand, 0) - np.nanmin(hand, 0)} m; look at sample-run/overlay.mp4")
+hand = run.motion.table.select(["left_hand"]).positions[:, 0]  # (frames, 3), metres
+print(f"{len(run.motion)} frames, {run.motion.status_counts}")
+print(f"the left hand moved through {np.nanmax(hand, 0) - np.nanmin(hand, 0)} m")
+print("look at sample-run/overlay.mp4")
