@@ -10,7 +10,7 @@ import numpy as np
 
 from shadowpuppet.body import cardbox
 from shadowpuppet.camera import Camera
-from shadowpuppet.initialization import sizes_from_height
+from shadowpuppet.anthropometry import sizes_from_height
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.overlay import matching
 from shadowpuppet.particle_filter import diffuse, evaluate, step

@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shadowpuppet.body import CardboxSizes
     from shadowpuppet.camera import Camera
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.initialization import find_person, fit_references
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from shadowpuppet.rasterize import Picture
     from shadowpuppet.settings import MonocularSettings, make_settings
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
+    from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking import MonocularTracker
     from shadowpuppet.video import open_frames, write_frames
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOMES = {
-    "CardboxSizes": "body", "Camera": "camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
+    "CardboxSizes": "sizes", "Camera": "camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
     "find_person": "initialization", "fit_references": "initialization", "read_calibration": "io.calibration",
     "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints", "Person": "io.person",
     "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",

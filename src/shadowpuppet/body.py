@@ -10,7 +10,7 @@ The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,79 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
+from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
 SIDES = ("left", "right")
-
-
-@dataclass(frozen=True)
-class CardboxSizes:
-    """The 18 sizes a1..a18 of Liu 2011, Fig. 2, metres; left and right share values."""
-
-    head_width: float
-    head_height: float
-    neck_gap: float
-    shoulder_width: float
-    """Width of the torso's top."""
-    torso_bottom_width: float
-    torso_height: float
-    waist_width: float
-    waist_height: float
-    head_depth: float
-    torso_top_depth: float
-    torso_bottom_depth: float
-    waist_depth: float
-    upper_arm_length: float
-    upper_arm_width: float
-    forearm_length: float
-    """From the elbow to the end of the fist (or of the fingers, where the hands are open)."""
-    elbow_width: float
-    """Width of the forearm at the elbow."""
-    hand_width: float
-    """Width of the forearm at the hand."""
-    shoulder_inset: float
-    """From the torso's edge inward to the shoulder joint."""
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            least = -0.2 if field.name in ("neck_gap", "shoulder_inset") else 0.005
-            if not least <= value <= 2.0:
-                raise ShadowPuppetError(f"size {field.name}: found {value!r}, expected {least} to 2.0 metres")
-
-    @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """The 18 names, in the paper's order a1..a18."""
-        return tuple(field.name for field in fields(cls))
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, float], source: str = "sizes") -> CardboxSizes:
-        """Sizes from named values. Raises `ShadowPuppetError` for names missing or unknown."""
-        unknown, missing = set(values) - set(cls.names()), set(cls.names()) - set(values)
-        if unknown or missing:
-            what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
-            raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
-        for name, value in values.items():
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise ShadowPuppetError(f"{source}: {name}: found {value!r}, expected a number of metres")
-        return cls(**{name: float(value) for name, value in values.items()})
-
-    @classmethod
-    def from_array(cls, values: ArrayLike) -> CardboxSizes:
-        """Sizes from an array (18,) in the paper's order."""
-        return cls(*(float(v) for v in np.asarray(values)))
-
-    def to_array(self) -> Array:
-        """The sizes as an array (18,) in the paper's order."""
-        return np.array([getattr(self, name) for name in self.names()])
-
-    def with_values(self, **values: float) -> CardboxSizes:
-        """A copy with some sizes replaced."""
-        return replace(self, **values)
-
-
-SUBSETS = {"O1": CardboxSizes.names()[:8], "O2": CardboxSizes.names()[8:12], "O3": CardboxSizes.names()[12:]}
-"""The three groups in which Algorithm 1 estimates the sizes: front view, side view, arms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,11 +201,11 @@ class _Part:
 def _parts(sizes: CardboxSizes) -> list[_Part]:
     s, neck = sizes, sizes.torso_height + sizes.neck_gap
     parts = [
-        _Part("head", "torso", neck + s.head_height, neck, (s.head_width,) * 2, (s.head_depth,) * 2),
+        _Part("head", "torso", neck + s.head_height, neck, (s.head_width, s.head_width), (s.head_depth, s.head_depth)),
         _Part("torso", "torso", s.torso_height, 0.0, (s.shoulder_width, s.torso_bottom_width), (s.torso_top_depth, s.torso_bottom_depth)),
-        _Part("waist", "pelvis", 0.0, -s.waist_height, (s.waist_width,) * 2, (s.waist_depth,) * 2),
+        _Part("waist", "pelvis", 0.0, -s.waist_height, (s.waist_width, s.waist_width), (s.waist_depth, s.waist_depth)),
     ]
-    upper, lower = (s.upper_arm_width,) * 2, (s.elbow_width, s.hand_width)
+    upper, lower = (s.upper_arm_width, s.upper_arm_width), (s.elbow_width, s.hand_width)
     for side in SIDES:
         parts += [_Part(f"{side}_upper_arm", f"{side}_shoulder", 0.0, -s.upper_arm_length, upper, upper),
                   _Part(f"{side}_forearm", f"{side}_elbow", 0.0, -s.forearm_length, lower, lower)]
@@ -311,34 +242,36 @@ def rounded(sizes: CardboxSizes) -> Body:
     Two crossed cards look 0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so that width tells nearness.
     """
     s, skeleton = sizes, upper_body_skeleton(sizes, clavicles=True)
-    chin = s.torso_height + s.neck_gap
-    neck, arm = 0.35 * s.head_width, s.upper_arm_width / 2
+    crown = s.torso_height + s.neck_gap + s.head_height
+    neck, arm, fore, palm = 0.35 * s.head_width, s.upper_arm_width / 2, s.elbow_width / 2, s.hand_width / 2
+    wrist = 0.36 * s.elbow_width
 
-    def ellipsoid(joint: str, x: float, y: float, z: float, depth: float, width: float, height: float):
-        return skeleton.joint_index(joint), (x, y, z), (depth, width, height)
+    def ellipsoid(joint: str, z: float, depth: float, width: float, height: float):
+        return skeleton.joint_index(joint), (0.0, 0.0, z), (depth, width, height)
 
-    skull = chin + s.head_height
+    def ball(joint: str, z: float, radius: float):
+        return ellipsoid(joint, z, radius, radius, radius)
+
+    def loin(joint: str):
+        return ellipsoid(joint, 0.1 * s.torso_height, s.torso_bottom_depth / 2, s.torso_bottom_width / 2, 0.1 * s.torso_height)
+
     parts = {
-        "head": [ellipsoid("torso", 0, 0, skull - s.head_height * 0.35, s.head_depth / 2, s.head_width / 2, s.head_height * 0.35),
-                 ellipsoid("torso", 0, 0, skull - s.head_height * 0.70, s.head_depth * 0.42, s.head_width * 0.40, s.head_height * 0.30)],
-        "neck": [ellipsoid("torso", 0, 0, skull - s.head_height * 0.6, neck, neck, neck), ellipsoid("torso", 0, 0, s.torso_height, neck, neck, neck)],
-        "shoulders": [ellipsoid(f"{side}_shoulder", 0, 0, 0, arm, arm, arm) for side in SIDES]
-        + [ellipsoid("torso", 0, 0, s.torso_height + neck * 0.5, neck, neck, neck)],
-        "torso": [ellipsoid("torso", 0, 0, 0.65 * s.torso_height, s.torso_top_depth / 2, 0.44 * s.shoulder_width, 0.3 * s.torso_height),
-                  ellipsoid("torso", 0, 0, 0.1 * s.torso_height, s.torso_bottom_depth / 2, s.torso_bottom_width / 2, 0.1 * s.torso_height)],
-        "waist": [ellipsoid("pelvis", 0, 0, 0.1 * s.torso_height, s.torso_bottom_depth / 2, s.torso_bottom_width / 2, 0.1 * s.torso_height),
-                  ellipsoid("pelvis", 0, 0, -0.9 * s.waist_height, s.waist_depth / 2, s.waist_width / 2, 0.1 * s.waist_height)],
+        "head": [ellipsoid("torso", crown - 0.35 * s.head_height, 0.5 * s.head_depth, 0.5 * s.head_width, 0.35 * s.head_height),
+                 ellipsoid("torso", crown - 0.7 * s.head_height, 0.42 * s.head_depth, 0.4 * s.head_width, 0.3 * s.head_height)],
+        "neck": [ball("torso", crown - 0.6 * s.head_height, neck), ball("torso", s.torso_height, neck)],
+        "shoulders": [*(ball(f"{side}_shoulder", 0, arm) for side in SIDES), ball("torso", s.torso_height + neck / 2, neck)],
+        "torso": [ellipsoid("torso", 0.65 * s.torso_height, s.torso_top_depth / 2, 0.44 * s.shoulder_width, 0.3 * s.torso_height),
+                  loin("torso")],
+        "waist": [loin("pelvis"), ellipsoid("pelvis", -0.9 * s.waist_height, s.waist_depth / 2, s.waist_width / 2, 0.1 * s.waist_height)],
     }
     for side in SIDES:
-        shoulder, elbow, fore, wrist = f"{side}_shoulder", f"{side}_elbow", s.elbow_width / 2, 0.36 * s.elbow_width
-        at_wrist, palm = -WRIST_SHARE * s.forearm_length, s.hand_width / 2
-        parts[f"{side}_upper_arm"] = [ellipsoid(shoulder, 0, 0, 0, arm, arm, arm), ellipsoid(elbow, 0, 0, 0, 0.9 * fore, 0.9 * fore, 0.9 * fore)]
-        parts[f"{side}_forearm"] = [ellipsoid(elbow, 0, 0, -0.06 * s.forearm_length, fore, fore, fore),
-                                    ellipsoid(elbow, 0, 0, at_wrist, wrist, wrist, wrist)]
-        parts[f"{side}_hand"] = [ellipsoid(elbow, 0, 0, -0.75 * s.forearm_length, palm, palm, palm),
-                                 ellipsoid(elbow, 0, 0, -s.forearm_length + palm / 2, palm / 2, palm / 2, palm / 2)]
-    shapes = [part if len(part) == 3 else [*part, part[-1]] for part in parts.values()]
-    joints, centres, radii = (np.array([[e[i] for e in shape] for shape in shapes]) for i in range(3))
+        shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
+        parts[f"{side}_upper_arm"] = [ball(shoulder, 0, arm), ball(elbow, 0, 0.9 * fore)]
+        parts[f"{side}_forearm"] = [ball(elbow, -0.06 * s.forearm_length, fore), ball(elbow, -WRIST_SHARE * s.forearm_length, wrist)]
+        parts[f"{side}_hand"] = [ball(elbow, -0.75 * s.forearm_length, palm), ball(elbow, palm / 2 - s.forearm_length, palm / 2)]
+    most = max(map(len, parts.values()))
+    shapes = [part + [part[-1]] * (most - len(part)) for part in parts.values()]  # an ellipsoid twice changes no hull
+    joints, centres, radii = (np.array([[ellipsoid[i] for ellipsoid in shape] for shape in shapes]) for i in range(3))
     return Body("rounded", skeleton, Hulls(joints.astype(np.int64), centres.astype(float), radii.astype(float)), tuple(parts),
                 _landmarks(sizes), _hem(sizes))
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body import BODIES, SUBSETS, CardboxSizes
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SizePrior, sizes_from_height
+from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices
 from shadowpuppet.first_pose import search
@@ -18,33 +18,9 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.rasterize import Picture, count, place
 from shadowpuppet.settings import InitializationSettings
+from shadowpuppet.sizes import SUBSETS, CardboxSizes
 
 Mask = NDArray[np.bool_]
-
-AVERAGE_HEIGHT = 1.70
-"""Stature (m) taken where neither height nor distance is known: the mean adult of ANSUR II (Gordon et al. 2014), women and men."""
-SOLE = 0.025
-"""What shoes add to the height that is given, metres."""
-
-PROPORTIONS: Mapping[str, tuple[float, float]] = {
-    "head_width": (0.095, 0.06), "head_height": (0.143, 0.06), "neck_gap": (0.022, 0.80),
-    "shoulder_width": (0.215, 0.15), "torso_bottom_width": (0.184, 0.25), "torso_height": (0.236, 0.10),
-    "waist_width": (0.210, 0.20), "waist_height": (0.123, 0.20),
-    "head_depth": (0.114, 0.06), "torso_top_depth": (0.120, 0.40), "torso_bottom_depth": (0.155, 0.30), "waist_depth": (0.150, 0.30),
-    "upper_arm_length": (0.1605, 0.05), "upper_arm_width": (0.068, 0.30), "forearm_length": (0.254, 0.05),
-    "elbow_width": (0.070, 0.30), "hand_width": (0.030, 0.50), "shoulder_inset": (0.007, 4.0),
-}  # fmt: skip
-"""Every size as a fraction of the stature, and its relative standard deviation among adults.
-
-Arms by de Leva (1996, table 4; means of women and men), heights along the trunk and the hand's length by Drillis & Contini (1966) as
-given by Winter (2009, fig. 4.1), breadths and depths rounded from ANSUR II (Gordon et al. 2014); limbs' widths are girths over pi.
-Breadths and depths of trunk and limbs vary together from slim to stout: they are left loose, so that many of them do not outvote the
-lengths, which tell how far away the person stands.
-"""
-SHOULDER_JOINT = (0.103, 0.06)
-"""Half the distance of the shoulders' joints: half the biacromial breadth of ANSUR II less some 2 cm to the humerus' centre."""
-TRUNK = (0.518, 0.03)
-"""From the crotch to the crown: one less ANSUR II's crotch height. Of all upright measures the steadiest fraction of stature."""
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},
@@ -52,36 +28,6 @@ POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_arms_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},
 }
 """The known postures d_ref of the reference pictures, for O1, O2 and O3 in this order."""
-
-
-def sizes_from_height(height: float) -> CardboxSizes:
-    """Sizes of the average person of a height (m, shoes on)."""
-    stature = height - SOLE
-    return CardboxSizes(**{name: share * stature for name, (share, _) in PROPORTIONS.items()})
-
-
-@dataclass(frozen=True)
-class SizePrior:
-    """What is known of a person's sizes before they are seen: proportions of the stature."""
-
-    height: float
-    """Metres, shoes on."""
-
-    @cached_property
-    def mean(self) -> Array:
-        """Expected sizes (18,), metres."""
-        return sizes_from_height(self.height).to_array()
-
-    def penalty(self, sizes: Array) -> Array:
-        """Squared deviations (N,) of sizes (N, 18), summed, in units of their variances."""
-        spread = np.array([PROPORTIONS[name][1] for name in CardboxSizes.names()])
-        stature, of = self.height - SOLE, {name: i for i, name in enumerate(CardboxSizes.names())}
-        joint = sizes[:, of["shoulder_width"]] / 2 - sizes[:, of["shoulder_inset"]]
-        trunk = sizes[:, [of["head_height"], of["neck_gap"], of["torso_height"], of["waist_height"]]].sum(1)
-        total = (((sizes / self.mean - 1) / spread) ** 2).sum(1)
-        for value, (share, deviation) in ((joint, SHOULDER_JOINT), (trunk, TRUNK)):
-            total += ((value / (share * stature) - 1) / deviation) ** 2
-        return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +61,13 @@ class Fit:
 
 
 class _Bodies:
-    """Many people at once: joints and corners of the cardbox are linear in the sizes, so that a body a hypothesis need not be built."""
+    """Many people at once: joints and shapes of a body are linear in the sizes, so that none need be built for each hypothesis."""
 
     def __init__(self, name: str) -> None:
         base = np.full(len(CardboxSizes.names()), 0.1)
         self.make = BODIES[name]
         self.body = self.make(CardboxSizes.from_array(base))
-        self.slopes = []
+        self.slopes: list[Array] = []
         still, step = self._measures(base), 0.01
         moved = [self._measures(base + step * unit) for unit in np.eye(len(base))]
         for i, array in enumerate(still):
@@ -134,7 +80,7 @@ class _Bodies:
     def costs(self, camera: Camera, root: Array, observation: Observation, poses: Array, sizes: Array, shift: Array) -> Array:
         """Eq. 2 (N,), pixels, of poses (N, D) with sizes (N, 18), the base moved by `shift` (N, 2) along X and Z."""
         picture, skeleton = Picture(self.body, camera, root), self.body.skeleton
-        offsets, *arrays = (np.ascontiguousarray(np.tensordot(sizes, slope, 1)) for slope in self.slopes)
+        offsets, *arrays = (np.ascontiguousarray(np.tensordot(sizes, slope, 1), float) for slope in self.slopes)
         offsets[:, 0, [0, 2]] += shift
         transforms = np.empty((len(poses), len(skeleton.joints), 3, 4))
         skeleton.forward_some(np.ascontiguousarray(poses), np.arange(len(skeleton.joints)), transforms, root, offsets)
@@ -344,9 +290,9 @@ def _places(camera: Camera, mask: Mask, height: float | None, distance: float | 
     """People of plausible sizes at plausible places, with the crown at the mask's upper edge or, for raised arms, under it."""
     top = np.flatnonzero(mask.any(1))[0]
     centre = np.flatnonzero(mask.any(0)).mean()
-    known = height is not None or sizes is not None
-    heights = [height or AVERAGE_HEIGHT] if known or distance is None else list(np.arange(1.0, 2.1, 0.08))
-    distances = [distance] if distance is not None else list(0.8 * 1.07 ** np.arange(36))
+    known = height is not None or sizes is not None or distance is None
+    heights: list[float] = [height or AVERAGE_HEIGHT] if known else np.arange(1.0, 2.1, 0.08).tolist()
+    distances: list[float] = [distance] if distance is not None else (0.8 * 1.07 ** np.arange(36)).tolist()
     up, out = place(camera, 0.0, 0.0)[:3, 2], []
     ray = camera.rays(np.array([centre, top], float))
     for tall, far in product(heights, distances):
@@ -362,17 +308,17 @@ def _first_guess(camera: Camera, names: Sequence[str], masks: Sequence[Mask], he
     mask, name = masks[0], names[0]
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     focal = camera.matrix[0, 0]
-    known, height = height, height or AVERAGE_HEIGHT
-    sizes = sizes_from_height(height)
+    tall = height or AVERAGE_HEIGHT
+    sizes = sizes_from_height(tall)
     reach = sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length
     extent, measure = (columns[-1] - columns[0], 2 * reach) if name != "side_arms_hanging" else (
         rows[-1] - rows[0], sizes.torso_height + sizes.head_height + sizes.neck_gap + sizes.waist_height)
-    if distance is not None and known is None:
-        height = height * distance * extent / focal / measure
-        sizes = sizes_from_height(height)
+    if distance is not None and height is None:
+        tall *= distance * extent / focal / measure
+        sizes = sizes_from_height(tall)
     far = distance if distance is not None else focal * measure / max(extent, 1)
     down = camera.rays(np.array([columns.mean(), rows[0]], float))
     up = place(camera, 0.0, 0.0)[:3, 2]
     crown = down / abs(down[2]) * far
     elevation = float(crown @ up) - (sizes.torso_height + sizes.neck_gap + sizes.head_height)
-    return Guess(sizes, height, far, elevation)
+    return Guess(sizes, tall, far, elevation)

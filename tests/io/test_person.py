@@ -7,9 +7,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.body import CardboxSizes
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.person import Person, read_person, write_person
+from shadowpuppet.sizes import CardboxSizes
 
 SIZES = CardboxSizes.from_array(np.linspace(0.05, 0.6, 18))
 text = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)

@@ -11,7 +11,7 @@ from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import read_toml
 
 if TYPE_CHECKING:  # the body brings its kernels' compiler
-    from shadowpuppet.body import CardboxSizes
+    from shadowpuppet.sizes import CardboxSizes
 
 KEYS = ("height", "source", "notes", "sizes")
 HEIGHTS = (0.5, 2.5)
@@ -41,7 +41,7 @@ class Person:
 
 def read_person(path: str | Path) -> Person:
     """A person from a file. Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible."""
-    from shadowpuppet.body import CardboxSizes
+    from shadowpuppet.sizes import CardboxSizes
 
     path = Path(path)
     data = read_toml(path, FormatError)

@@ -1,0 +1,82 @@
+"""A person's named sizes: the 18 of Liu 2011."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.geometry import Array
+
+
+@dataclass(frozen=True)
+class CardboxSizes:
+    """The 18 sizes a1..a18 of Liu 2011, Fig. 2, metres; left and right share values."""
+
+    head_width: float
+    head_height: float
+    neck_gap: float
+    shoulder_width: float
+    """Width of the torso's top."""
+    torso_bottom_width: float
+    torso_height: float
+    waist_width: float
+    waist_height: float
+    head_depth: float
+    torso_top_depth: float
+    torso_bottom_depth: float
+    waist_depth: float
+    upper_arm_length: float
+    upper_arm_width: float
+    forearm_length: float
+    """From the elbow to the end of the fist (or of the fingers, where the hands are open)."""
+    elbow_width: float
+    """Width of the forearm at the elbow."""
+    hand_width: float
+    """Width of the forearm at the hand."""
+    shoulder_inset: float
+    """From the torso's edge inward to the shoulder joint."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            least = -0.2 if field.name in ("neck_gap", "shoulder_inset") else 0.005
+            if not least <= value <= 2.0:
+                raise ShadowPuppetError(f"size {field.name}: found {value!r}, expected {least} to 2.0 metres")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """The 18 names, in the paper's order a1..a18."""
+        return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, float], source: str = "sizes") -> CardboxSizes:
+        """Sizes from named values. Raises `ShadowPuppetError` for names missing or unknown."""
+        unknown, missing = set(values) - set(cls.names()), set(cls.names()) - set(values)
+        if unknown or missing:
+            what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
+            raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
+        for name, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ShadowPuppetError(f"{source}: {name}: found {value!r}, expected a number of metres")
+        return cls(**{name: float(value) for name, value in values.items()})
+
+    @classmethod
+    def from_array(cls, values: ArrayLike) -> CardboxSizes:
+        """Sizes from an array (18,) in the paper's order."""
+        return cls(*(float(v) for v in np.asarray(values)))
+
+    def to_array(self) -> Array:
+        """The sizes as an array (18,) in the paper's order."""
+        return np.array([getattr(self, name) for name in self.names()])
+
+    def with_values(self, **values: float) -> CardboxSizes:
+        """A copy with some sizes replaced."""
+        return replace(self, **values)
+
+
+SUBSETS = {"O1": CardboxSizes.names()[:8], "O2": CardboxSizes.names()[8:12], "O3": CardboxSizes.names()[12:]}
+"""The three groups in which Algorithm 1 estimates the sizes: front view, side view, arms."""
