@@ -51,7 +51,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     from shadowpuppet.terminal import terminal
 
     options = options_from(flags, config)
-    folder = folder or Path(f"run-{recording.resolve().stem}")
+    folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
     with terminal(quiet, folder) as shown:
         summary = track_recording(recording, folder, options, shown)
     if not quiet:

@@ -8,7 +8,7 @@ from typing import Any
 from warnings import warn
 
 from shadowpuppet.camera import Camera
-from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.run import read_run
@@ -25,6 +25,8 @@ def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Se
     run = read_run(folder)
     table = truth if truth is not None else _known_truth(run.info.get("truth"))
     reference = None if table is None else read_joints(table)
+    if reference is not None and not 0 <= start < len(reference.times):
+        raise ShadowPuppetError(f"start: found {start}, expected 0 to {len(reference.times) - 1}, a frame of {table}")
     measured = evaluate(run.motion, reference, joints, camera=_camera(run.folder), start=start)
     return {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete, **measured}
 

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.footage import Footage, Mask, Sample, Shot, Silhouettes
-from shadowpuppet.initialization import AVERAGE_HEIGHT, Fit, find_person, fit_references
+from shadowpuppet.geometry import Array
+from shadowpuppet.initialization import POSTURES, Fit, Guess, find_person, fit_references
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.options import Options
 from shadowpuppet.tracking import MonocularTracker
 
-WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.57, "front_arms_t_pose": 0.65}
-"""Overlap of the fitted body and a reference's silhouette under which it does not show its posture..."""
+WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
+"""Overlap (intersection over union) of the fitted body and a reference's silhouette under which it does not show its posture..."""
 DOUBTFUL = {"front_t_pose": 0.78, "side_arms_hanging": 0.68, "front_arms_t_pose": 0.78}
-"""... or may not."""
+"""... or may not. Right ones have 0.85 to 0.94, from the side 0.72 to 0.89."""
+SEEN = 0.6
+"""Share of a level forearm that lies in the silhouette, under which the arms were not level: sizes can hide a wrong posture."""
+DEEP = 1.2
+"""Depth of the fitted trunk over its width from which on it was not seen from the side; right ones have 0.75 to 0.82."""
 POOR = 0.75
 """Overlap with the film's first silhouette under which the body is in doubt; bodies that fit have 0.85 to 0.95."""
 LONGEST_REFERENCE = 60
@@ -83,7 +91,7 @@ def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Opt
     references = _references(footage, seen)
     if references:
         fit = fit_references(rng, footage.camera, references, **known)
-        _check_postures(footage, fit)
+        _check_postures(footage, references, fit)
         return fit, "references"
     return find_person(rng, footage.camera, _few(masks), **known), "proportions, refined on the first seconds"
 
@@ -98,7 +106,8 @@ def _few(masks: list[Mask]) -> list[Mask]:
 def _references(footage: Footage, seen: Silhouettes) -> dict[str, Mask]:
     """Masks of the reference postures; with ready masks those that have one."""
     given = [r for r in footage.recording.references if seen.segmenter is not None or r.mask is not None]
-    return {reference.name: _reference(footage, seen, reference) for reference in given}
+    found = {reference.name: _reference(footage, seen, reference) for reference in given}
+    return {name: found[name] for name in POSTURES if name in found}
 
 
 def _reference(footage: Footage, seen: Silhouettes, reference: Reference) -> Mask:
@@ -115,12 +124,35 @@ def _reference(footage: Footage, seen: Silhouettes, reference: Reference) -> Mas
     return middle
 
 
-def _check_postures(footage: Footage, fit: Fit) -> None:
+def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: Fit) -> None:
+    """Raise `RecordingError` where a reference shows another posture than its name says."""
     paths = {reference.name: reference.image for reference in footage.recording.references}
-    worst = min(fit.overlaps, key=lambda name: fit.overlaps[name] - WRONG[name])
-    if fit.overlaps[worst] < WRONG[worst]:
-        raise RecordingError(f"{paths[worst]}: the body in the posture {worst} overlaps the silhouette by "
-                             f"{fit.overlaps[worst]:.2f} only, expected over {DOUBTFUL[worst]}: {HOW[worst]}; take it again, or remove it")
+    for (name, mask), pose in zip(masks.items(), fit.poses):
+        if (wrong := wrong_posture(footage.camera, mask, name, fit, pose)) is not None:
+            raise RecordingError(f"{paths[name]}: not the posture {name}, it seems: {wrong}; {HOW[name]}; take it again, or remove it")
+
+
+def wrong_posture(camera: Camera, mask: Mask, name: str, fit: Fit, pose: Array) -> str | None:
+    """What shows that a reference's mask (H, W) does not have its posture, after the fit with `pose` (D,); None where nothing does."""
+    sizes = fit.guess.sizes
+    if fit.overlaps[name] < WRONG[name]:
+        return f"the body overlaps the silhouette by {fit.overlaps[name]:.2f} only, expected over {DOUBTFUL[name]}"
+    if name == "side_arms_hanging":
+        deep, wide = (sizes.torso_top_depth + sizes.torso_bottom_depth) / 2, (sizes.shoulder_width + sizes.torso_bottom_width) / 2
+        return f"the trunk is {deep:.2f} m deep and {wide:.2f} m wide, expected less depth than width" if deep > DEEP * wide else None
+    seen = _forearms_seen(camera, mask, fit.guess, pose)
+    return f"{100 * seen:.0f} % of the level forearms are in the silhouette, expected nearly all" if seen < SEEN else None
+
+
+def _forearms_seen(camera: Camera, mask: Mask, guess: Guess, pose: Array) -> float:
+    """Share of the lines from the elbows to the wrists that lies in a mask (H, W), of what is in the picture; 1 where nothing is."""
+    picture = guess.picture(camera)
+    pixels = dict(zip(picture.body.landmark_names, camera.project(picture.points_world(pose[None])[0])))
+    along = np.linspace(0, 1, 20)[:, None]
+    line = np.concatenate([pixels[f"{side}_elbow"] * (1 - along) + pixels[f"{side}_wrist"] * along for side in ("left", "right")])
+    x, y = np.rint(line).astype(int).T
+    inside = (x >= 0) & (y >= 0) & (x < camera.size[0]) & (y < camera.size[1])
+    return float(mask[y[inside], x[inside]].mean()) if inside.any() else 1.0
 
 
 HOW = {

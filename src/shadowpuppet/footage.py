@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -184,13 +185,13 @@ class Silhouettes:
     """None where ready masks are taken."""
     region: tuple[slice, slice] | None = None
     blank: Image | None = None
-    """The empty scene, which stands in for what is outside the region."""
+    """A picture of the empty scene, which stands in for what is outside the region."""
 
     def __call__(self, shot: Shot) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:
             return self._within(ready_mask(shot.ready if shot.ready is not None else shot.image))
-        return self._within(self.segmenter(self._visible(shot.image)))
+        return self._within(self.segmenter(self.visible(shot.image)))
 
     def plain(self, shot: Shot) -> Mask | None:
         """The mask by eq. 1 alone; None where there is no standard deviation."""
@@ -198,8 +199,8 @@ class Silhouettes:
             return None
         return self._within(self.segmenter.raw(shot.image))
 
-    def _visible(self, image: Image) -> Image:
-        # Before segmentation, so that nothing outside is taken for the person.
+    def visible(self, image: Image) -> Image:
+        """A picture with the empty scene outside the region, so that nothing there is taken for the person."""
         if self.region is None or self.blank is None:
             return image
         seen = self.blank.copy()
@@ -223,17 +224,16 @@ def silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouett
         scene, source = [background_from_film(images)], "the film itself (median)"
     else:
         scene, source = footage.pictures(footage.view.background, "the empty scene"), _told(footage.view.background)
-    segmenter = learn_background(scene, options.silhouette, film=images)
-    blank = None if footage.region is None else _middle(footage, images)
-    return Silhouettes(source, segmenter, footage.region, blank)
+    first, scene = _peeked(iter(scene))
+    seen = Silhouettes(source, None, footage.region, None if footage.region is None else first)
+    segmenter = learn_background(scene, options.silhouette, film=[seen.visible(image) for image in images])
+    return replace(seen, segmenter=segmenter)
 
 
-def _middle(footage: Footage, images: list[Image]) -> Image:
-    """A picture of the empty scene without noise."""
-    if footage.view.background is None:
-        return background_from_film(images)
-    scene = [frame for frame, _ in zip(footage.pictures(footage.view.background, "the empty scene"), range(25))]
-    return np.median(scene, axis=0).astype(np.uint8)
+def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:
+    """The first of some pictures, and all of them."""
+    first = next(images, None)
+    return first, chain([] if first is None else [first], images)
 
 
 def _told(path: Path | None) -> str:

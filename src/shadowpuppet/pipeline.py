@@ -13,10 +13,10 @@ from warnings import warn
 
 import numpy as np
 
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT, sizes_from_height
 from shadowpuppet.body import BODIES
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.fitting import Found
-from shadowpuppet.initialization import AVERAGE_HEIGHT, sizes_from_height
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._plain import for_json, plain
 from shadowpuppet.io.calibration import write_calibration

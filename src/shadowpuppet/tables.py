@@ -11,10 +11,10 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from shadowpuppet.body import CardboxSizes
 from shadowpuppet.fitting import Found
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import FAR
+from shadowpuppet.sizes import CardboxSizes
 
 BARS = "▁▂▃▄▅▆▇█"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from rich.console import Console, RenderableType
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.look import Look
@@ -25,7 +25,7 @@ class Terminal(Listener):
         """`quiet`: nothing but warnings."""
         self.quiet, self.frames = quiet, 0
         self._console = Console(stderr=True, highlight=False)
-        self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TextColumn("{task.fields[speed]}"),
+        self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
                                   TimeRemainingColumn(), console=self._console, transient=True,
                                   disable=quiet or not self._console.is_terminal)
         self._task: TaskID | None = None
@@ -35,15 +35,17 @@ class Terminal(Listener):
         """Show what begins."""
         if self._task is not None:
             self._progress.remove_task(self._task)
-        self._task = self._progress.add_task(what, total=total, speed="")
+        self._task = self._progress.add_task(what, total=total, done="")
         self._progress.start()
 
     def advance(self, frames: int) -> None:
         """Show how many frames are done, and how fast."""
         self.frames = frames
         if self._task is not None and not self._progress.disable:
-            speed = self._progress.tasks[-1].finished_speed or self._progress.tasks[-1].speed
-            self._progress.update(self._task, completed=frames, speed=f"{speed:.0f} frames/s" if speed else "")
+            task = self._progress.tasks[-1]
+            total = f"/{task.total:.0f}" if task.total else ""
+            speed = f"  {task.speed:.0f} frames/s" if task.speed else ""
+            self._progress.update(self._task, completed=frames, done=f"{frames}{total}{speed}")
 
     def look(self, look: Look) -> None:
         """Show what was found, and what is in doubt."""

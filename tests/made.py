@@ -1,0 +1,48 @@
+"""A tiny made recording for tests of whole runs, and parts of it changed."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from shadowpuppet.synthetic import Gesture, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.video import open_frames, write_frames
+
+SIZE = (160, 120)
+RATE = 10.0
+SPEC = Spec(name="tiny", motion=(Gesture(motion="wave_hands", seconds=2),), cameras=(Viewpoint(size=SIZE),), rate=RATE,
+            scene=Scene(empty_seconds=1))
+
+
+def make(folder: Path) -> Path:
+    """A recording of 37 frames, with background, masks, references and truth."""
+    return synthesize(SPEC, folder, np.random.default_rng(7))
+
+
+def copied(recording: Path, to: Path, without: Iterable[str] = ()) -> Path:
+    """A copy to be spoilt, without some of its files or folders."""
+    shutil.copytree(recording, to)
+    for name in without:
+        path = to / name
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    return to
+
+
+def images(film: Path) -> list[np.ndarray]:
+    return [frame.image for frame in open_frames(film)]
+
+
+def write_film(path: Path, frames: Iterable[np.ndarray], rate: float = RATE, lossless: bool = False) -> None:
+    path.unlink(missing_ok=True)
+    with write_frames(path, rate, lossless=lossless) as film:
+        for frame in frames:
+            film.write(frame)
+
+
+def replace_text(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text, f"{old!r} is not in {path}"
+    path.write_text(text.replace(old, new))
