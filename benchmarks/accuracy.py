@@ -13,11 +13,13 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shadowpuppet.body import HAND_SHARE
 from shadowpuppet.fitting import find
 from shadowpuppet.footage import silhouettes, take_sample
 from shadowpuppet.io.joints import read_joints
@@ -25,12 +27,14 @@ from shadowpuppet.look import prepare
 from shadowpuppet.metrics import UPPER, joint_errors
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options, make_options
+from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.tracking import MonocularTracker
 
 ALIGNED = [name.replace("hand", "wrist") for name in UPPER]
 ROWS: dict[str, dict[str, Any]] = {
     "default": {},
     "default, exact masks": {"masks": True},
+    "default, exact masks, true arms": {"masks": True, "true_arms": True},
     "default, cardbox": {"tracker": {"body": "cardbox"}},
     "default, plain masks (eq. 1)": {"silhouette": {"method": "averaging"}},
     "default, no references": {"references": False},
@@ -50,7 +54,7 @@ class Case:
 
     def __init__(self, path: Path, row: dict[str, Any]) -> None:
         values = dict(row)
-        self.references = values.pop("references", True)
+        self.references, self.true_arms = values.pop("references", True), values.pop("true_arms", False)
         plain = make_options({"silhouette": values.pop("silhouette", {})})
         self.options: Options = make_options(values)
         prepared = prepare(str(path), self.options, np.random.default_rng(0))
@@ -69,6 +73,8 @@ class Case:
         """Errors of one seed: the fit of the person and the tracking."""
         for_fit, for_track = np.random.default_rng(seed).spawn(2)
         guess = find(self.footage, self.sample, self.seen, self.options, for_fit).fit.guess
+        if self.true_arms:
+            guess = replace(guess, sizes=_with_true_arms(guess.sizes, self.truth))
         picture = guess.picture(self.footage.camera, self.options.tracker.body)
         tracker = MonocularTracker(picture, self.options.tracker)
         states = [tracker.start(for_track, self.masks[0])]
@@ -90,9 +96,18 @@ class Case:
                       "jitter": jitter, "ms": 1000 * spent / len(states)}
 
 
-def _without_references(footage: Any) -> Any:
-    from dataclasses import replace
+def _with_true_arms(sizes: CardboxSizes, truth: JointTable) -> CardboxSizes:
+    """The sizes with the truth's shoulder distance, upper arm and forearm: what a perfect fit of the arms would be worth."""
+    def apart(one: str, other: str) -> float:
+        places = truth.select([one, other]).positions
+        return float(np.nanmedian(np.linalg.norm(places[:, 0] - places[:, 1], axis=1)))
 
+    half = apart("left_shoulder", "right_shoulder") / 2
+    return sizes.with_values(shoulder_inset=sizes.shoulder_width / 2 - half, upper_arm_length=apart("left_shoulder", "left_elbow"),
+                             forearm_length=apart("left_elbow", "left_hand") / HAND_SHARE)
+
+
+def _without_references(footage: Any) -> Any:
     return replace(footage, recording=replace(footage.recording, references=()))
 
 
