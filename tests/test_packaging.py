@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,19 @@ OUTSIDE = {"tests", "benchmarks", "examples", "docs", "conftest", "src"}
 def test_the_manual_documents_every_public_name():
     told = {entry.rsplit(".", 1)[-1] for entry in re.findall(r"^::: (\S+)$", docs("api.md"), re.MULTILINE)}
     assert set(shadowpuppet.__all__) - told - {"__version__"} == set()
+
+
+def test_the_method_names_what_is_in_the_code():
+    names = re.findall(r"`(\w+(?:\.\w+)+)(?:\[.*?\])?`", docs("method.md"))
+    assert len(names) > 20
+    for name in names:
+        module, *rest = name.split(".")
+        try:
+            found = getattr(import_module(f"shadowpuppet.{module}"), rest[0])
+        except AttributeError:
+            found = import_module(f"shadowpuppet.{module}.{rest[0]}")
+        for part in rest[1:]:
+            found = getattr(found, part)
 
 
 def test_every_setting_is_explained():
