@@ -129,7 +129,8 @@ class Picture:
     def added(self, transforms: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits,
               arrays: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
         """What drawing some shapes adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
-        if not silhouette.shape == fixed.shape == (shape := self.empty().shape):  # the kernel would write past their ends
+        shape = self.empty().shape
+        if silhouette.shape != shape or fixed.shape != shape:  # the kernel would write past their ends
             raise ShadowPuppetError(f"masks of {silhouette.shape} and {fixed.shape} words x rows, expected the camera's {shape}")
         corners, counts = self.polygons(transforms, which, arrays)
         out = np.empty((len(transforms), 2), np.int64)
@@ -179,13 +180,15 @@ def _spans(P, m, width, height, left, right):  # pragma: no cover
 
     The span of a row is where it lies inside the half planes of all edges, so the edges' lines may be followed past their ends.
     """
+    if m < 3:
+        return 0, 0, 0, 0
     top, bottom, west, east, area = P[0, 1], P[0, 1], P[0, 0], P[0, 0], 0.0
     for v in range(m):
         w = v + 1 if v + 1 < m else 0
         area += P[v, 0] * P[w, 1] - P[w, 0] * P[v, 1]
         top, bottom = min(top, P[v, 1]), max(bottom, P[v, 1])
         west, east = min(west, P[v, 0]), max(east, P[v, 0])
-    if m < 3 or abs(area) < 1e-9 or bottom < 0 or top >= height or east < 0 or west >= width:
+    if abs(area) < 1e-9 or bottom < 0 or top >= height or east < 0 or west >= width:
         return 0, 0, 0, 0
     r0, r1 = int(np.ceil(max(top, 0.0))), int(np.ceil(min(bottom, float(height))))
     rows = max(r1 - r0, 0)
