@@ -17,8 +17,10 @@ PARTS = {"torso": "torso_", "left_arm": "left_", "right_arm": "right_"}
 """Parts that a stage can name, and how the names of their DOF begin."""
 HELD = {"torso": ("left_shoulder", "right_shoulder"), "left_arm": ("left_elbow", "left_hand"), "right_arm": ("right_elbow", "right_hand")}
 """Points of each part that the motion's pull holds."""
-WANDER = 0.3
-"""Deviation of the torso's angles, rad, where a stage explores; an explored arm is a coarse one give or take 0.2 rad."""
+WANDER, AROUND = 0.3, 0.2
+"""Where a stage explores: deviation of the torso's angles from upright, and of an arm's from a coarse arm, rad."""
+TEMPERATURE = 20.0
+"""For the mean estimate: a particle worse by so many pixels (at 320 x 240) weighs 1/e."""
 
 
 class FilterStage:
@@ -76,7 +78,7 @@ class FilterStage:
             spread = np.where(self.turns, WANDER, 5 * self.settings.torso.sigma_translation)
             return np.where(self.turns, 0.0, best) + rng.standard_normal((number, len(best))) * spread
         arms = coarse_arms()
-        return arms[rng.integers(len(arms), size=number)] + 0.2 * rng.standard_normal((number, len(best)))
+        return arms[rng.integers(len(arms), size=number)] + AROUND * rng.standard_normal((number, len(best)))
 
     def weigh(self, observation: Observation, around: Array, last: Array) -> Weigh:
         """Costs (N,) and log weights (eq. 6) of values (N, d), all other DOF as in `around` (D,).
@@ -102,7 +104,7 @@ class FilterStage:
         """Values (d,): the particle of least cost, or the mean weighed by cost."""
         if self.settings.estimate == "best":
             return particles.best
-        return normalise(-particles.costs / (20 * self.scale)) @ particles.poses
+        return normalise(-particles.costs / (TEMPERATURE * self.scale)) @ particles.poses
 
     def _places(self, poses: Array) -> Array:
         """Where the points (N, P, 3) are that the motion's pull holds, metres."""

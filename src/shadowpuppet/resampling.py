@@ -2,8 +2,8 @@
 
     scheme(rng, log_weights, number) -> ancestors (number,), indices of particles
 
-`log_weights` (N,) need not be normalised. Schemes are listed in `SCHEMES`. Liu 2011's two strategies both keep the best particle first
-(`keeps_best`): `deterministic` (DRS, Algorithm 4) by its nature, `stratified` (SRS, Algorithm 3) through `with_best`.
+`log_weights` (N,) need not be normalised. `SCHEMES` lists the schemes. In Liu 2011 the best particle comes first and stays as it is:
+`deterministic` (DRS, Algorithm 4) puts it there by its nature, `stratified` (SRS, Algorithm 3) and the others through `with_best`.
 """
 
 from __future__ import annotations
