@@ -2,8 +2,8 @@
 
     python benchmarks/kernels.py [--size 320x240] [--particles 200] [--rounds 21] [--json FILE]
 
-OpenCV and NumPy get the polygons ready-made, in the form that they want, and buffers; the bits' time holds kinematics, projection, and
-drawing. Arm stages draw one arm over a fixed mask; OpenCV copies that mask first. One thread throughout.
+OpenCV and NumPy get the polygons ready-made, OpenCV at whole pixels, and buffers; the bits' time holds kinematics, projection and drawing.
+Arm stages draw one arm over a fixed mask, which OpenCV copies first. One thread throughout.
 """
 
 from __future__ import annotations
@@ -12,17 +12,19 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Mapping
+from itertools import product
 from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from shadowpuppet.body import BODIES, Hulls, Quads
+from shadowpuppet.anthropometry import sizes_from_height
+from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.anthropometry import sizes_from_height
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.rasterize import Picture, place, unpack
 
@@ -63,23 +65,33 @@ def numpy_costs(polygons: list[list[Array]], fixed: Array, mask: Array) -> Array
     return out
 
 
+def stage_dofs(picture: Picture, stage: str) -> NDArray[np.int64]:
+    return np.flatnonzero([stage == "full" or name.startswith("left_") for name in picture.body.skeleton.dof_names])
+
+
+def moving(body: str, stage: str, size: tuple[int, int]) -> NDArray[np.int64]:
+    """Shapes that a stage draws for every particle."""
+    picture = scene(body, size)[0]
+    return PartialCost(picture, stage_dofs(picture, stage)).moving
+
+
 def contenders(body: str, stage: str, size: tuple[int, int], particles: int) -> dict[str, tuple[Callable[[], object], int]]:
     """What is timed, by name, with how many particles it works off."""
     picture, pose = scene(body, size)
-    skeleton, rng = picture.body.skeleton, np.random.default_rng(0)
-    dofs = np.flatnonzero([stage == "full" or name.startswith("left_") for name in skeleton.dof_names])
+    dofs, rng = stage_dofs(picture, stage), np.random.default_rng(0)
     poses = np.repeat(pose[None], particles, axis=0)
     poses[:, dofs] += 0.1 * rng.standard_normal((particles, len(dofs)))
     partial = PartialCost(picture, dofs)
     costs = partial.costs(Observation.of(picture.mask(pose)), pose)
     corners, counts = picture.polygons(picture.transforms(poses), partial.moving)
-    flat = [[np.ascontiguousarray(np.rint(c[:m]), np.int32) for c, m in zip(*pair)] for pair in zip(corners, counts)]
+    exact = [[c[:m] for c, m in zip(*pair)] for pair in zip(corners, counts)]
+    whole = [[np.rint(shape).astype(np.int32) for shape in shapes] for shapes in exact]
     mask = picture.mask(pose).astype(np.uint8)
     fixed = unpack(picture.draw(pose, partial.still), size[0]).astype(np.uint8)
     return {
         "bits": (lambda: costs(poses), particles),
-        "OpenCV": (lambda: opencv_costs(flat, fixed, mask), particles),
-        "NumPy": (lambda: numpy_costs(flat[:NUMPY_PARTICLES], fixed, mask), NUMPY_PARTICLES),
+        "OpenCV": (lambda: opencv_costs(whole, fixed, mask), particles),
+        "NumPy": (lambda: numpy_costs(exact[:NUMPY_PARTICLES], fixed, mask), NUMPY_PARTICLES),
     }
 
 
@@ -95,11 +107,6 @@ def medians(runs: Mapping[str, tuple[Callable[[], object], int]], rounds: int) -
     return {name: float(np.median(spent)) for name, spent in times.items()}
 
 
-def shapes_text(body: str) -> str:
-    shapes: Quads | Hulls = scene(body, (320, 240))[0].body.shapes
-    return f"{len(shapes.joints)} {'quads' if isinstance(shapes, Quads) else 'hulls'}"
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", default="320x240")
@@ -109,14 +116,14 @@ def main() -> None:
     args = parser.parse_args()
     cv2.setNumThreads(1)
     width, height = (int(n) for n in args.size.split("x"))
-    table = Table(*("body", "stage", "bits, us", "OpenCV, us", "NumPy, us", "OpenCV / bits", "NumPy / bits"), title=f"A particle, {args.size}")
+    table = Table("body", "stage", "shapes", "bits", "OpenCV", "NumPy", "OpenCV/bits", "NumPy/bits", title=f"us a particle, {args.size}")
     rows = []
-    for body in BODIES:
-        for stage in ("full", "arm"):
-            spent = medians(contenders(body, stage, (width, height), args.particles), args.rounds)
-            rows.append({"body": body, "stage": stage, "size": args.size, "particles": args.particles, "microseconds": spent})
-            bits, opencv, plain = spent.values()
-            table.add_row(f"{body} ({shapes_text(body)})", stage, *(f"{t:.1f}" for t in spent.values()), f"{opencv / bits:.1f}", f"{plain / bits:.0f}")
+    for body, stage in product(BODIES, ("full", "arm")):
+        spent = medians(contenders(body, stage, (width, height), args.particles), args.rounds)
+        shapes = len(moving(body, stage, (width, height)))
+        rows.append({"body": body, "stage": stage, "shapes": shapes, "size": args.size, "particles": args.particles, "microseconds": spent})
+        ratios = (f"{spent['OpenCV'] / spent['bits']:.1f}", f"{spent['NumPy'] / spent['bits']:.0f}")
+        table.add_row(body, stage, str(shapes), *(f"{spent[name]:.1f}" for name in ("bits", "OpenCV", "NumPy")), *ratios)
     Console().print(table)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

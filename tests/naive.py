@@ -146,8 +146,9 @@ def cost(drawn: Mask, mask: Mask, ignore: Mask | bool = False) -> int:
 
 def convex_hull(points: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
     """Convex hull of points with whole coordinates, exact (Andrew 1979)."""
-    ordered = sorted(set(points))
-    halves = []
+    ordered, halves = sorted(set(points)), []
+    if len(ordered) < 3:
+        return ordered
     for direction in (ordered, ordered[::-1]):
         half: list[tuple[int, int]] = []
         for p in direction:

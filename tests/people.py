@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.body import BODIES, CardboxSizes
+from shadowpuppet.anthropometry import sizes_from_height
+from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.anthropometry import sizes_from_height
 from shadowpuppet.rasterize import Picture, place
+from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.skeleton import Skeleton
 
 SIZES = sizes_from_height(1.75)

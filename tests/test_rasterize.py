@@ -1,0 +1,402 @@
+"""Projection and drawing against half-plane and ray oracles, to the pixel; borders, near plane, lenses, and what is drawn where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+import naive
+from people import LENSES, SIZES, camera, picture, random_poses
+from shadowpuppet.body import BODIES, Body, Quads, upper_body_skeleton
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.geometry import rigid, rotation_from_vector
+from shadowpuppet.projection import DIRECTIONS, NEAR, make_lens
+from shadowpuppet.rasterize import Picture, count, draw_polygon, pack, place, unpack
+from shadowpuppet.skeleton import Joint, Skeleton
+from test_body import mirrored
+
+UNIT = 64
+"""Polygons have corners at 64ths of a pixel, so that the oracle can count in whole numbers."""
+SIZES_OF_PICTURES = [(1, 1), (1, 7), (7, 1), (63, 9), (64, 9), (65, 9), (130, 11), (192, 5)]
+seeds = st.integers(0, 2**32 - 1)
+
+
+@st.composite
+def polygons(draw, whole: bool = False) -> tuple[np.ndarray, tuple[int, int]]:
+    """A convex polygon (K, 2), in 64ths of a pixel, and a picture's size that it may lie in, stick out of, cover or miss."""
+    width, height = size = draw(st.sampled_from(SIZES_OF_PICTURES))
+    step = UNIT if whole else draw(st.sampled_from([1, 8, UNIT]))
+    x = st.integers(-40 * UNIT // step, (width + 40) * UNIT // step).map(lambda v: v * step)
+    y = st.integers(-10 * UNIT // step, (height + 10) * UNIT // step).map(lambda v: v * step)
+    corners = np.array(naive.convex_hull(draw(st.lists(st.tuples(x, y), min_size=1, max_size=8)) + [(0, 0)] * draw(st.booleans())))
+    if draw(st.booleans()):
+        corners = corners[::-1]
+    return np.roll(corners, draw(st.integers(0, len(corners))), 0), size
+
+
+# Bits -----------------------------------------------------------------------------------------------------------------
+
+
+@given(arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=140)))
+def test_bits_hold_a_mask_and_nothing_else(mask):
+    bits = pack(mask)
+    assert bits.shape == (-(-mask.shape[1] // 64), mask.shape[0])
+    assert bits.flags.c_contiguous
+    np.testing.assert_array_equal(unpack(bits, mask.shape[1]), mask)
+    assert count(bits) == mask.sum()  # what pads the last word is empty
+
+
+def test_a_pixel_is_a_bit_of_its_word_column():
+    mask = np.zeros((3, 130), bool)
+    mask[1, 65] = True
+    bits = pack(mask)
+    assert bits[1, 1] == 2
+    assert count(bits) == 1
+
+
+# Polygons -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.kernels
+@given(polygons())
+@settings(max_examples=300, deadline=None)
+def test_a_polygon_is_the_pixels_whose_centres_it_holds(made):
+    corners, size = made
+    np.testing.assert_array_equal(draw_polygon(corners / UNIT, size), naive.half_planes(corners, size, UNIT)[0])
+
+
+@pytest.mark.kernels
+@given(polygons(whole=True))
+@settings(max_examples=200, deadline=None)
+def test_corners_and_edges_on_pixel_centres_are_half_open(made):
+    corners, size = made
+    np.testing.assert_array_equal(draw_polygon(corners / UNIT, size), naive.half_planes(corners, size, UNIT)[0])
+
+
+@pytest.mark.kernels
+@given(polygons(whole=True), st.data())
+@settings(max_examples=150, deadline=None)
+def test_a_fan_of_triangles_around_a_whole_point_leaves_no_gap_and_overlaps_nowhere(made, data):
+    corners, size = made
+    low, high = corners.min(0), corners.max(0)
+    inside = [st.integers(int(a) // UNIT, int(b) // UNIT).map(lambda v: v * UNIT) for a, b in zip(low, high)]
+    middle = np.array(data.draw(st.tuples(*inside)))
+    edges = list(zip(corners, np.roll(corners, -1, 0)))
+    sides = [np.linalg.det(np.stack([b - a, middle - a]).astype(float)) for a, b in edges]
+    if len(corners) < 3 or not (min(sides) >= 0 or max(sides) <= 0):
+        return  # the point lies outside
+    fan = sum(draw_polygon(np.array([a, b, middle]) / UNIT, size).astype(int) for a, b in edges)
+    np.testing.assert_array_equal(fan, draw_polygon(corners / UNIT, size))
+
+
+def test_a_grid_of_crooked_quads_covers_a_picture_once(rng):
+    size = (150, 70)
+    x, y = np.meshgrid(np.linspace(-10, 160, 9), np.linspace(-10, 80, 7))
+    knots = np.stack([x, y], -1) + rng.integers(-4, 5, (7, 9, 2))
+    cells = [knots[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i in range(6) for j in range(8)]
+    np.testing.assert_array_equal(sum(draw_polygon(cell, size).astype(int) for cell in cells), 1)
+
+
+@pytest.mark.parametrize("corners", [
+    [], [[3, 3]], [[1, 1], [9, 9]], [[1, 1], [5, 5], [9, 9]], [[1, 1], [9, 1], [5, 1]], [[4, 2]] * 4, [[1, 1], [1, 1], [9, 9], [9, 9]],
+    [[-9, 2], [-3, 2], [-3, 8]], [[2, 99], [9, 99], [9, 120]], [[2, -9], [9, -9], [9, 0]], [[300, 2], [310, 2], [310, 8]],
+    [[2.2, 2.2], [2.8, 2.2], [2.8, 2.8], [2.2, 2.8]], [[np.nan, 1], [5, 5], [1, 9]], [[1, np.nan], [5, 5], [1, 9]],
+])  # fmt: skip
+def test_what_holds_no_centre_draws_nothing(corners):
+    assert not draw_polygon(np.array(corners, float).reshape(-1, 2), (100, 20)).any()
+
+
+def test_what_covers_all_draws_all():
+    for width in (1, 63, 64, 65, 200):
+        assert draw_polygon([[-1e6, -1e6], [1e6, -1e6], [1e6, 1e6], [-1e6, 1e6]], (width, 5)).all()
+
+
+@pytest.mark.kernels
+@given(st.lists(st.tuples(*[st.sampled_from([np.nan, np.inf, -np.inf, 1e300, -1e300, 1e19, -1e9, 1e9, 0, 5.5, 63, 64, 1e-300])] * 2),
+                min_size=1, max_size=5))
+@settings(max_examples=100, deadline=None)
+def test_nonsense_stays_inside_the_picture(corners):
+    assert draw_polygon(corners, (70, 9)).shape == (9, 70)  # with NUMBA_BOUNDSCHECK=1 a write past the end is an error
+
+
+# Projection -----------------------------------------------------------------------------------------------------------
+
+
+def one_quad(corners: np.ndarray, cam: Camera) -> Picture:
+    """A quad (4, 3) given in the camera's frame, as a body."""
+    shapes = Quads(np.zeros((1, 1), np.int64), corners[None])
+    body = Body("quad", Skeleton((Joint("root", None),), ()), shapes, ("part",), {}, np.zeros((2, 3)))
+    return Picture(body, cam, np.eye(4))
+
+
+def quad_at(rng: np.random.Generator, depth: tuple[float, float] = (-0.3, 1.5)) -> np.ndarray:
+    """A flat convex quad (4, 3), a trapezium as all cards are, of any attitude at any place near the axis."""
+    w, h, x = rng.uniform(0.05, 1.0, 3)
+    flat = np.array([[-w, -h, 0], [w, -h, 0], [x * w, h, 0], [-x * w, h, 0]])
+    T = rigid(rotation_from_vector(rng.standard_normal(3) * 1.5), [*rng.uniform(-0.4, 0.4, 2), rng.uniform(*depth)])
+    return flat @ T[:3, :3].T + T[:3, 3]
+
+
+def projected(view: Picture, poses=None) -> tuple[np.ndarray, np.ndarray]:
+    poses = np.zeros((1, len(view.body.skeleton.dofs))) if poses is None else poses
+    return view.polygons(view.transforms(poses), np.arange(len(view.body.parts)))
+
+
+@pytest.mark.kernels
+@given(seeds)
+@settings(max_examples=100, deadline=None)
+def test_cards_are_cut_at_the_near_plane(seed):
+    rng = np.random.default_rng(seed)
+    cam, quad = camera((40, 30)), quad_at(rng)
+    corners, counts = projected(one_quad(quad, cam))
+    kept = naive.clipped(quad)
+    assert counts[0, 0] == len(kept)
+    if kept:
+        np.testing.assert_allclose(corners[0, 0, : len(kept)], naive.to_pixels(cam, kept), rtol=1e-9, atol=1e-9)
+
+
+@given(seeds)
+@settings(max_examples=100, deadline=None)
+def test_a_card_is_the_pixels_whose_rays_hit_it(seed):
+    """Nearly all of these cards cross the near plane, the picture's border or both; the oracle knows no projection."""
+    rng = np.random.default_rng(seed)
+    cam, quad = camera((70, 50)), quad_at(rng)
+    hit, close = naive.seen_through(quad, cam)
+    drawn = one_quad(quad, cam).mask([])
+    np.testing.assert_array_equal(drawn[~close], hit[~close])
+
+
+@pytest.mark.parametrize(("depths", "number"), [
+    ([1, 1, 1, 1], 4), ([-1, -1, -1, -1], 0), ([0, 0, 0, 0], 0), ([NEAR / 2] * 4, 0), ([NEAR] * 4, 4),
+    ([1, 1, -1, -1], 4), ([1, 1, 1, -1], 5), ([1, -1, -1, -1], 3), ([-1, 1, -1, -1], 3), ([0, 1, 1, 0], 4), ([-1, -1, -1, 1], 3),
+])  # fmt: skip
+def test_how_many_corners_are_left_in_front(depths, number):
+    flat = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
+    corners, counts = projected(one_quad(np.column_stack([flat, depths]), camera()))
+    assert counts[0, 0] == number
+    assert np.isfinite(corners[0, 0, :number]).all()
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("body", BODIES)
+def test_corners_are_where_opencv_sees_them(lens, body, rng):
+    view = picture(body, camera(lens=lens))
+    poses = random_poses(rng, view.body.skeleton, 6)
+    corners, counts = projected(view, poses)
+    for n, pose in enumerate(poses):
+        joints = naive.forward(view.body.skeleton, pose, view.T_camera_base)
+        for shape in range(len(view.body.parts)):
+            expected = naive.polygon(view, joints, shape)
+            assert counts[n, shape] == len(expected)
+            np.testing.assert_allclose(corners[n, shape, : len(expected)], expected, atol=1e-7)
+
+
+def test_an_equidistant_fisheye_is_no_pinhole():
+    quad = np.array([[1.0, -0.1, 1], [1.2, -0.1, 1], [1.2, 0.1, 1], [1.0, 0.1, 1]])
+    corners = [projected(one_quad(quad, camera(lens=lens)))[0][0, 0, 0] for lens in ("pinhole", "equidistant")]
+    cam = camera()
+    radius = np.hypot(1.0, 0.1)
+    assert (corners[1] - cam.matrix[:2, 2]) / (corners[0] - cam.matrix[:2, 2]) == pytest.approx(np.arctan(radius) / radius)
+
+
+FOLDING = [{"distortion": [-0.3, 0, 0, 0]}, {"distortion": [-0.05, 0, 0, 0]}, LENSES["rational"],
+           {"distortion": [-0.25, 0, 0, 0], "fisheye": True}]
+
+
+@pytest.mark.parametrize("lens", FOLDING)
+def test_what_lies_outside_the_picture_is_not_bent_into_it(lens):
+    """Polynomials turn back beyond the picture: without an end to them, k1 = -0.3 draws at x = -63 what stands at x = 2, z = 1."""
+    cam = Camera("cam", (160, 120), camera().matrix, **lens)
+    radii = np.linspace(0, 60, 500)
+    quads = np.stack([radii, 0 * radii, 1 + 0 * radii], 1)
+    x = np.concatenate([projected(one_quad(quads[i : i + 4], cam))[0][0, 0, :4, 0] for i in range(0, 500, 4)])
+    assert (np.diff(x) > 0).all()
+    reach = make_lens(cam)[4]
+    inner = radii < 0.99 * reach
+    assert 0.5 < reach < 60
+    np.testing.assert_allclose(x[inner], naive.to_pixels(cam, quads[inner])[:, 0], atol=1e-6)
+
+
+def test_only_bending_lenses_have_an_end():
+    assert make_lens(camera())[3:] == (False, np.inf)
+    assert make_lens(camera(lens="distorted"))[3:] == (True, np.inf)  # k2 holds k1's turn back
+    assert make_lens(camera(lens="equidistant"))[3:] == (True, np.inf)
+
+
+def ellipsoid_points(view: Picture, pose: np.ndarray, shape: int, number: int = 4000) -> np.ndarray:
+    """Pixels of points all over the surfaces of a shape's ellipsoids."""
+    i = np.arange(number) + 0.5
+    polar, turn = np.arccos(1 - 2 * i / number), np.pi * (1 + 5**0.5) * i
+    sphere = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], 1)
+    shapes, T = view.body.shapes, view.transforms(pose[None])[0]
+    ellipsoids = zip(shapes.joints[shape], shapes.centres[shape], shapes.radii[shape])
+    points = [T[j, :, :3] @ (c + r * sphere).T + T[j, :, 3:] for j, c, r in ellipsoids]
+    return naive.to_pixels(view.camera, np.concatenate(points, 1).T)
+
+
+@pytest.mark.parametrize("distance", [1.2, 2.5])
+def test_a_hull_s_corners_touch_the_outline_of_its_ellipsoids(distance, rng):
+    view = picture("rounded", camera((640, 480)), distance)
+    for pose in random_poses(rng, view.body.skeleton, 3) * 0.5:
+        corners, counts = projected(view, pose[None])
+        for shape in range(len(view.body.parts)):
+            assert counts[0, shape] == len(DIRECTIONS)
+            true = (ellipsoid_points(view, pose, shape) @ DIRECTIONS.T).max(0)
+            mine = (corners[0, shape] @ DIRECTIONS.T).max(0)
+            wide = np.ptp(corners[0, shape], axis=0).max()
+            # An ellipsoid's outline is nearly that of the flat ellipse at its centre: nearly, the nearer the less.
+            np.testing.assert_allclose(mine, true, atol=0.04 * wide)
+
+
+def test_hulls_behind_the_camera_are_not_drawn():
+    behind = picture("rounded", distance=-2.5)
+    assert not projected(behind)[1].any()
+    assert not behind.mask(np.zeros(12)).any()
+
+
+# Whole people ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize(("lens", "distance", "size"), [
+    ("pinhole", 2.5, (160, 120)), ("distorted", 2.5, (130, 100)), ("equidistant", 1.5, (64, 48)),
+    ("pinhole", 0.5, (97, 60)),  # the arms cross the near plane
+    ("pinhole", 1.0, (1, 1)), ("pinhole", 3.0, (200, 7)),
+])  # fmt: skip
+def test_the_mask_is_the_union_of_all_parts(body, lens, distance, size, rng):
+    view = picture(body, camera(size, lens), distance)
+    poses = random_poses(rng, view.body.skeleton, 4)
+    for pose in poses:
+        drawn, doubtful = naive.silhouette(view, pose)
+        assert doubtful.mean() < 0.01 or size == (1, 1)
+        np.testing.assert_array_equal(view.mask(pose)[~doubtful], drawn[~doubtful])
+
+
+def test_a_close_person_does_cross_the_near_plane(rng):
+    view = picture("cardbox", camera((97, 60)), 0.5)
+    T = view.transforms(random_poses(rng, view.body.skeleton, 50))
+    counts = view.polygons(T, np.arange(15))[1]
+    assert {0, 3, 4, 5} <= set(counts.ravel())
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_mirrored_pose_draws_a_mirrored_mask(body, rng):
+    view = picture(body, camera((161, 120)))
+    poses = random_poses(rng, view.body.skeleton, 10)
+    for pose, other in zip(poses, mirrored(view.body.skeleton, poses)):
+        a, b = view.mask(pose), view.mask(other)[:, ::-1]
+        assert a.sum() > 100
+        # Of a row's two ends on pixel centres one counts, the left: nothing else may differ.
+        assert (a != b).sum() <= 2
+    assert (view.mask(poses[0]) != view.mask(mirrored(view.body.skeleton, poses[:1])[0])).any()
+
+
+def test_some_shapes_are_drawn_by_number_and_the_whole_is_their_union(rng):
+    view = picture("rounded")
+    pose = random_poses(rng, view.body.skeleton, 1)[0]
+    parts = [view.draw(pose, np.array([i])) for i in range(len(view.body.parts))]
+    np.testing.assert_array_equal(np.bitwise_or.reduce(parts), view.draw(pose))
+    assert not view.draw(pose, np.array([], np.int64)).any()
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("body", BODIES)
+def test_added_counts_what_drawing_adds(body, rng):
+    view = picture(body, camera((100, 75)))
+    poses = random_poses(rng, view.body.skeleton, 6)
+    silhouette, fixed = rng.random((75, 100)) < 0.5, rng.random((75, 100)) < 0.5
+    which = np.array([1, 4, 5])
+    found = view.added(view.transforms(poses), which, pack(silhouette), pack(fixed))
+    for n, pose in enumerate(poses):
+        new = unpack(view.draw(pose, which), 100) & ~fixed
+        np.testing.assert_array_equal(found[n], [new.sum(), (new & silhouette).sum()])
+
+
+def test_people_of_different_sizes_are_drawn_at_once(rng):
+    view = picture("rounded")
+    people = [SIZES, SIZES.with_values(upper_arm_width=0.2), SIZES.with_values(head_height=0.4)]
+    poses = random_poses(rng, view.body.skeleton, 3)
+    bodies = [BODIES["rounded"](sizes) for sizes in people]
+    stacked = tuple(np.array([b.shapes.arrays[i] for b in bodies]) for i in range(2))
+    which = np.arange(len(view.body.parts))
+    T = view.transforms(poses)
+    corners = view.polygons(T, which, stacked)[0]
+    for n, body in enumerate(bodies):
+        alone = Picture(Body("b", view.body.skeleton, body.shapes, body.parts, {}, body.hem), view.camera, view.T_camera_base)
+        np.testing.assert_array_equal(corners[n], alone.polygons(T[n : n + 1], which)[0][0])
+
+
+def test_masks_of_another_size_are_refused():
+    view = picture(cam=camera((100, 75)))
+    T = view.transforms(np.zeros((1, 12)))
+    good, wide, high = view.empty(), pack(np.zeros((75, 200))), pack(np.zeros((80, 100)))
+    for silhouette, fixed in ((wide, good), (good, wide), (high, high)):
+        with pytest.raises(ShadowPuppetError, match=r"words x rows, expected the camera's \(2, 75\)"):
+            view.added(T, np.arange(3), silhouette, fixed)
+
+
+# Where the body and its legs are --------------------------------------------------------------------------------------
+
+
+def test_the_body_s_frame_is_the_paper_s():
+    cam = camera()
+    T = place(cam, 2.0, 0.3)
+    np.testing.assert_allclose(T[:3, :3].T @ [0, 0, -1], [1, 0, 0], atol=1e-12)  # X toward the camera
+    np.testing.assert_allclose(T[:3, :3].T @ [1, 0, 0], [0, 1, 0], atol=1e-12)  # Y to the image's right
+    np.testing.assert_allclose(T[:3, 3], [0, -0.3, 2.0], atol=1e-12)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(0, 6.28), st.floats(0.5, 5), st.floats(-1, 1))
+def test_the_body_stands_upright_in_the_world_however_the_camera_is_pitched(pitch, heading, distance, elevation):
+    level = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    R = rotation_from_vector([pitch, 0, 0]) @ level @ rotation_from_vector([0, 0, heading])
+    cam = Camera("cam", (160, 120), camera().matrix, T_camera_world=rigid(R, [0.3, 0.2, 1.0]))
+    T = place(cam, distance, elevation)
+    np.testing.assert_allclose(T[:3, 2], R @ [0, 0, 1], atol=1e-9)  # Z is the world's up
+    np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-9)
+    assert np.linalg.det(T[:3, :3]) > 0
+    assert T[0, 3] == pytest.approx(0, abs=1e-9)  # straight ahead
+    assert T[:3, 3] @ T[:3, 2] == pytest.approx(elevation, abs=1e-9)
+    assert np.linalg.norm(T[:3, 3] - elevation * T[:3, 2]) == pytest.approx(distance)
+    if pitch == 0:
+        assert T[2, 3] == pytest.approx(distance)
+
+
+def test_a_camera_that_looks_straight_down_uses_its_own_frame():
+    cam = Camera("cam", (160, 120), camera().matrix, T_camera_world=rigid(rotation_from_vector([np.pi, 0, 0]), [0, 0, 3.0]))
+    np.testing.assert_allclose(place(cam, 2.0, 0.0), place(camera(), 2.0, 0.0), atol=1e-12)
+
+
+def test_points_in_the_world_are_those_in_the_camera_s_frame(rng):
+    cam = Camera("cam", (160, 120), camera().matrix, T_camera_world=rigid(rotation_from_vector([1.4, 0.2, 0]), [0.3, 0.2, 1.0]))
+    view = picture(cam=cam)
+    poses = random_poses(rng, view.body.skeleton, 3)
+    np.testing.assert_allclose(cam.project(view.points_world(poses)), naive.to_pixels(cam, view.points(poses)), atol=1e-9)
+
+
+@pytest.mark.parametrize("twist", [0.0, 0.7, -1.2])
+def test_legs_hang_from_the_waist_and_widen(twist):
+    view = picture("rounded", camera((200, 220)), elevation=0.3)
+    pose = view.body.skeleton.pose(torso_twist=twist)
+    legs, waist = view.legs(pose), unpack(view.draw(pose, view.body.shapes_of("waist")), 200)
+    rows = np.flatnonzero(legs.any(1))
+    assert abs(rows[0] - np.flatnonzero(waist.any(1))[-1]) <= 3
+    assert rows[-1] == 219
+    widths = legs[rows].sum(1)
+    assert (np.diff(widths) >= 0).all()
+    assert widths[-1] - widths[0] == pytest.approx(2 * np.tan(np.radians(25)) * (len(rows) - 1), abs=3)
+
+
+def test_legs_out_of_the_picture_or_behind_the_camera_are_nowhere():
+    assert not picture(elevation=-2.0).legs(np.zeros(12)).any()
+    assert not picture(distance=-2.0).legs(np.zeros(12)).any()
+
+
+def test_the_upper_body_has_no_other_measures_than_its_skeleton():
+    assert upper_body_skeleton(SIZES) == picture().body.skeleton
