@@ -169,7 +169,7 @@ def test_ready_masks_are_used_only_when_asked_for(recording, tmp_path):
 
 def _sampled(recording, options):
     footage = open_footage(recording, options)
-    return footage, take_sample(footage), options
+    return footage, take_sample(footage, options.masks), options
 
 
 def test_larger_frames_are_scaled_and_joints_stay_where_they_are(recording, run, tmp_path):
@@ -270,7 +270,7 @@ def test_memory_does_not_grow_with_the_film(recording):
         longer = replace(footage)
         shots = [shot for _ in range(times) for shot in footage.shots(ready=False)]
         long = [shot._replace(time=n / 10) for n, shot in enumerate(shots)]
-        object.__setattr__(longer, "shots", lambda ready, long=long: iter(shot._replace(image=shot.image.copy()) for shot in long))
+        object.__setattr__(longer, "shots", lambda ready, strict, long=long: iter(shot._replace(image=shot.image.copy()) for shot in long))
         tracemalloc.start()
         sample = take_sample(longer)
         peaks.append(tracemalloc.get_traced_memory()[1])

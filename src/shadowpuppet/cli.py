@@ -23,7 +23,8 @@ def _version() -> str:
     return version("shadowpuppet")
 
 
-app = App(name="shadowpuppet", version=_version, help_format="plaintext", help="Markerless motion capture from silhouettes.")
+app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppress_keyboard_interrupt=False,
+          help="Markerless motion capture from silhouettes.")
 Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it, or an earlier "
                                                             "run's run.toml. Flags go before it.")]
 Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]

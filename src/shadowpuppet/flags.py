@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, make_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from types import UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from cyclopts import Group, Parameter
 from pydantic import BeforeValidator
@@ -32,7 +33,7 @@ def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True) -> t
         if isinstance(hint, type) and is_dataclass(hint):
             made.append((field.name, Annotated[flags_of(hint, shown=False) | None, HIDDEN], None))
         else:
-            made.append((field.name, Annotated[_typed(hint) | None, _parameter(field, told, shown)], None))
+            made.append((field.name, Annotated[_bare(hint) | None, _parameter(field, told, shown)], None))
     # cyclopts takes classes of the standard library, as which it would see this one, for single values.
     return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
 
@@ -56,16 +57,14 @@ def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     return {**below, **above, **both}
 
 
-def _typed(hint: Any) -> Any:
-    """The type that a flag has: what can be told in one word is text."""
-    metadata = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-    if any(isinstance(item, BeforeValidator) for item in metadata) or any(_is_split(part) for part in get_args(hint)):
-        return str
+def _bare(hint: Any) -> Any:
+    """A type without its limits, which `make_options` checks; text where it is read from text."""
+    if get_origin(hint) is Annotated:
+        read = any(isinstance(item, BeforeValidator) for item in get_args(hint)[1:])
+        return str if read else _bare(get_args(hint)[0])
+    if get_origin(hint) in (Union, UnionType):
+        return Union[tuple(_bare(part) for part in get_args(hint))]  # noqa: UP007 - a tuple of types
     return hint
-
-
-def _is_split(hint: Any) -> bool:
-    return get_origin(hint) is Annotated and any(isinstance(item, BeforeValidator) for item in get_args(hint)[1:])
 
 
 def _parameter(field: Any, told: str, shown: bool) -> Parameter:

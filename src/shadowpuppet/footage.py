@@ -53,12 +53,15 @@ class Footage:
         """The film's frames."""
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
 
-    def shots(self, ready: bool) -> Iterator[Shot]:
-        """The film's frames, with the ready silhouettes where asked for. Raises `SilhouetteError` where these end before it."""
+    def shots(self, ready: bool, strict: bool = True) -> Iterator[Shot]:
+        """The film's frames, with the ready silhouettes where asked for.
+
+        Raises `SilhouetteError` where these end before it, or, if not `strict`, goes on without.
+        """
         masks = iter(open_frames(self.view.masks, size=self.camera.size)) if ready and self.view.masks else None
         for n, frame in enumerate(self.film()):
             mask = None if masks is None else next(masks, None)
-            if masks is not None and mask is None:
+            if masks is not None and mask is None and strict:
                 raise SilhouetteError(f"{self.view.masks}: found {n} silhouettes, expected one for each frame of {self.view.video}")
             yield Shot(frame.time, frame.image, None if mask is None else mask.image)
 
@@ -147,14 +150,14 @@ class Sample:
         return float(np.std(np.diff(self.times))) if len(self.times) > 1 else np.nan
 
 
-def take_sample(footage: Footage) -> Sample:
-    """Go once through the film's first `LOOKED_AT` frames. Raises `VideoError` for a film without any."""
+def take_sample(footage: Footage, need_masks: bool = False) -> Sample:
+    """Go once through the film's first `LOOKED_AT` frames. Raises `SilhouetteError` where ready masks that are needed end before."""
     film = footage.film()
     length = film.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
     wanted = _spread(min(int(length), LOOKED_AT))
     runs: dict[int, list[Shot]] = {}
     first, times, next_first = list[Shot](), list[float](), 0.0
-    for n, shot in zip(range(LOOKED_AT), footage.shots(ready=True)):
+    for n, shot in zip(range(LOOKED_AT), footage.shots(ready=True, strict=need_masks)):
         times.append(shot.time)
         if n in wanted:
             runs.setdefault(wanted[n], []).append(shot)

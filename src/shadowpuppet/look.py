@@ -84,7 +84,7 @@ class Prepared:
 def prepare(path: str, options: Options, rng: np.random.Generator) -> Prepared:
     """Look at a recording, and find the person. Raises a `ShadowPuppetError` where something cannot be used."""
     footage = open_footage(path, options)
-    sample = take_sample(footage)
+    sample = take_sample(footage, options.masks)
     seen = silhouettes(footage, sample, options)
     look = _first_look(footage, sample, seen)
     if look.refusal is not None:
@@ -120,7 +120,7 @@ def _first_look(footage: Footage, sample: Sample, seen: Silhouettes) -> Look:
         area=_share(flat), plain_area=_share(plain) if plain else None, exact_overlap=_agreement(flat, exact),
         exact_overlap_plain=_agreement(plain, exact), quality=quality, refusal=quality.refusal(),
     )  # fmt: skip
-    return replace(look, doubts=tuple(_doubts(look, footage)))
+    return look if look.refusal else replace(look, doubts=tuple(_doubts(look, footage)))
 
 
 def _doubts(look: Look, footage: Footage) -> list[str]:

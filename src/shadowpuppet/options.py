@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import re
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -138,9 +137,14 @@ def _plain(value: Any) -> Any:
     return {f.name: _plain(getattr(value, f.name)) for f in fields(value)} if is_dataclass(value) else value
 
 
-def _lines(settings: Any, title: str) -> Iterator[str]:
+def _toml(value: Any) -> str:
+    """A value as TOML, on one line."""
     import tomli_w
 
+    return f"[{', '.join(map(_toml, value))}]" if isinstance(value, tuple) else tomli_w.dumps({"x": value}).strip()[4:]
+
+
+def _lines(settings: Any, title: str) -> Iterator[str]:
     inner = []
     for field, _, told in settings_of(type(settings)):
         value = getattr(settings, field.name)
@@ -151,8 +155,7 @@ def _lines(settings: Any, title: str) -> Iterator[str]:
         if value is None:
             yield f"# {field.name} ="
         else:
-            text = tomli_w.dumps({field.name: list(value) if isinstance(value, tuple) else value})
-            yield re.sub(r"\n\s*|,\n", " ", text.rstrip()).replace(", ]", "]").replace("[ ", "[")
+            yield f"{field.name} = {_toml(value)}"
     for name, value, told in inner:
         place = f"{title}.{name}" if title else name
         yield from ("", f"# {told}", f"[{place}]")

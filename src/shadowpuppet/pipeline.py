@@ -142,8 +142,9 @@ def _generators(options: Options) -> list[np.random.Generator]:
 
 
 def _write_beside(folder: Path, prepared: Prepared) -> None:
+    found = check(prepared)
     write_whole(folder / "look.json", json_text(prepared.look) + "\n")
-    write_person(folder / "person.toml", check(prepared).person)
+    write_person(folder / "person.toml", found.person)
     write_calibration(folder / "calibration.toml", [prepared.footage.view.camera])
 
 
