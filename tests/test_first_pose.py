@@ -50,9 +50,9 @@ def test_who_stands_in_a_coarse_pose_is_found(left, right, y):
     pose = np.array([y, 0, 0, 0, *LIBRARY[left], *LIBRARY[right]])
     mask = VIEW.mask(pose)
     found = search(VIEW, mask)
-    assert abs(found.pose[0] - y) < 0.12
-    assert overlap(VIEW, found.pose, mask) > 0.75
-    assert found.cost <= 0.25 * mask.sum()
+    assert abs(found.pose[0] - y) < 0.03
+    assert overlap(VIEW, found.pose, mask) > 0.85
+    assert found.cost <= 0.15 * mask.sum()
 
 
 def test_level_arms_are_found_to_the_pixel():
