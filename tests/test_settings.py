@@ -1,0 +1,130 @@
+"""Settings: presets and Table I, tables laid over one another, ranges, and what is said of names and values that are wrong."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+from typing import get_args, get_type_hints
+
+import pytest
+
+from shadowpuppet.body import BODIES
+from shadowpuppet.errors import SettingsError
+from shadowpuppet.resampling import SCHEMES
+from shadowpuppet.settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings, validate
+
+KINDS = (PartSettings, MonocularSettings, InitializationSettings)
+
+
+# Presets --------------------------------------------------------------------------------------------------------------
+
+
+def test_liu2011_is_table_i():
+    paper = make_settings("liu2011")
+    assert paper.torso == PartSettings(particles=200, survival=0.2, sigma_rotation=0.1, sigma_translation=0.02, sigma_cost=8000)
+    assert paper.arm == PartSettings(particles=200, survival=0.4, sigma_rotation=0.25, sigma_translation=0.02, sigma_cost=4000)
+    assert (paper.body, paper.resampling, paper.estimate) == ("cardbox", "deterministic", "best")
+    assert paper.stages == ("torso", "left_arm", "right_arm")
+    # One cycle a frame of one noise, and nothing that the paper does not have.
+    assert (paper.cycles, paper.cooling, paper.explore, paper.motion_weight, paper.posture_weight) == (1, 1, 0, 0, 0)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_presets_are_possible_and_overrides_come_last(preset):
+    plain = make_settings(preset)
+    changed = make_settings(preset, {"cycles": 9, "arm": {"survival": 0.77}})
+    assert changed == replace(plain, cycles=9, arm=replace(plain.arm, survival=0.77))
+    assert make_settings(preset, {}) == plain
+
+
+def test_the_default_preset_is_what_the_class_says():
+    assert make_settings() == MonocularSettings()
+
+
+def test_a_table_given_in_part_keeps_the_rest_of_the_preset_s():
+    made = make_settings("liu2011", {"arm": {"particles": 50}})
+    assert (made.arm.particles, made.arm.survival, made.arm.sigma_cost) == (50, 0.4, 4000)
+    assert made.torso == make_settings("liu2011").torso
+    assert make_settings("liu2011", {"torso": PartSettings(particles=7)}).torso == PartSettings(particles=7)
+
+
+def test_merging_changes_no_preset():
+    before = repr(PRESETS)
+    make_settings("liu2011", {"arm": {"particles": 50}, "torso": {"survival": 1.0}})
+    assert repr(PRESETS) == before
+
+
+def test_names_that_settings_offer_are_those_there_are():
+    hints = get_type_hints(MonocularSettings)
+    assert set(get_args(hints["body"])) == set(BODIES)
+    assert set(get_args(hints["resampling"])) == set(SCHEMES)
+
+
+# What is wrong --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("overrides", "said"), [
+    ({"particles": 3}, "unknown setting 'particles'; there are: arm, body, cooling, cycles"),
+    ({"torso": {"particle": 3}}, "unknown setting 'torso.particle'; there are: particles, sigma_cost, sigma_rotation"),
+    ({"arm": {"cycles": 3}}, "unknown setting 'arm.cycles'; there are: particles"),
+    ({"torso": {"particles": 1}}, "torso.particles: found 1; input should be greater than or equal to 2"),
+    ({"torso": {"particles": 2.5}}, "torso.particles: found 2.5; input should be a valid integer"),
+    ({"torso": {"survival": 1.01}}, "torso.survival: found 1.01; input should be less than or equal to 1"),
+    ({"arm": {"survival": -0.1}}, "arm.survival"), ({"arm": {"sigma_rotation": 0}}, "arm.sigma_rotation"),
+    ({"arm": {"sigma_translation": -1}}, "arm.sigma_translation"), ({"arm": {"sigma_cost": 0}}, "arm.sigma_cost"),
+    ({"arm": {"sigma_rotation": math.nan}}, "arm.sigma_rotation: found nan"),
+    ({"torso": 3}, "torso: found 3; input should be a dictionary"),
+    ({"torso": None}, "torso: found None"), ({"stages": []}, "stages: found []"), ({"stages": "torso"}, "stages: found 'torso'"),
+    ({"stages": ["torso", 3]}, "stages.1: found 3"), ({"cycles": 0}, "cycles: found 0"), ({"cycles": 101}, "cycles: found 101"),
+    ({"cooling": 0}, "cooling"), ({"cooling": 1.1}, "cooling"), ({"explore": -1}, "explore"), ({"motion_weight": -1}, "motion_weight"),
+    ({"motion_reach": 0}, "motion_reach"), ({"posture_weight": math.nan}, "posture_weight"),
+    ({"body": "ball"}, "body: found 'ball'; input should be 'cardbox', 'boxes' or 'rounded'"),
+    ({"resampling": "best"}, "resampling: found 'best'; input should be 'deterministic', 'stratified'"),
+    ({"rank_by": None}, "rank_by: found None"), ({"torso_arms": "both"}, "input should be 'last' or 'hidden'"),
+    ({"estimate": "median"}, "input should be 'best' or 'mean'"), ({"limits": 2}, "limits: found 2"),
+    ({"ignore_legs": "perhaps"}, "ignore_legs"),
+])  # fmt: skip
+def test_what_is_wrong_is_said_with_its_place_and_what_is_possible(overrides, said):
+    with pytest.raises(SettingsError) as error:
+        make_settings("liu2011", overrides, "run.toml")
+    assert str(error.value).startswith("run.toml: ")
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("values", "said"), [
+    ({"hypotheses": 1}, "hypotheses"), ({"sigma": 0}, "sigma"), ({"share": 0}, "share"), ({"shrink": 1.5}, "shrink"),
+    ({"prior_weight": -1}, "prior_weight"), ({"tolerance": 2}, "tolerance"), ({"patience": 0}, "patience"), ({"rounds": 0}, "rounds"),
+    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: hypotheses, patience"),
+])  # fmt: skip
+def test_what_is_wrong_in_other_tables_is_said_alike(values, said):
+    with pytest.raises(SettingsError) as error:
+        validate(InitializationSettings, values, "run.toml")
+    assert said in str(error.value)
+
+
+def test_an_unknown_preset_is_said_with_those_there_are():
+    with pytest.raises(SettingsError, match="unknown preset 'liu'; there are: default, liu2011"):
+        make_settings("liu", source="run.toml")
+
+
+# What holds of all settings -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_settings_are_frozen_named_and_comparable(kind):
+    made = kind()
+    assert made == kind()
+    assert hash(made) == hash(kind())
+    with pytest.raises(FrozenInstanceError):
+        setattr(made, fields(made)[0].name, 3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_settings_go_through_plain_values_and_back(kind):
+    """As they do through TOML and run.toml."""
+    def plain(settings):
+        return {f.name: plain(v) if is_dataclass(v := getattr(settings, f.name)) else list(v) if isinstance(v, tuple) else v
+                for f in fields(settings)}
+
+    assert validate(kind, plain(kind())) == kind()
