@@ -12,13 +12,13 @@ from shadowpuppet.synthetic import Gesture, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.video import open_frames, write_frames
 
 SIZE = (160, 120)
-RATE = 10.0
+RATE, FRAMES = 8.0, 29
 SPEC = Spec(name="tiny", motion=(Gesture(motion="wave_hands", seconds=2),), cameras=(Viewpoint(size=SIZE),), rate=RATE,
             scene=Scene(empty_seconds=1))
 
 
 def make(folder: Path) -> Path:
-    """A recording of 37 frames, with background, masks, references and truth."""
+    """A recording of `FRAMES` frames, with background, masks, references and truth."""
     return synthesize(SPEC, folder, np.random.default_rng(7))
 
 

@@ -130,8 +130,9 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert "\x1b" not in out
     assert max(map(len, out.splitlines())) <= 80
     assert not any(line.endswith(" ") for line in out.splitlines())
-    for word in ("camera       cam, 160 x 120 pixels, 60 degrees wide, calibrated", "film         37 frames, 10 frames/s", "scale",
-                 "exact masks", "person", "frames   37", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
+    for word in ("camera       cam, 160 x 120 pixels, 60 degrees wide, calibrated",
+                 f"film         {made.FRAMES} frames, 8 frames/s", "scale",
+                 "exact masks", "person", f"frames   {made.FRAMES}", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
         assert word in out
     assert "run-tiny/joints.csv" in out
     assert (tmp_path / "run-tiny" / "joints.csv").exists()
@@ -147,7 +148,7 @@ def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
     assert "these silhouettes overlap the ready ones by 0.9" in out
     assert not list(tmp_path.iterdir())
     code, out, _ = shell("info", recording, "--json")
-    assert (code, json.loads(out)["frames"]) == (0, 37)
+    assert (code, json.loads(out)["frames"]) == (0, made.FRAMES)
 
 
 def test_evaluate_measures_again_what_track_measured(shell, recording, run):
@@ -166,9 +167,9 @@ def test_evaluate_measures_again_what_track_measured(shell, recording, run):
 def test_evaluate_takes_joints_and_a_first_frame(shell, run):
     code, out, _ = shell("evaluate", run, "--joints", "neck,head", "--start", "10", "--json")
     errors = json.loads(out)["errors"]
-    assert (code, list(errors["joints"]), errors["frames"]) == (0, ["neck", "head"], 27)
+    assert (code, list(errors["joints"]), errors["frames"]) == (0, ["neck", "head"], made.FRAMES - 10)
     assert "the run lacks" in refused(shell, "evaluate", run, "--joints", "left_knee")
-    assert "start: found 99, expected 0 to 36, a frame of" in refused(shell, "evaluate", run, "--start", "99")
+    assert f"start: found 99, expected 0 to {made.FRAMES - 1}, a frame of" in refused(shell, "evaluate", run, "--start", "99")
 
 
 def test_evaluate_says_when_the_truth_is_gone(shell, run, tmp_path):
@@ -323,7 +324,7 @@ def test_nobody_in_the_film(shell, spoilt, tmp_path):
 
 
 def test_silhouettes_of_everything(shell, spoilt):
-    made.write_film(spoilt / "masks" / "cam.mkv", [np.full(made.SIZE[::-1], 255, np.uint8)] * 37, lossless=True)
+    made.write_film(spoilt / "masks" / "cam.mkv", [np.full(made.SIZE[::-1], 255, np.uint8)] * made.FRAMES, lossless=True)
     assert "nearly all of the picture is silhouette in 100 % of the frames" in refused(shell, "track", spoilt, "--masks")
 
 
@@ -333,7 +334,7 @@ def test_a_person_partly_outside(shell, spoilt, tmp_path):
     code, _, err = shell("track", spoilt, "-o", "run", "--masks", *QUICK)
     assert code == 0
     assert "warning: the silhouette touches the left border in" in err
-    assert len(read_run(tmp_path / "run").motion) == 37
+    assert len(read_run(tmp_path / "run").motion) == made.FRAMES
 
 
 def test_no_references_no_height_no_distance(shell, recording, tmp_path):
@@ -342,7 +343,7 @@ def test_no_references_no_height_no_distance(shell, recording, tmp_path):
     assert code == 0
     assert "average height of 1.70 m, assumed" in out
     assert err.count("warning: neither height nor distance is known") == 1
-    assert len(read_run(tmp_path / "run").motion) == 37
+    assert len(read_run(tmp_path / "run").motion) == made.FRAMES
 
 
 def test_references_in_the_wrong_posture(shell, spoilt):
@@ -366,7 +367,7 @@ def test_a_truncated_film_gives_what_it_has(shell, spoilt, tmp_path):
     code, _, err = shell("track", spoilt, "-o", "run", *QUICK)
     assert code == 0
     assert err.count("broken off") == 1  # though the film is read more than once
-    assert 5 < len(read_run(tmp_path / "run").motion) < 37
+    assert 5 < len(read_run(tmp_path / "run").motion) < made.FRAMES
 
 
 def test_a_full_disk(shell, recording, monkeypatch, tmp_path):
@@ -404,7 +405,7 @@ def test_control_c_leaves_a_run_that_can_be_read(recording, tmp_path):
     assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}\n", err)
     left = read_run(folder)
     assert not left.complete
-    assert 2 <= len(left.motion) < 37
+    assert 2 <= len(left.motion) < made.FRAMES
 
 
 def test_control_c_before_the_first_frame(shell, recording, monkeypatch, tmp_path):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
-from shadowpuppet.footage import Footage, Mask, Sample, Shot, Silhouettes
+from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
 from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import POSTURES, Fit, Guess, find_person, fit_references
 from shadowpuppet.io.person import Person, read_person
@@ -65,7 +66,7 @@ class Found:
 def find(footage: Footage, sample: Sample, seen: Silhouettes, options: Options, rng: np.random.Generator) -> Found:
     """Sizes and place. Raises `TrackingError` where nobody is found or a reference shows another posture, or `FormatError`."""
     for_fit, for_start = rng.spawn(2)
-    masks = [mask for mask in map(seen, [*sample.first, *sample.shots]) if mask.any()]
+    masks = list(islice((mask for mask in map(seen, chain(sample.first, sample.shots)) if mask.any()), FIRST))
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty, expected a person in them")
     fit, source = _fitted(footage, masks, seen, options, for_fit)
@@ -98,9 +99,7 @@ def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Opt
 
 def _few(masks: list[Mask]) -> list[Mask]:
     """Some of the masks of the first seconds, spread."""
-    first = masks[: max(10, LOOKED_FOR_IN)]
-    places = np.unique(np.linspace(0, len(first) - 1, LOOKED_FOR_IN).astype(int))
-    return [first[k] for k in places]
+    return [masks[k] for k in np.unique(np.linspace(0, len(masks) - 1, LOOKED_FOR_IN).astype(int))]
 
 
 def _references(footage: Footage, seen: Silhouettes) -> dict[str, Mask]:
