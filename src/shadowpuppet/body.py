@@ -105,7 +105,7 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     joints = [Joint(shoulder, "torso", (0.0, y, z)), Joint(elbow, shoulder, (0.0, 0.0, -sizes.upper_arm_length))]
     dofs = [
         Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190]), rest=0.8, spread=(2.0, 2.0)),
-        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100]), rest=0.2, spread=(0.2, 0.7)),
+        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100]), rest=0.2, spread=(0.25, 0.7)),
         Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95]), spread=(1.0, 1.0)),
         Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150]), spread=(1.2, 1.2)),
     ]
@@ -126,7 +126,7 @@ def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleto
     joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
-        Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90]), spread=(0.25, 0.25)),
+        Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90]), spread=(0.7, 0.7)),
         Dof("torso_bow", "torso", "y", *np.radians([-10, 90]), spread=(0.06, 0.06)),
         Dof("torso_bend", "torso", "x", *np.radians([-50, 50]), spread=(0.25, 0.25)),
     ]

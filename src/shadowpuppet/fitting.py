@@ -31,7 +31,7 @@ POOR = 0.75
 """Overlap with the film's first silhouette under which the body is in doubt; bodies that fit have 0.85 to 0.95."""
 LONGEST_REFERENCE = 60
 """Frames of a reference's film that are looked at."""
-LOOKED_FOR_IN = 6
+LOOKED_FOR_IN = 12
 """Masks of the first seconds in which a person without references is looked for."""
 
 

@@ -23,7 +23,7 @@ LOOKED_AT = 1500
 """Frames of the film that a sample is taken from: a look must not take as long as the work."""
 RUNS, RUN = 10, 4
 """A sample's parts, spread over these frames, and the frames of each, which follow one another."""
-FIRST_SECONDS, FIRST = 3.0, 10
+FIRST_SECONDS, FIRST = 8.0, 16
 """The film's first seconds, and how many of their frames are in a sample too."""
 
 
