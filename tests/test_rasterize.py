@@ -119,8 +119,12 @@ def test_what_covers_all_draws_all():
 @given(st.lists(st.tuples(*[st.sampled_from([np.nan, np.inf, -np.inf, 1e300, -1e300, 1e19, -1e9, 1e9, 0, 5.5, 63, 64, 1e-300])] * 2),
                 min_size=1, max_size=5))
 @settings(max_examples=100, deadline=None)
-def test_nonsense_stays_inside_the_picture(corners):
-    assert draw_polygon(corners, (70, 9)).shape == (9, 70)  # with NUMBA_BOUNDSCHECK=1 a write past the end is an error
+def test_nonsense_stays_inside_the_picture_and_draws_nothing(corners):
+    with np.errstate(all="ignore"):
+        drawn = draw_polygon(corners, (70, 9))  # with NUMBA_BOUNDSCHECK=1 a write past the end is an error
+    assert drawn.shape == (9, 70)
+    if np.abs(corners).max() > 1e16 or not np.isfinite(corners).all():
+        assert not drawn.any()
 
 
 # Projection -----------------------------------------------------------------------------------------------------------

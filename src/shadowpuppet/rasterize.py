@@ -188,7 +188,7 @@ def _spans(P, m, width, height, left, right):  # pragma: no cover
         area += P[v, 0] * P[w, 1] - P[w, 0] * P[v, 1]
         top, bottom = min(top, P[v, 1]), max(bottom, P[v, 1])
         west, east = min(west, P[v, 0]), max(east, P[v, 0])
-    if abs(area) < 1e-9 or bottom < 0 or top >= height or east < 0 or west >= width:
+    if not 1e-9 <= abs(area) < 1e30 or bottom < 0 or top >= height or east < 0 or west >= width:  # edge-on, no numbers, or outside
         return 0, 0, 0, 0
     r0, r1 = int(np.ceil(max(top, 0.0))), int(np.ceil(min(bottom, float(height))))
     rows = max(r1 - r0, 0)
