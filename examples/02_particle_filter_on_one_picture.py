@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from shadowpuppet.anthropometry import sizes_from_height
 from shadowpuppet.body import cardbox
 from shadowpuppet.camera import Camera
-from shadowpuppet.anthropometry import sizes_from_height
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.overlay import matching
 from shadowpuppet.particle_filter import diffuse, evaluate, step
