@@ -441,3 +441,15 @@ def test_the_errors_are_those_of_the_projects_own_script(shell, recording, run, 
     ours = json.loads(shell("evaluate", run, "--json")[1])["errors"]
     for key in ("mean_mm", "rmse_mm", "plane_mm", "far", "p95_mm", "aligned_mean_mm"):
         assert ours[key] == pytest.approx(theirs[key], abs=0.01)
+
+
+def test_plane_and_depth_are_those_of_the_runs_camera(shell, run, tmp_path):
+    """Seen from the side, what was depth lies in the picture."""
+    turned = made.copied(run, tmp_path / "run")
+    rotation = next(line for line in (turned / "calibration.toml").read_text().splitlines() if line.startswith("rotation"))
+    side = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]
+    made.replace_text(turned / "calibration.toml", rotation, f"rotation = {side}")
+    before, after = (json.loads(shell("evaluate", folder, "--json")[1])["errors"] for folder in (run, turned))
+    assert after["mean_mm"] == pytest.approx(before["mean_mm"])
+    assert after["depth_mm"] < 0.9 * before["depth_mm"]
+    assert after["plane_mm"] > before["plane_mm"]

@@ -146,6 +146,9 @@ def test_frames_before_the_person_and_without_them_are_absent(recording, tmp_pat
     np.testing.assert_array_equal(result.motion.status == "absent", absent)
     np.testing.assert_array_equal(np.isnan(result.motion.joints).all((1, 2)), absent)
     assert any("the silhouette is empty in" in doubt for doubt in result.look.doubts)
+    for n, shown in enumerate(made.images(result.folder / "overlay.mp4")):
+        height = made.SIZE[1]
+        assert (shown[height + 30 : 2 * height].max() < 60) == absent[n]  # nothing is drawn of who is not there
 
 
 def test_masks_that_end_early_are_said(recording, tmp_path):
@@ -195,6 +198,15 @@ def test_what_is_outside_the_region_is_background(recording, tmp_path):
         right[:, 98:] = False
         assert not mask[:, 98:].any()
         assert overlap(mask, right) > 0.9
+
+
+def test_ready_masks_are_cut_to_the_region(recording):
+    options = make_options({"region": "0,0,80,120", "masks": True})
+    seen, whole = silhouettes(*_sampled(recording, options)), silhouettes(*_sampled(recording, Options(masks=True)))
+    shot = next(open_footage(recording, options).shots(ready=True))
+    assert whole(shot)[:, 80:].any()
+    assert not seen(shot)[:, 80:].any()
+    np.testing.assert_array_equal(seen(shot)[:, :80], whole(shot)[:, :80])
 
 
 def test_a_region_is_told_in_pixels_of_the_film(recording):
