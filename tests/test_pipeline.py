@@ -151,6 +151,19 @@ def test_frames_before_the_person_and_without_them_are_absent(recording, tmp_pat
         assert (shown[height + 30 : 2 * height].max() < 60) == absent[n]  # nothing is drawn of who is not there
 
 
+def test_a_run_that_lost_the_person_says_so(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "lost")
+    masks = made.images(recording / "masks" / "cam.mkv")
+    for n in range(10, 20):
+        masks[n] = np.zeros_like(masks[n])
+        masks[n][::4] = 255  # stripes all over
+    made.write_film(spoilt / "masks" / "cam.mkv", masks, lossless=True)
+    with pytest.warns(ShadowPuppetWarning, match=r"the person is lost in \d+ % of the frames, first at 1.\d\d s"):
+        result = track_recording(spoilt, tmp_path / "run", make_options(QUICK | {"masks": True}))
+    assert np.isnan(result.motion.joints[result.motion.status == "lost"]).all()
+    assert (result.motion.status[:10] == "tracked").all()
+
+
 def test_masks_that_end_early_are_said(recording, tmp_path):
     spoilt = made.copied(recording, tmp_path / "short")
     made.write_film(spoilt / "masks" / "cam.mkv", made.images(recording / "masks" / "cam.mkv")[:20], lossless=True)

@@ -36,6 +36,8 @@ STAGES = ("decode", "segment", "track", "write")
 """What a frame's time is spent on."""
 FALLBACK_RATE = 25.0
 """Frames/s of an overlay whose film does not tell its own."""
+MANY_LOST = 0.1
+"""Share of frames from which on a run that lost the person is said to be in doubt."""
 
 
 class Listener:
@@ -116,8 +118,9 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
         run.info |= {"truth": str(truth.resolve())} if (truth := prepared.footage.recording.truth) else {}
         _write_beside(run.folder, prepared)
         _follow(run, prepared, options, listener, for_track, joints)
-    motion = read_run(folder).motion
-    metrics = read_run(folder).metrics | _evaluated(prepared, motion)
+    written = read_run(folder)
+    motion, metrics = written.motion, written.metrics | _evaluated(prepared, written.motion)
+    _warn_of_losses(motion)
     write_metrics(folder, metrics)
     return Summary(Path(folder), motion, metrics, prepared.look)
 
@@ -208,6 +211,16 @@ def _draw(film: OverlayWriter, seconds: float, image: np.ndarray, mask: np.ndarr
 def _timings(watch: Watch, frames: int, wall: float) -> dict[str, Any]:
     milliseconds = {stage: round(1000 * seconds / max(frames, 1), 3) for stage, seconds in watch.seconds.items()}
     return {"track_s": round(wall, 3), "frames_per_s": round(frames / max(wall, 1e-9), 2), "ms_per_frame": milliseconds}
+
+
+def _warn_of_losses(motion: Motion) -> None:
+    """Warn where much of the run is nothing."""
+    lost = np.flatnonzero(motion.status == "lost")
+    present = np.count_nonzero(motion.status != "absent")
+    if len(lost) > MANY_LOST * present:
+        warn(f"the person is lost in {100 * len(lost) / present:.0f} % of the frames, first at {motion.times[lost[0]]:.2f} s: do their "
+             "silhouettes show them, and them alone? --overlay shows it; give a picture of the empty scene, a --region, or better light",
+             ShadowPuppetWarning, stacklevel=3)
 
 
 def _evaluated(prepared: Prepared, motion: Motion) -> dict[str, Any]:
