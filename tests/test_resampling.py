@@ -123,6 +123,14 @@ def test_the_bound_on_expected_offspring_catches_a_published_bias():
     assert (np.abs(mean - 10 * weights) > margin).any()
 
 
+def test_strata_are_drawn_one_by_one_or_together():
+    """Of weights 1/4, 1/2, 1/4 and two strata: both outer particles with chance 1/4, or never."""
+    values, rng = np.log([0.25, 0.5, 0.25]), np.random.default_rng(2)
+    both = [np.mean([set(scheme(rng, values, 2).tolist()) == {0, 2} for _ in range(2000)]) for scheme in (stratified, systematic)]
+    assert both[0] == pytest.approx(0.25, abs=0.05)
+    assert both[1] == 0
+
+
 def test_strata_vary_less_than_independent_draws(rng):
     weights = normalise(rng.standard_normal(30))
     spread = {}
@@ -238,7 +246,7 @@ def test_ties_go_to_the_first():
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_every_scheme_made_by_name_puts_the_best_first(name, rng):
-    values = -np.array([30.0, 20, 10, 40])
+    values = -np.array([0.3, 0.2, 0.1, 0.4])  # all are drawn, and those drawn come in order
     ancestors = make_scheme(name, 0.5)(rng, values, 8)
     assert len(ancestors) == 8
     assert ancestors[0] == 2

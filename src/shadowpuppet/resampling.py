@@ -68,7 +68,7 @@ def residual(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> I
 def deterministic(rng: np.random.Generator, log_weights: ArrayLike, number: int, survival: float = 0.2) -> Indices:
     """DRS (Liu 2011, Algorithm 4): the best `survival` * number particles live on in their order; copies of the best fill the rest."""
     ranked = np.argsort(-np.asarray(log_weights, float), kind="stable")
-    survivors = ranked[: max(int(survival * number + 1e-9), 1)]
+    survivors = ranked[: int(survival * number + 1e-9)]
     return np.concatenate([survivors, np.full(number - len(survivors), ranked[0])])
 
 
