@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
@@ -395,7 +396,9 @@ def test_a_folder_that_holds_something_else(shell, recording, tmp_path):
 
 def test_control_c_leaves_a_run_that_can_be_read(recording, tmp_path):
     folder = tmp_path / "run"
-    child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10")
+    # Who starts the tests in the background has them, and so their children, ignore Ctrl-C.
+    heeding = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", preexec_fn=heeding)
     rows, end = folder / "joints.csv", time.monotonic() + 60
     while child.poll() is None and time.monotonic() < end and (not rows.exists() or rows.read_text().count("\n") < 4):
         time.sleep(0.01)
