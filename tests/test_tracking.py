@@ -11,6 +11,7 @@ import pytest
 
 from people import camera, picture
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.first_pose import search
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.rasterize import Picture
@@ -70,6 +71,15 @@ def test_a_wave_is_followed(preset, body):
     across = np.linalg.norm((found - view(body).points(poses, ARMS))[..., :2], axis=-1)  # depth is what one camera sees least
     assert np.median(across) < 0.05
     assert across.max() < 0.35
+
+
+@pytest.mark.parametrize("preset", ["liu2011", "default"])
+def test_the_start_settles_on_what_the_search_found_roughly(preset):
+    mask = wave(1)[1][0]
+    of = tracker(preset)
+    found = search(of.picture, mask)
+    rough = of.observe(mask, found.pose).cost_and_overlap(of.picture.draw(found.pose))[0]
+    assert of.start(np.random.default_rng(0), mask).cost < 0.6 * rough
 
 
 def test_a_state_says_what_its_pose_costs():
@@ -173,12 +183,15 @@ def test_an_arm_s_stage_sees_the_new_torso_and_the_other_arm_as_it_was(monkeypat
         np.testing.assert_array_equal(around[left | right], before.pose[left | right])
 
 
-@pytest.mark.parametrize(("rank_by", "evaluations"), [("last", 600), ("new", 1200)])
-def test_particles_are_ranked_by_known_costs_or_evaluated_again(monkeypatch, rank_by, evaluations):
+@pytest.mark.parametrize(("overrides", "evaluations"), [
+    ({}, 600), ({"rank_by": "new"}, 1200), ({"cycles": 3}, 1800), ({"cycles": 2, "explore": 10}, 1230), ({"stages": ("torso",)}, 200),
+])  # fmt: skip
+def test_how_many_particles_a_frame_evaluates(monkeypatch, overrides, evaluations):
+    """Ranked by known costs, or evaluated again in the new picture (eq. 8 as printed), which doubles the work."""
     counted = []
     original = Picture.added
     masks = wave(3)[1]
-    of = tracker(rank_by=rank_by)
+    of = tracker(**overrides)
     state = track(of, masks[:2])[-1]
 
     def added(view, transforms, *rest):
