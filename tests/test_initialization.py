@@ -203,6 +203,18 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
     assert scaled < as_it_was + 0.25 * (left - as_it_was)  # not all: a shoulder's rise has one size
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_who_was_taken_for_small_and_near_becomes_taller_and_farther(seed):
+    """The picture is the same for both; only the height that is known tells them apart."""
+    share = 1.5 / 1.78
+    near = Guess(CardboxSizes.from_array(SOMEONE.to_array() * share), 1.78, 2.8 * share, 0.15 * share)
+    pose = BODIES["rounded"](SOMEONE).skeleton.pose
+    poses = np.array([pose(torso_y=0.3 * i * share, **angles) for i, angles in enumerate(POSTURES.values())])
+    fit = refine(np.random.default_rng(seed), CAMERA, near, list(references().values()), poses, free_distance=True, settings=QUICK)
+    assert fit.guess.distance > near.distance + 0.1
+    assert crown(fit.guess) > crown(near) + 0.02
+
+
 def test_same_seed_same_sizes():
     quick = [fit_references(np.random.default_rng(s), CAMERA, references(), height=1.78, settings=QUICK).guess for s in (0, 0, 1)]
     assert quick[0].sizes == quick[1].sizes
