@@ -116,7 +116,7 @@ def main() -> None:
     args = parser.parse_args()
     cv2.setNumThreads(1)
     width, height = (int(n) for n in args.size.split("x"))
-    table = Table("body", "stage", "shapes", "bits", "OpenCV", "NumPy", "OpenCV/bits", "NumPy/bits", title=f"us a particle, {args.size}")
+    table = Table("body", "stage", "shapes", "bits", "OpenCV", "NumPy", "OpenCV / bits", "NumPy / bits", title=f"us a particle, {args.size}")
     rows = []
     for body, stage in product(BODIES, ("full", "arm")):
         spent = medians(contenders(body, stage, (width, height), args.particles), args.rounds)
@@ -124,7 +124,7 @@ def main() -> None:
         rows.append({"body": body, "stage": stage, "shapes": shapes, "size": args.size, "particles": args.particles, "microseconds": spent})
         ratios = (f"{spent['OpenCV'] / spent['bits']:.1f}", f"{spent['NumPy'] / spent['bits']:.0f}")
         table.add_row(body, stage, str(shapes), *(f"{spent[name]:.1f}" for name in ("bits", "OpenCV", "NumPy")), *ratios)
-    Console().print(table)
+    Console(width=100).print(table)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 

@@ -206,7 +206,7 @@ def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
 @pytest.mark.skipif(not hasattr(rasterize._added, "signatures"), reason="kernels are not compiled")
 @pytest.mark.parametrize("stage", ["full", "arm"])
 def test_bits_are_several_times_faster_than_opencv(stage):
-    """Measured side by side in turns: about ten times; the guard leaves a margin of two. OpenCV gets its polygons ready-made."""
+    """Measured side by side in turns: six to ten times, with OpenCV's polygons ready-made; the guard leaves a margin of two."""
     import cv2
     import kernels
 
@@ -217,7 +217,7 @@ def test_bits_are_several_times_faster_than_opencv(stage):
         spent = kernels.medians({name: runs[name] for name in ("bits", "OpenCV")}, 9)
     finally:
         cv2.setNumThreads(threads)
-    assert spent["OpenCV"] > 4 * spent["bits"], spent
+    assert spent["OpenCV"] > 3 * spent["bits"], spent
 
 
 @pytest.mark.parametrize("stage", ["full", "arm"])
