@@ -116,7 +116,8 @@ def main() -> None:
     args = parser.parse_args()
     cv2.setNumThreads(1)
     width, height = (int(n) for n in args.size.split("x"))
-    table = Table("body", "stage", "shapes", "bits", "OpenCV", "NumPy", "OpenCV / bits", "NumPy / bits", title=f"us a particle, {args.size}")
+    columns = ("body", "stage", "shapes", "bits", "OpenCV", "NumPy", "OpenCV / bits", "NumPy / bits")
+    table = Table(*columns, title=f"Microseconds a particle, {args.size}")
     rows = []
     for body, stage in product(BODIES, ("full", "arm")):
         spent = medians(contenders(body, stage, (width, height), args.particles), args.rounds)
