@@ -103,7 +103,7 @@ FOLDING = [{"distortion": [-0.3, 0, 0, 0]}, {"distortion": [-0.05, 0, 0, 0]}, LE
 
 @pytest.mark.parametrize("lens", FOLDING)
 def test_what_lies_outside_the_picture_is_not_bent_into_it(lens):
-    """Polynomials turn back beyond the picture: without an end to them, k1 = -0.3 draws at x = -63 what stands at x = 2, z = 1."""
+    """Polynomials turn back beyond the picture: without an end, k1 = -0.3 draws in its column 24 what stands at x = 2, z = 1."""
     cam = Camera("cam", (160, 120), camera().matrix, **lens)
     radii = np.linspace(0, 60, 500)
     quads = np.stack([radii, 0 * radii, 1 + 0 * radii], 1)
