@@ -121,7 +121,7 @@ def test_nonsense_stays_inside_the_picture_and_draws_nothing(corners):
     with np.errstate(all="ignore"):
         drawn = draw_polygon(corners, (70, 9))  # with NUMBA_BOUNDSCHECK=1 a write past the end is an error
     assert drawn.shape == (9, 70)
-    if np.abs(corners).max() > 1e16 or not np.isfinite(corners).all():
+    if not np.isfinite(corners).all():
         assert not drawn.any()
 
 
