@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 from typing import NamedTuple
 
@@ -16,11 +17,14 @@ from shadowpuppet.rasterize import Picture
 ARM_PARTS = ("upper_arm", "forearm", "hand")
 
 
+@cache
 def coarse_arms() -> Array:
-    """Arms (K, 4), rad, all over their range: abduction, forward, roll, flexion. A straight arm has no roll."""
+    """Arms (K, 4), rad, all over their range: abduction, forward, roll, flexion. A straight arm has no roll. Made once, read-only."""
     bent = [(roll, flexion) for roll in (-80, -40, 0, 45, 90) for flexion in (45, 90, 130)]
-    return np.radians([(*shoulder, *elbow) for shoulder in product((0, 20, 45, 70, 90, 110, 135, 165), (0, 40, 80))
+    arms = np.radians([(*shoulder, *elbow) for shoulder in product((0, 20, 45, 70, 90, 110, 135, 165), (0, 40, 80))
                        for elbow in ((0, 5), *bent)])  # fmt: skip
+    arms.setflags(write=False)
+    return arms
 
 
 def arm_parts(picture: Picture, side: str) -> list[str]:
