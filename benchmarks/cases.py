@@ -1,0 +1,97 @@
+"""What the benchmarks of accuracy share: recordings read and segmented once, persons fitted, trackers run and measured."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.fitting import find
+from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes, silhouettes, take_sample
+from shadowpuppet.geometry import Array
+from shadowpuppet.initialization import Guess
+from shadowpuppet.io.joints import read_joints
+from shadowpuppet.look import prepare
+from shadowpuppet.metrics import UPPER, joint_errors
+from shadowpuppet.motion import JointTable
+from shadowpuppet.options import Options, make_options
+from shadowpuppet.settings import MonocularSettings
+from shadowpuppet.tracking import MonocularTracker
+
+ALIGNED = [name.replace("hand", "wrist") for name in UPPER]
+COLUMNS = ("mean", "sd", "plane", "depth", "far", "aligned", "shoulder", "elbow", "hand", "cost", "jitter", "ms")
+"""Measures in the order of the tables; `sd` is the standard deviation of the mean error over seeds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A recording with known truth, read and segmented once."""
+
+    name: str
+    footage: Footage
+    sample: Sample
+    seen: Silhouettes
+    """For the fit of the person."""
+    times: Array
+    masks: list[Mask]
+    """For the tracker."""
+    truth: JointTable
+
+    @classmethod
+    def read(cls, path: Path, *, masks: bool = False, references: bool = True, silhouette: dict[str, Any] | None = None) -> Case:
+        """masks: the ready ones instead of segmentation; silhouette: settings of the segmentation of the masks that are tracked."""
+        options = make_options({"masks": masks})
+        prepared = prepare(str(path), options, np.random.default_rng(0))
+        footage = prepared.footage
+        if footage.recording.truth is None:
+            raise SystemExit(f"{path}: no truth")
+        if not references:
+            footage = replace(footage, recording=replace(footage.recording, references=()))
+        sample = take_sample(footage)
+        seen = silhouettes(footage, sample, make_options({"silhouette": silhouette})) if silhouette else prepared.silhouettes
+        shots = list(footage.shots(masks))
+        times, tracked = np.array([shot.time for shot in shots]), [seen(shot) for shot in shots]
+        return cls(path.name, footage, sample, prepared.silhouettes, times, tracked, read_joints(footage.recording.truth))
+
+    @property
+    def camera(self) -> Camera:
+        """The recording's one camera."""
+        return self.footage.camera
+
+    def person(self, options: Options, rng: np.random.Generator) -> Guess:
+        """Sizes and place, as `shadowpuppet track` finds them."""
+        return find(self.footage, self.sample, self.seen, options, rng).fit.guess
+
+    def track(self, person: Guess, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
+        """Run a tracker and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a frame."""
+        picture = person.picture(self.camera, settings.body)
+        tracker = MonocularTracker(picture, settings)
+        states = [tracker.start(rng, self.masks[0])]
+        start = time.perf_counter()
+        for mask in self.masks[1:]:
+            states.append(tracker.step(rng, states[-1], mask))
+        spent = time.perf_counter() - start
+        table = JointTable(self.times, picture.body.landmark_names, picture.points_world(np.array([state.pose for state in states])))
+        costs = [state.cost for state in states]
+        return self.measure(table) | {"cost": float(np.nanmean(costs)), "ms": 1000 * spent / max(len(states) - 1, 1)}
+
+    def measure(self, table: JointTable) -> dict[str, float]:
+        """Errors of joints against the truth, and how much the hands shake."""
+        errors = joint_errors(table, self.truth, UPPER, camera=self.camera).summary()
+        aligned = joint_errors(table, self.truth, ALIGNED, camera=self.camera).summary()
+        per = {part: float(np.mean([errors["joints"][f"{side}_{part}"]["mean_mm"] for side in ("left", "right")]))
+               for part in ("shoulder", "elbow", "hand")}
+        hands = table.select(["left_hand", "right_hand"]).positions
+        pace = float(np.median(np.diff(self.times)))
+        jitter = float(np.sqrt((np.linalg.norm(np.diff(hands, 2, axis=0), axis=2) ** 2).mean()) / pace**2)
+        return per | {"mean": errors["mean_mm"], "plane": errors["plane_mm"], "depth": errors["depth_mm"], "far": 100 * errors["far"],
+                      "aligned": aligned["aligned_mean_mm"], "jitter": jitter}
+
+
+def means(runs: list[dict[str, float]]) -> dict[str, float]:
+    """Means over seeds, and the standard deviation of the mean error."""
+    return {key: float(np.mean([run[key] for run in runs])) for key in runs[0]} | {"sd": float(np.std([run["mean"] for run in runs]))}
