@@ -331,7 +331,7 @@ def test_regions_outside_the_film_are_said(recording, region, said):
     ({"preset": 7}, r"preset: found 7, expected a name in quotes"),
     ({"silhouette": {"method": "magic"}}, r"silhouette.method: found 'magic'"),
     ({"seed": -1}, r"seed: found -1; .*greater than or equal to 0"),
-    ({"height": 178}, r"height: found 178; .*less than or equal to 2.5"),
+    ({"height": 178}, r"height: found 178; expected 0.5 to 2.5 metres \(178 cm are 1.78\)"),
 ])  # fmt: skip
 def test_wrong_settings_are_said_with_what_is_possible(values, said):
     with pytest.raises(SettingsError, match=said):

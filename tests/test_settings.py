@@ -6,14 +6,17 @@ import math
 from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
 from typing import get_args, get_type_hints
 
+import numpy as np
 import pytest
 
 from shadowpuppet.body import BODIES
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, ShadowPuppetError
+from shadowpuppet.options import Options
 from shadowpuppet.resampling import SCHEMES
 from shadowpuppet.settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings, validate
+from shadowpuppet.silhouette import SilhouetteSettings
 
-KINDS = (PartSettings, MonocularSettings, InitializationSettings)
+KINDS = (PartSettings, MonocularSettings, InitializationSettings, SilhouetteSettings, Options)
 
 
 # Presets --------------------------------------------------------------------------------------------------------------
@@ -101,6 +104,49 @@ def test_what_is_wrong_in_other_tables_is_said_alike(values, said):
     with pytest.raises(SettingsError) as error:
         validate(InitializationSettings, values, "run.toml")
     assert said in str(error.value)
+
+
+def numbers(kind):
+    """The settings of a kind that are numbers with a fraction."""
+    return [f.name for f in fields(kind) if isinstance(getattr(kind(), f.name), float) or f.name in ("height", "distance", "fov")]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan, np.float64(np.inf)])
+def test_no_setting_may_be_infinite_or_no_number(kind, value):
+    for name in numbers(kind):
+        for attempt in (lambda name=name: kind(**{name: value}), lambda name=name: validate(kind, {name: value}, "run.toml"),
+                        lambda name=name: replace(kind(), **{name: value})):
+            with pytest.raises(SettingsError) as error:
+                attempt()
+            said = "expected 0." if name in ("height", "distance") else "input should be a finite number"
+            assert f"{name}: found {float(value)}; {said}" in str(error.value)
+
+
+@pytest.mark.parametrize(("made", "said"), [
+    (lambda: MonocularSettings(cycles=0), "MonocularSettings: cycles: found 0; input should be greater than or equal to 1"),
+    (lambda: replace(MonocularSettings(), cycles=np.int64(0)), "MonocularSettings: cycles: found 0; input should be greater"),
+    (lambda: MonocularSettings(arm={"particles": 1}), "MonocularSettings: arm.particles: found 1; input should be greater"),
+    (lambda: MonocularSettings(arm={"particle": 1}), "unknown setting 'arm.particle'; there are: particles, sigma_cost"),
+    (lambda: PartSettings(particle=3), "PartSettings: unknown setting 'particle'; there are: particles, sigma_cost"),
+    (lambda: PartSettings(sigma_cost=np.float64(-1)), "PartSettings: sigma_cost: found -1.0; input should be greater than 0"),
+    (lambda: InitializationSettings(sweeps=0), "InitializationSettings: sweeps: found 0"),
+    (lambda: SilhouetteSettings(factor=101), "SilhouetteSettings: factor: found 101; input should be less than or equal to 100"),
+    (lambda: Options(seed=-1), "Options: seed: found -1"),
+    (lambda: Options(region=(1, 2, 3)), "Options: region: found (1, 2, 3); expected four numbers x0,y0,x1,y1, found 3"),
+    (lambda: Options(height=180), "Options: height: found 180; expected 0.5 to 2.5 metres (180 cm are 1.8)"),
+    (lambda: Options(height=np.float64(18)), "Options: height: found 18.0; expected 0.5 to 2.5 metres"),
+    (lambda: Options(height="tall"), "Options: height: found 'tall'; expected 0.5 to 2.5 metres"),
+    (lambda: Options(distance=250), "Options: distance: found 250; expected 0.2 to 30 metres (250 cm are 2.5)"),
+    (lambda: PartSettings(3), "PartSettings: 0: found 3; unexpected positional argument"),
+])  # fmt: skip
+def test_what_is_wrong_in_python_is_said_alike(made, said):
+    for family in (ShadowPuppetError, ValueError):
+        with pytest.raises(family) as error:
+            made()
+        assert type(error.value) is SettingsError
+        assert str(error.value).startswith(said) if said[0].isupper() else said in str(error.value)
+        assert "\n" not in str(error.value)
 
 
 def test_an_unknown_preset_is_said_with_those_there_are():

@@ -36,13 +36,19 @@ class FormatError(ShadowPuppetError):
     """A data file that is not what its name says."""
 
 
-class SettingsError(ShadowPuppetError):
+class SettingsError(ShadowPuppetError, ValueError):
     """A setting with an unknown name or an impossible value."""
 
 
 def choices(names: Iterable[str]) -> str:
     """Valid names as they are listed in messages: `a, b, c`."""
     return ", ".join(sorted(names)) or "none"
+
+
+def shown(value: object) -> str:
+    """A value as messages show it: NumPy's numbers and arrays as Python's."""
+    plain = getattr(value, "tolist", None)
+    return repr(plain() if callable(plain) else value)
 
 
 class ShadowPuppetWarning(UserWarning):

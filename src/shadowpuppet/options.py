@@ -5,19 +5,20 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from dataclasses import Field as DataclassField
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
-from pydantic import BeforeValidator, Field
-from pydantic.dataclasses import dataclass
+from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
+from pydantic_core import PydanticCustomError
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.settings import STRICT, InitializationSettings, MonocularSettings, make_settings, validate
+from shadowpuppet.settings import InitializationSettings, MonocularSettings, checked, make_settings, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
+from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres
 
 TABLES = ("tracker", "silhouette", "initialization")
 """Options that are tables of settings."""
@@ -32,7 +33,19 @@ def _corners(value: object) -> object:
     return value
 
 
-@dataclass(frozen=True, config=STRICT, kw_only=True)
+def _metres(limits: tuple[float, float]) -> WrapValidator:
+    """Says of a length that cannot be what can, in metres."""
+
+    def check(value: Any, handler: Callable[[Any], Any]) -> Any:
+        try:
+            return handler(value)
+        except ValidationError:
+            raise PydanticCustomError("metres", "{expected}", {"expected": expected_metres(value, limits)}) from None
+
+    return WrapValidator(check)
+
+
+@checked
 class Options:
     """What a run can be told; each is a flag of the command line and a line of TOML."""
 
@@ -40,9 +53,9 @@ class Options:
     """Settings of the tracker to begin with: default (the best we know) or liu2011 (the paper's)."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of all randomness: the same seed gives the same run."""
-    height: Annotated[float, Field(ge=0.5, le=2.5)] | None = None
+    height: Annotated[float, Field(ge=HEIGHTS[0], le=HEIGHTS[1]), _metres(HEIGHTS)] | None = None
     """Height of the person, metres, shoes on. Replaces what recording.toml says."""
-    distance: Annotated[float, Field(ge=0.2, le=30)] | None = None
+    distance: Annotated[float, Field(ge=DISTANCES[0], le=DISTANCES[1]), _metres(DISTANCES)] | None = None
     """Distance from the camera to the middle of the body at the start, metres. Replaces what recording.toml says."""
     person: Path | None = None
     """Sizes of the person, as an earlier run or `fit-person` saved them (person.toml)."""

@@ -7,21 +7,43 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Annotated, Any, Literal, TypeVar
+from functools import wraps
+from typing import Annotated, Any, Literal, TypeVar, dataclass_transform
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.errors import SettingsError, choices, shown
 
 Settings = TypeVar("Settings")
-STRICT = ConfigDict(extra="forbid")
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def checked(kind: type[Settings]) -> type[Settings]:
+    """Make a frozen dataclass of a class of settings: every value is checked whichever way it comes.
+
+    `Kind(name=value)` raises `SettingsError` for an unknown name or an impossible value, as `validate` does.
+    """
+    made: Any = dataclass(frozen=True, kw_only=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))(kind)
+    check = made.__init__
+
+    @wraps(check)
+    def __init__(self: Any, *args: Any, **values: Any) -> None:
+        try:
+            check(self, *args, **values)
+        except ValidationError as error:
+            raise _told(error, made, made.__name__) from None
+
+    made.__init__ = __init__
+    return made
+
+
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-@dataclass(frozen=True, config=STRICT, kw_only=True)
+@checked
 class PartSettings:
     """How one stage of the filter draws and weighs (a column of Liu 2011, Table I)."""
 
@@ -37,7 +59,7 @@ class PartSettings:
     """sigma_gamma of eq. 6 (pixels at 320 x 240; scaled with the number of pixels)."""
 
 
-@dataclass(frozen=True, config=STRICT, kw_only=True)
+@checked
 class MonocularSettings:
     """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
@@ -111,14 +133,19 @@ def validate(kind: type[Settings], values: Mapping[str, Any], source: str = "set
     try:
         return TypeAdapter(kind).validate_python(dict(values))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(key) for key in first["loc"])
-        if first["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
-            owner = kind
-            for key in first["loc"][:-1]:
-                owner = type(getattr(owner(), str(key)))
-            raise SettingsError(f"{source}: unknown setting {place!r}; there are: {choices(f.name for f in fields(owner))}") from None  # pyright: ignore[reportArgumentType]
-        raise SettingsError(f"{source}: {place}: found {first['input']!r}; {first['msg'][:1].lower()}{first['msg'][1:]}") from None
+        raise _told(error, kind, source) from None
+
+
+def _told(error: ValidationError, kind: Any, source: str) -> SettingsError:
+    """The first of the mistakes in settings of a kind, in a sentence."""
+    first = error.errors()[0]
+    place = ".".join(str(key) for key in first["loc"])
+    if first["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
+        for key in first["loc"][:-1]:
+            kind = type(getattr(kind(), str(key)))
+        return SettingsError(f"{source}: unknown setting {place!r}; there are: {choices(f.name for f in fields(kind))}")
+    said = first["msg"].removeprefix("Value error, ")
+    return SettingsError(f"{source}: {place}: found {shown(first['input'])}; {said[:1].lower()}{said[1:]}")
 
 
 def _plain(settings: Any) -> dict[str, Any]:
@@ -134,7 +161,7 @@ def _merge(*tables: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-@dataclass(frozen=True, config=STRICT, kw_only=True)
+@checked
 class InitializationSettings:
     """How a person's sizes are found (Liu 2011, Algorithm 1). The paper draws with sigma = 0.05 throughout and knows no prior."""
 

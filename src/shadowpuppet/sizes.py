@@ -8,8 +8,22 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.errors import ShadowPuppetError, choices, shown
 from shadowpuppet.geometry import Array
+
+HEIGHTS, DISTANCES = (0.5, 2.5), (0.2, 30.0)
+"""What a person's height, and the distance from the camera, can be; metres."""
+
+
+def is_within(value: object, limits: tuple[float, float]) -> bool:
+    """Whether something is a number within limits."""
+    return isinstance(value, (int, float, np.integer)) and not isinstance(value, bool) and bool(limits[0] <= value <= limits[1])
+
+
+def expected_metres(value: object, limits: tuple[float, float]) -> str:
+    """What is possible in place of a value, for messages; what would be possible in centimetres is told in metres."""
+    hint = f" ({value:g} cm are {value / 100:g})" if isinstance(value, (int, float)) and is_within(value / 100, limits) else ""
+    return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
 @dataclass(frozen=True)
@@ -45,7 +59,7 @@ class CardboxSizes:
             value = getattr(self, field.name)
             least = -0.2 if field.name in ("neck_gap", "shoulder_inset") else 0.005
             if not least <= value <= 2.0:
-                raise ShadowPuppetError(f"size {field.name}: found {value!r}, expected {least} to 2.0 metres")
+                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to 2.0 metres")
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -61,7 +75,7 @@ class CardboxSizes:
             raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
         for name, value in values.items():
             if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise ShadowPuppetError(f"{source}: {name}: found {value!r}, expected a number of metres")
+                raise ShadowPuppetError(f"{source}: {name}: found {shown(value)}, expected a number of metres")
         return cls(**{name: float(value) for name, value in values.items()})
 
     @classmethod

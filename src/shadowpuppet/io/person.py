@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
+from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import read_toml
-
-if TYPE_CHECKING:  # the body brings its kernels' compiler
-    from shadowpuppet.sizes import CardboxSizes
+from shadowpuppet.sizes import HEIGHTS, CardboxSizes, expected_metres, is_within
 
 KEYS = ("height", "source", "notes", "sizes")
-HEIGHTS = (0.5, 2.5)
-"""What can be true, metres."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +28,8 @@ class Person:
 
     def __post_init__(self) -> None:
         """Check."""
-        if self.height is not None and (not _is_number(self.height) or not HEIGHTS[0] <= self.height <= HEIGHTS[1]):
-            raise ShadowPuppetError(f"height: found {self.height!r}, expected {HEIGHTS[0]:g} to {HEIGHTS[1]:g} metres")
+        if self.height is not None and not is_within(self.height, HEIGHTS):
+            raise ShadowPuppetError(f"height: found {shown(self.height)}, {expected_metres(self.height, HEIGHTS)}")
         for key in ("source", "notes"):
             if not isinstance(getattr(self, key), str):
                 raise ShadowPuppetError(f"{key}: found {getattr(self, key)!r}, expected text in quotes")
@@ -41,8 +37,6 @@ class Person:
 
 def read_person(path: str | Path) -> Person:
     """A person from a file. Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible."""
-    from shadowpuppet.sizes import CardboxSizes
-
     path = Path(path)
     data = read_toml(path, FormatError)
     unknown = set(data) - set(KEYS)
@@ -65,7 +59,3 @@ def write_person(path: str | Path, person: Person) -> None:
     sizes = dict(zip(person.sizes.names(), person.sizes.to_array().tolist()))
     head = "# Lengths in metres; the sizes are a1..a18 of Liu 2011, Fig. 2.\n"
     write_whole(Path(path), head + tomli_w.dumps({**known, "source": person.source, "notes": person.notes, "sizes": sizes}))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -12,6 +12,7 @@ from warnings import warn
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
 from shadowpuppet.io.calibration import read_calibration, read_toml
+from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
 from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
 
 FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",
@@ -21,8 +22,8 @@ POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
 KEYS = ("subject", "rate", "calibration", "truth", "training", "video", "background", "masks")
 """Keys of recording.toml."""
-HEIGHTS, DISTANCES, RATES = (0.5, 2.5), (0.2, 30.0), (0.1, 10_000.0)
-"""What can be true: metres, metres, frames/s."""
+RATES = (0.1, 10_000.0)
+"""What can be true, frames/s."""
 
 
 @dataclass(frozen=True)
@@ -147,8 +148,9 @@ class _Notes:
         value = (self.table(table) if table else self.data).get(key)
         if value is None:
             return None
-        if not isinstance(value, (int, float)) or isinstance(value, bool) or not limits[0] <= value <= limits[1]:
-            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected {limits[0]:g} to {limits[1]:g} {unit}")
+        if not is_within(value, limits):
+            expected = expected_metres(value, limits) if unit == "metres" else f"expected {limits[0]:g} to {limits[1]:g} {unit}"
+            raise RecordingError(f"{self.path}: {key}: found {value!r}, {expected}")
         return float(value)
 
     def file(self, key: str) -> Path | None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
+
+from shadowpuppet.settings import checked
 
 Method = Literal["auto", "brightness", "colour", "both", "averaging", "mog2", "knn"]
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
+@checked
 class SilhouetteSettings:
     """How a person is told from the background. The defaults serve any film; `averaging` is Liu 2011, eq. 1, to the letter."""
 
