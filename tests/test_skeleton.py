@@ -235,6 +235,9 @@ def test_the_twelve_dof_of_the_paper():
     (lambda s: s.forward(np.zeros(12)), "poses have shape (12,), expected (N, 12)"),
     (lambda s: s.forward(np.zeros((2, 11))), "poses have shape (2, 11), expected (N, 12)"),
     (lambda s: Skeleton((Joint("a", "b"), Joint("b", None)), ()), "joint 'a': its parent 'b' must stand before it"),
+    (lambda s: Skeleton((Joint("a", None), Joint("b", "a"), Joint("b", "a")), ()), "joint 'b': found 2 of this name, expected one"),
+    (lambda s: Skeleton((Joint("a", None), Joint("b", "a")), (Dof("x", "a", "x"), Dof("y", "a", "y"), Dof("x", "b", "x"))),
+     "degree of freedom 'x': found 2 of this name, expected one"),
     (lambda s: Skeleton((Joint("a", None), Joint("b", "a")), (Dof("x", "b", "x"), Dof("y", "a", "x"))), "grouped by joint"),
     (lambda s: Skeleton((Joint("a", None),), (Dof("x", "c", "x"),)), "unknown joint 'c'; there are: a"),
 ])

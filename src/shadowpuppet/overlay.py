@@ -112,9 +112,9 @@ class OverlayWriter:
         self._film.__enter__()
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Finish the film; after an error what there is can be played from `<name>.part.<ending>`."""
-        self._film.__exit__(*error)  # type: ignore[arg-type]
+        self._film.__exit__(kind)
 
     def write(self, image: Image, mask: ArrayLike, pose: ArrayLike, *, status: str, time: float, overlap: float = np.nan,
               ignore: ArrayLike | None = None) -> None:

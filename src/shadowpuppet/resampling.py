@@ -56,7 +56,7 @@ def residual(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> I
     """floor(number * weight) copies of each for certain, the rest drawn by what remains (Liu & Chen 1998)."""
     expected = normalise(log_weights) * number
     copies = np.floor(expected + 1e-9).astype(np.int64)  # a weight of exactly k / number must not lose a copy to rounding
-    certain = np.repeat(np.arange(len(copies)), copies)[:number]
+    certain = np.repeat(np.arange(len(copies)), copies)
     rest = number - len(certain)
     if rest == 0:
         return certain

@@ -67,6 +67,10 @@ class Skeleton:
     couplings: tuple[Coupling, ...] = ()
 
     def __post_init__(self) -> None:
+        for what, named in (("joint", self.joints), ("degree of freedom", self.dofs)):
+            names = [each.name for each in named]
+            if twice := [name for name in names if names.count(name) > 1]:
+                raise ShadowPuppetError(f"{what} {twice[0]!r}: found {names.count(twice[0])} of this name, expected one")
         seen: set[str] = set()
         for joint in self.joints:
             if joint.parent is not None and joint.parent not in seen:
