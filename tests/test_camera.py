@@ -66,6 +66,55 @@ def test_points_at_and_behind_the_camera_have_no_pixel():
     np.testing.assert_array_equal(np.isnan(found).all(-1), [False, True, True])
 
 
+BARRELS = [{"distortion": [-0.3, 0.0, 0.0, 0.0]}, {"distortion": [-0.25, 0.02, 0.001, -0.002, 0.0]},
+           {"distortion": [-0.05, -0.2, 0.0, 0.0], "fisheye": True}]
+"""Lenses whose formulas turn back: the first from x = 1.05 on, so that x = 1.8 comes back to the middle of the picture."""
+
+
+@pytest.mark.parametrize("lens", BARRELS)
+@given(angle=st.floats(0, 2 * math.pi), depth=st.floats(0.1, 20))
+def test_what_is_farther_out_is_seen_farther_out(lens, angle, depth):
+    cam = camera(**lens, T_camera_world=np.eye(4))
+    radii = np.linspace(0, 30, 400)
+    points = depth * np.stack([radii * math.cos(angle), radii * math.sin(angle), np.ones(400)], 1)
+    out = np.linalg.norm((cam.project(points) - cam.matrix[:2, 2]) / cam.matrix[[0, 1], [0, 1]], axis=1)
+    assert 0.5 < cam.reach < 3
+    assert (np.diff(out[radii > 0.1]) > -1e-3).all()  # near the end of its reach a lens hardly leads outward
+    assert (np.diff(out[radii > cam.reach]) > 0.01).all()
+
+
+@pytest.mark.parametrize("lens", BARRELS)
+def test_a_lens_ends_where_its_formula_turns_and_is_what_it_was_up_to_there(lens):
+    cam = camera(**lens, T_camera_world=np.eye(4))
+    inside, outside = (cam.project([[share * cam.reach, 0, 1.0]])[0] for share in (0.999, 2.0))
+    np.testing.assert_allclose(inside, cam._bent(np.array([[0.999 * cam.reach, 0]]))[0])
+    edge = cam._bent(np.array([[cam.reach, 0]]))[0]
+    np.testing.assert_allclose(outside - cam.matrix[:2, 2], 2 * (edge - cam.matrix[:2, 2]))
+    beyond = [cam._bent(np.array([[share * cam.reach, 0]]))[0, 0] for share in (1.01, 1.1)]
+    assert edge[0] > beyond[0] > beyond[1]  # it does turn
+
+
+def test_what_lies_beyond_a_strong_barrel_is_not_in_the_picture():
+    cam = camera(distortion=[-0.3, 0, 0, 0], T_camera_world=np.eye(4))
+    assert naive_projection(cam, np.array([1.8, 0, 1.0]))[0] == pytest.approx(350, abs=1)  # in its middle, by the formula alone
+    assert cam.project([1.8, 0, 1.0])[0] > SIZE[0]
+    assert cam.reach == pytest.approx(1 / math.sqrt(0.9), rel=0.01)
+
+
+@pytest.mark.parametrize("lens", [{"distortion": []}, {"distortion": [0.1, 0, 0, 0]}, {"distortion": [0.0] * 4, "fisheye": True}])
+def test_lenses_that_never_turn_have_no_end(lens):
+    assert camera(**lens).reach == math.inf
+
+
+@pytest.mark.parametrize("lens", [{"distortion": [0.0] * 4, "fisheye": True}, BARRELS[2]])
+def test_a_fisheye_sees_half_the_world_and_no_more(lens):
+    cam = camera(**lens, T_camera_world=np.eye(4))
+    angles = np.radians([0, 45, 89.9, 90, 90.1, 135, 180])
+    found = cam.project(np.stack([np.sin(angles), np.zeros(7), np.cos(angles)], 1))
+    np.testing.assert_array_equal(np.isnan(found).all(1), angles >= np.radians(89.99))
+    assert (np.diff(found[:3, 0]) > 0).all()
+
+
 def test_shapes_are_kept_and_nothing_is_nothing():
     cam = camera()
     assert cam.project(np.zeros((2, 5, 3))).shape == (2, 5, 2)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
+
+STEPS = 1000
+"""Angles off the optical axis at which a lens is tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,21 +91,39 @@ class Camera:
         return inverse(self.T_camera_world)[:3, 3]
 
     def project(self, points_world: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera."""
+        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera.
+
+        Points beyond the lens's `reach` go on outward in proportion, as `projection` draws them: the polynomials of distortion, fitted
+        to the picture, turn back there and would bring what lies far outside into it.
+        """
+        points = transform(self.T_camera_world, points_world)
+        flat = points.reshape(-1, 3)
+        ahead = flat[:, 2] > 1e-9
+        xy = flat[ahead, :2] / flat[ahead, 2:]
+        beyond = np.maximum(np.linalg.norm(xy, axis=1, keepdims=True) / self.reach, 1.0)
+        within, centre = self._bent(xy / beyond), self.matrix[:2, 2]
+        pixels = np.full((len(flat), 2), np.nan)
+        pixels[ahead] = np.where(beyond > 1, (within - centre) * beyond + centre, within)
+        return pixels.reshape(*points.shape[:-1], 2)
+
+    def _bent(self, xy: Array) -> Array:
+        """Pixels (N, 2) of points (N, 2) on the plane z = 1, by OpenCV's formulas, wherever these lead."""
         import cv2
 
-        points = transform(self.T_camera_world, points_world)
-        flat = points.reshape(-1, 1, 3)
-        if not flat.size:
-            return np.zeros((*points.shape[:-1], 2))  # OpenCV refuses none
-        still = np.zeros(3)
-        if self.fisheye:
-            pixels = cv2.fisheye.projectPoints(flat, still, still, self.matrix, self.distortion)[0]
-        else:
-            pixels = cv2.projectPoints(flat, still, still, self.matrix, self.distortion)[0]
-        pixels = np.asarray(pixels, float).reshape(-1, 2)
-        pixels[flat[:, 0, 2] <= 1e-9] = np.nan
-        return pixels.reshape(*points.shape[:-1], 2)
+        if not len(xy):
+            return np.zeros((0, 2))  # OpenCV refuses none
+        points, still = np.concatenate([xy, np.ones((len(xy), 1))], 1)[:, None], np.zeros(3)
+        project = cv2.fisheye.projectPoints if self.fisheye else cv2.projectPoints
+        return np.asarray(project(points, still, still, self.matrix, self.distortion)[0], float).reshape(-1, 2)
+
+    @cached_property
+    def reach(self) -> float:
+        """Radius on the plane z = 1 up to which the lens's formula leads outward; infinite where it does so everywhere."""
+        if not (self.fisheye or self.distortion.any()):
+            return np.inf
+        radii = np.tan(np.arange(STEPS) * np.pi / 2 / STEPS)
+        outward = np.diff(self._bent(np.stack([radii, np.zeros(STEPS)], 1))[:, 0]) > 0
+        return np.inf if outward.all() else float(radii[max(int(np.argmin(outward)), 1)])
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Directions in the camera's frame (..., 3), z = 1, of pixels (..., 2): the inverse of `project` up to depth."""
