@@ -12,9 +12,10 @@ from shadowpuppet.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePr
 from shadowpuppet.body import BODIES
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.fitting import wrong_posture
-from shadowpuppet.initialization import POSTURES, Fit, Guess, _Bodies, _Hypotheses, find_person, fit_references, refine
+from shadowpuppet.hypotheses import Bodies, Guess, Hypotheses
+from shadowpuppet.initialization import POSTURES, Fit, find_person, fit_references, refine
 from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.rasterize import Picture, place
+from shadowpuppet.rasterize import Picture, place, unpack
 from shadowpuppet.settings import InitializationSettings
 from shadowpuppet.sizes import SUBSETS, CardboxSizes
 
@@ -135,7 +136,7 @@ def test_without_either_the_average_is_taken():
 
 def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
     """From one search to the next the cost may rise: where the legs are, is looked up anew."""
-    original, searches = _Hypotheses.search, []
+    original, searches = Hypotheses.search, []
 
     def search(of, rng, columns, pictures, settings, sigma, scale=True):
         observations, before = of.observe(), of.vector
@@ -143,7 +144,7 @@ def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
         searches.append((curve, *(of.costs(v[None], pictures, observations)[0] for v in (before, of.vector))))
         return curve
 
-    monkeypatch.setattr(_Hypotheses, "search", search)
+    monkeypatch.setattr(Hypotheses, "search", search)
     fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=QUICK)
     assert len(searches) == QUICK.sweeps * len(SUBSETS)
     for curve, before, after in searches:
@@ -152,16 +153,16 @@ def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
         assert before >= curve[0]
         assert after == pytest.approx(curve[-1])
     for i, subset in enumerate(SUBSETS):
-        assert fit.curves[subset] == sum((tuple(curve) for curve, *_ in searches[i :: len(SUBSETS)]), ())
+        assert fit.curves[subset] == tuple(tuple(curve) for curve, *_ in searches[i :: len(SUBSETS)])
 
 
 def test_a_search_stops_when_nothing_is_gained():
     calm = InitializationSettings(tolerance=1.0, patience=3, sweeps=1)
     fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=calm)
-    assert {len(curve) for curve in fit.curves.values()} == {4}
+    assert {len(curve) for curves in fit.curves.values() for curve in curves} == {4}
     eager = InitializationSettings(tolerance=0.0, patience=1, rounds=7, sweeps=1)
     fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=eager)
-    assert max(len(curve) for curve in fit.curves.values()) <= 7
+    assert max(len(curve) for curves in fit.curves.values() for curve in curves) <= 7
 
 
 def test_sizes_stay_possible_whatever_is_drawn():
@@ -192,11 +193,11 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
     names, masks = list(POSTURES), list(references().values())
     poses = np.array([BODIES["rounded"](SOMEONE).skeleton.pose(torso_y=0.3 * i, **POSTURES[name]) for i, name in enumerate(names)])
     no_prior = InitializationSettings(prior_weight=0.0, posture_weight=0.0)
-    of = _Hypotheses(CAMERA, masks, poses, TRUE, SizePrior(1.78), no_prior, "rounded")
+    of = Hypotheses(CAMERA, masks, poses, TRUE, SizePrior(1.78), no_prior, "rounded")
     here, there = of.vector[None].copy(), of.vector[None].copy()
     there[:, of.columns([], distance=True)[0]] -= farther
     moved = there.copy()
-    of._scale(moved, of.vector)
+    of.scale(moved, of.vector)
     assert moved[0, 0] == pytest.approx(SOMEONE.head_width * (2.8 + farther) / 2.8)
     scaled, left, as_it_was = (of.costs(v, range(3), of.observe())[0] for v in (moved, there, here))
     assert left > as_it_was + 1000
@@ -253,6 +254,95 @@ def test_an_empty_silhouette_is_said_with_its_posture():
         fit_references(np.random.default_rng(0), CAMERA, masks, height=1.78)
 
 
+def test_silhouettes_of_everything_are_said_with_their_posture():
+    for share in (0.85, 1.0):
+        masks = references() | {"front_t_pose": np.broadcast_to(np.arange(240)[:, None] >= (1 - share) * 240, (240, 320))}
+        said = f"references: front_t_pose: the silhouette covers {100 * share:.0f} % of the picture, expected a person"
+        with pytest.raises(TrackingError, match=said):
+            fit_references(np.random.default_rng(0), CAMERA, masks, height=1.78)
+
+
+@pytest.mark.parametrize("shape", [(120, 160), (320, 240), (240, 320, 3), (240,), ()])
+def test_masks_of_another_shape_are_said_with_both(shape):
+    wrong = np.ones(shape, bool)
+    with pytest.raises(TrackingError) as error:
+        fit_references(np.random.default_rng(0), CAMERA, references() | {"side_arms_hanging": wrong})
+    assert str(error.value) == f"references: side_arms_hanging: found shape {shape}, expected (240, 320), the camera's rows and columns"
+    with pytest.raises(TrackingError, match="mask 1 of the first seconds: found shape"):
+        find_person(np.random.default_rng(0), CAMERA, [references()["front_t_pose"], wrong], height=1.78)
+
+
+@pytest.mark.parametrize(("known", "said"), [
+    ({"height": 0}, "height: found 0, expected 0.5 to 2.5 metres"), ({"height": -1.8}, "height: found -1.8, expected 0.5 to 2.5 metres"),
+    ({"height": np.float64(18)}, "height: found 18.0, expected 0.5 to 2.5 metres"),
+    ({"height": np.int64(180)}, "height: found 180, expected 0.5 to 2.5 metres (180 cm are 1.8)"),
+    ({"height": np.nan}, "height: found nan, expected"), ({"height": np.inf}, "height: found inf, expected"),
+    ({"height": "tall"}, "height: found 'tall', expected"), ({"height": True}, "height: found True, expected"),
+    ({"distance": 0}, "distance: found 0, expected 0.2 to 30 metres"), ({"distance": np.float64(np.nan)}, "distance: found nan, expected"),
+    ({"distance": -2.8}, "distance: found -2.8, expected"),
+    ({"distance": 280}, "distance: found 280, expected 0.2 to 30 metres (280 cm are 2.8)"),
+])  # fmt: skip
+def test_heights_and_distances_that_cannot_be_are_said(known, said):
+    for attempt in (lambda: fit_references(np.random.default_rng(0), CAMERA, references(), **known),
+                    lambda: find_person(np.random.default_rng(0), CAMERA, [references()["front_t_pose"]], **known)):
+        with pytest.raises(TrackingError) as error:
+            attempt()
+        assert str(error.value).startswith(said)
+
+
+@pytest.mark.parametrize("height", [None, 1.78])
+@pytest.mark.parametrize("name", POSTURES)
+@pytest.mark.parametrize("distance", [0.25, 18, np.float64(12)])
+def test_a_distance_that_does_not_go_with_the_picture_is_said(height, name, distance):
+    """Someone who fills the picture at 18 m would be ten metres tall; masks are of someone at 2.8 m."""
+    with pytest.raises(TrackingError, match=rf"distance: found [\d.]+ metres, at which the person in {name} would be [\d.]+ m tall; "
+                                            r"expected about \d\.?\d? metres, for a height of 1\.7") as error:
+        fit_references(np.random.default_rng(0), CAMERA, {name: references()[name]}, height=height, distance=distance)
+    expected = float(str(error.value).split("about ")[1].split()[0])
+    assert (1.4 if name == "side_arms_hanging" else 2.5) <= expected <= 3.1
+
+
+# Legs -----------------------------------------------------------------------------------------------------------------
+
+
+def standing(gap: slice | None = None, feet: int = 240, width: int = 24) -> np.ndarray:
+    """The mask of someone whose legs reach down to the row `feet`, with a gap between them in some rows."""
+    pose = BODIES["rounded"](SOMEONE).skeleton.pose(**POSTURES["front_t_pose"])
+    view = TRUE.picture(CAMERA)
+    mask = view.mask(pose) | view.legs(pose, spread=0.0) | np.roll(view.legs(pose, spread=0.0), -4, axis=0)
+    mask[feet:] = False
+    middle = round(float(np.flatnonzero(view.legs(pose, spread=0.0)[-1]).mean()))
+    if gap is not None:
+        mask[gap, middle - width // 2 : middle + width // 2] = False
+    return mask
+
+
+def counted(mask: np.ndarray) -> np.ndarray:
+    """Rows in which the middle of the silhouette counts."""
+    pose = BODIES["rounded"](SOMEONE).skeleton.pose(**POSTURES["front_t_pose"])[None]
+    of = Hypotheses(CAMERA, [mask], pose, TRUE, SizePrior(1.78), QUICK, "rounded")
+    middle = round(float(np.flatnonzero(TRUE.picture(CAMERA).legs(pose[0], spread=0.0)[-1]).mean()))
+    ignored = unpack(of.observe()[0].ignore, 320)
+    return np.flatnonzero(mask[:, middle] & ~ignored[:, middle])
+
+
+HEM = int(np.flatnonzero(TRUE.picture(CAMERA).legs(np.zeros(12)).any(1))[0])
+CROTCH = HEM + 9
+
+
+def test_the_waist_ends_at_a_crotch_that_is_seen():
+    assert counted(standing(slice(CROTCH, 240)))[-1] == CROTCH - 1
+    assert counted(standing(slice(CROTCH, CROTCH + 6)))[-1] == CROTCH - 1  # the knees touch: they say nothing
+
+
+@pytest.mark.parametrize("mask", [
+    standing(), standing(slice(CROTCH, CROTCH + 1)), standing(slice(CROTCH, CROTCH + 2)), standing(feet=HEM + 20),
+    standing(slice(CROTCH, 240), width=4),
+], ids=["no gap", "one row of noise", "two rows of noise", "nothing under the feet", "a gap too narrow for the middle"])  # fmt: skip
+def test_what_is_no_gap_between_legs_shows_no_crotch(mask):
+    assert counted(mask)[-1] == HEM - 1
+
+
 # Without references ---------------------------------------------------------------------------------------------------
 
 
@@ -293,7 +383,7 @@ def test_empty_masks_are_left_out_and_nobody_at_all_is_said():
     known = {"height": 1.78, "distance": 2.8, "settings": QUICK}
     with_gaps = find_person(np.random.default_rng(0), CAMERA, [nothing, *masks, nothing], **known)
     assert with_gaps.guess.sizes == find_person(np.random.default_rng(0), CAMERA, masks, **known).guess.sizes
-    for masks in ([], [nothing, nothing]):
+    for masks in ([], [nothing, nothing], [~nothing]):
         with pytest.raises(TrackingError, match="nobody is found"):
             find_person(np.random.default_rng(0), CAMERA, masks, **known)
 
@@ -317,7 +407,7 @@ def test_costs_of_many_sizes_are_those_of_bodies_built_one_by_one(body, rng):
     mask = TRUE.picture(CAMERA, body).mask(poses[0])
     ignore = rng.random(mask.shape) < 0.1
     root = place(CAMERA, 2.8, 0.15)
-    found = _Bodies(body).costs(CAMERA, root, Observation.of(mask, ignore), poses, many, shift)
+    found = Bodies(body).costs(CAMERA, root, Observation.of(mask, ignore), poses, many, shift)
     for n, sizes in enumerate(many):
         at = place(CAMERA, 2.8 - shift[n, 0], 0.15 + shift[n, 1])
         alone = Picture(BODIES[body](CardboxSizes.from_array(sizes)), CAMERA, at)

@@ -10,12 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import SilhouetteError
+from shadowpuppet.masks import NEARLY_ALL, Mask
 
-Mask = NDArray[np.bool_]
-"""A silhouette, of shape (H, W)."""
-
-NEARLY_ALL = 0.8
-"""Share of the picture from which on a silhouette is no person's."""
 TINY = 0.003
 """Share of the picture below which limbs are too few pixels wide (15 pixels high of 240)."""
 JUMP = 0.25

@@ -43,6 +43,11 @@ NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
+def pixel_scale(size: tuple[int, int]) -> float:
+    """What settings in pixels, which are for 320 x 240, are multiplied by for pictures of another width and height."""
+    return size[0] * size[1] / (320 * 240)
+
+
 @checked
 class PartSettings:
     """How one stage of the filter draws and weighs (a column of Liu 2011, Table I)."""

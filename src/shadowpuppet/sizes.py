@@ -22,7 +22,7 @@ def is_within(value: object, limits: tuple[float, float]) -> bool:
 
 def expected_metres(value: object, limits: tuple[float, float]) -> str:
     """What is possible in place of a value, for messages; what would be possible in centimetres is told in metres."""
-    hint = f" ({value:g} cm are {value / 100:g})" if isinstance(value, (int, float)) and is_within(value / 100, limits) else ""
+    hint = f" ({value:g} cm are {value / 100:g})" if isinstance(value, (int, float, np.integer)) and is_within(value / 100, limits) else ""
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 

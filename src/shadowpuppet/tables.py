@@ -83,11 +83,12 @@ def sizes_table(sizes: CardboxSizes) -> RenderableType:
     return table
 
 
-def curves_table(curves: Mapping[str, Sequence[float]]) -> RenderableType:
-    """Cost over the rounds of Algorithm 1, a line a subset."""
-    table = _table("cost by round, pixels", ("sizes", "rounds", "first", "last", "curve"), right=(1, 2, 3))
-    for name, curve in curves.items():
-        table.add_row(name, str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
+def curves_table(curves: Mapping[str, Sequence[Sequence[float]]]) -> RenderableType:
+    """Cost over the rounds of Algorithm 1, a line a search of a subset."""
+    table = _table("cost by round, pixels", ("sizes", "search", "rounds", "first", "last", "curve"), right=(1, 2, 3, 4))
+    for name, searches in curves.items():
+        for n, curve in enumerate(searches, 1):
+            table.add_row(name if n == 1 else "", str(n), str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
     return table
 
 
