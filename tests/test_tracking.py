@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from people import camera, picture
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, TrackingError
 from shadowpuppet.first_pose import search
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation, silhouette_costs
@@ -258,6 +258,33 @@ def test_nobody_is_absent_and_the_pose_waits():
         assert np.isnan(gone.cost)
         assert gone.overlap == 0
         np.testing.assert_array_equal(gone.pose, state.pose)
+
+
+@pytest.mark.parametrize("preset", ["liu2011", "default"])
+def test_who_is_not_there_at_the_start_is_absent_and_found_when_they_come(preset):
+    masks = wave(3)[1]
+    for nobody in (np.zeros_like(masks[0]), block(0.002)):
+        states = track(tracker(preset), [nobody, nobody, *masks])
+        assert [state.status for state in states] == ["absent"] * 2 + ["tracked"] * 3
+        assert np.isnan(states[0].cost)
+        assert states[0].overlap == 0
+        assert np.isfinite(states[0].pose).all()
+
+
+@pytest.mark.parametrize("shape", [(160, 120), (240, 320), (120, 160, 3), (120,), ()])
+def test_masks_of_another_shape_are_said_with_both(shape):
+    of, rng = tracker(), np.random.default_rng(0)
+    state = of.start(rng, wave(1)[1][0])
+    for attempt in (lambda: of.start(rng, np.ones(shape, bool)), lambda: of.step(rng, state, np.ones(shape, bool))):
+        with pytest.raises(TrackingError) as error:
+            attempt()
+        assert str(error.value) == f"mask: found shape {shape}, expected (120, 160), the camera's rows and columns"
+
+
+def test_masks_may_be_of_numbers_too():
+    masks = wave(3)[1]
+    of = tracker("default")
+    assert all(same(a, b) for a, b in zip(track(of, masks), track(of, [255 * mask.astype(np.uint8) for mask in masks])))
 
 
 @pytest.mark.parametrize("preset", ["liu2011", "default"])

@@ -13,8 +13,11 @@ from shadowpuppet.body import SIDES
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.rasterize import Picture
+from shadowpuppet.skeleton import Skeleton
 
 ARM_PARTS = ("upper_arm", "forearm", "hand")
+GOOD = 40
+"""So many of the coarse arms that were tried, the best, are worth beginning a filter's particles around."""
 
 
 @cache
@@ -30,6 +33,11 @@ def coarse_arms() -> Array:
 def arm_parts(picture: Picture, side: str) -> list[str]:
     """Names of an arm's parts that the body has."""
     return [part for part in dict.fromkeys(picture.body.parts) if part in {f"{side}_{name}" for name in ARM_PARTS}]
+
+
+def arm_dofs(skeleton: Skeleton, side: str) -> NDArray[np.int64]:
+    """Indices of an arm's DOF, in the order of `coarse_arms`."""
+    return np.flatnonzero([name.startswith(side) for name in skeleton.dof_names])
 
 
 class FirstPose(NamedTuple):
@@ -60,7 +68,7 @@ def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
     arms: dict[str, Array] = {}
     least = np.inf
     for side, other in (("left", "right"), ("right", "left"), ("left", "right")):
-        dofs = np.flatnonzero([name.startswith(side) for name in skeleton.dof_names])
+        dofs = arm_dofs(skeleton, side)
         poses = np.repeat(pose[None], len(library), axis=0)
         poses[:, dofs] = library
         drawn = PartialCost(picture, dofs, hidden=() if other in arms else hidden[other])

@@ -13,6 +13,7 @@ from shadowpuppet import first_pose
 from shadowpuppet.geometry import Array
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation
+from shadowpuppet.masks import check_mask
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.rasterize import Picture, count
 from shadowpuppet.settings import MonocularSettings
@@ -50,9 +51,13 @@ class MonocularTracker:
     settings: MonocularSettings = field(default_factory=MonocularSettings)
 
     def step(self, rng: np.random.Generator, state: State, mask: NDArray[np.bool_]) -> State:
-        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh."""
+        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh.
+
+        Raises `TrackingError` for a mask that has not the camera's size.
+        """
+        mask = check_mask(mask, self.picture.camera.size)
         if self.is_absent(mask, state.pose):
-            return state._replace(cost=np.nan, overlap=0.0, status="absent")
+            return self.absent(state)
         if state.status == "absent":
             return self.start(rng, mask)
         after = self.cycle(rng, state, mask)
@@ -76,18 +81,23 @@ class MonocularTracker:
         return self.judge(pose, particles, observation)
 
     def start(self, rng: np.random.Generator, mask: NDArray[np.bool_]) -> State:
-        """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then some cycles on this mask."""
+        """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then some cycles on this mask.
+
+        Where nobody is there the state is `absent`. Raises `TrackingError` for a mask that has not the camera's size.
+        """
+        mask = check_mask(mask, self.picture.camera.size)
         found = first_pose.search(self.picture, mask)
         observation, particles = self.observe(mask, found.pose), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
             for side, arms in found.arms.items():
                 if f"{side}_arm" in stage.parts:
-                    columns = np.flatnonzero([name.startswith(side) for name in self.picture.body.skeleton.dof_names])
-                    poses[:, columns] = arms[np.arange(stage.number) % 40]
+                    poses[:, first_pose.arm_dofs(self.picture.body.skeleton, side)] = arms[np.arange(stage.number) % first_pose.GOOD]
             values = stage.clamp(diffuse(rng, poses[:, stage.dofs], stage.sigma))
             particles.append(evaluate(values, stage.weigh(observation, found.pose, found.pose)))
         state = self.judge(found.pose, particles, observation)
+        if self.is_absent(mask, found.pose):
+            return self.absent(state)
         for _ in range(SETTLE):
             state = self.cycle(rng, state, mask)
         return state
@@ -105,6 +115,11 @@ class MonocularTracker:
     def is_absent(self, mask: NDArray[np.bool_], pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
         return int(np.count_nonzero(mask)) < max(ABSENT * count(self.picture.draw(pose)), 1)
+
+    @staticmethod
+    def absent(state: State) -> State:
+        """The state while nobody is there: the pose waits."""
+        return state._replace(cost=np.nan, overlap=0.0, status="absent")
 
     @cached_property
     def stages(self) -> tuple[FilterStage, ...]:
