@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.fitting import find
-from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes, silhouettes, take_sample
+from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes
 from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import Guess
 from shadowpuppet.io.joints import read_joints
@@ -44,18 +44,16 @@ class Case:
     @classmethod
     def read(cls, path: Path, *, masks: bool = False, references: bool = True, silhouette: dict[str, Any] | None = None) -> Case:
         """masks: the ready ones instead of segmentation; silhouette: settings of the segmentation of the masks that are tracked."""
-        options = make_options({"masks": masks})
+        options = make_options({"masks": masks, "silhouette": silhouette or {}})
         prepared = prepare(str(path), options, np.random.default_rng(0))
         footage = prepared.footage
         if footage.recording.truth is None:
             raise SystemExit(f"{path}: no truth")
         if not references:
             footage = replace(footage, recording=replace(footage.recording, references=()))
-        sample = take_sample(footage)
-        seen = silhouettes(footage, sample, make_options({"silhouette": silhouette})) if silhouette else prepared.silhouettes
         shots = list(footage.shots(masks))
-        times, tracked = np.array([shot.time for shot in shots]), [seen(shot) for shot in shots]
-        return cls(path.name, footage, sample, prepared.silhouettes, times, tracked, read_joints(footage.recording.truth))
+        times, tracked = np.array([shot.time for shot in shots]), [prepared.silhouettes(shot) for shot in shots]
+        return cls(path.name, footage, prepared.sample, prepared.clear, times, tracked, read_joints(footage.recording.truth))
 
     @property
     def camera(self) -> Camera:

@@ -187,6 +187,16 @@ def test_evaluate_says_when_the_truth_is_gone(shell, run, tmp_path):
     assert "joint errors" not in out
 
 
+def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, tmp_path):
+    code, out, err = shell("track", recording, "--silhouette.method", "averaging", "-o", tmp_path / "plain", *QUICK)
+    assert code == 0
+    assert "Traceback" not in err
+    said = " ".join(out.split())
+    assert "key averaging: as set" in said
+    assert "all this in clean silhouettes by both: plain ones show no posture" in said
+    assert read_run(tmp_path / "plain").info["settings"]["silhouette"]["method"] == "averaging"
+
+
 def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording, tmp_path):
     code, out, err = shell("fit-person", recording, "-o", "me.toml")
     assert (code, err) == (0, "")

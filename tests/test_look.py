@@ -13,9 +13,20 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.diagnostics import mask_quality
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.fitting import DEEP, wrong_posture
-from shadowpuppet.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
+from shadowpuppet.footage import (
+    FIRST,
+    FIRST_SECONDS,
+    LOOKED_AT,
+    RUN,
+    RUNS,
+    _spread,
+    clear_silhouettes,
+    open_footage,
+    silhouettes,
+    take_sample,
+)
 from shadowpuppet.initialization import POSTURES, Fit, Guess, sizes_from_height
-from shadowpuppet.look import _quality
+from shadowpuppet.look import _quality, prepare
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.pipeline import json_text, look_at, track_recording
 
@@ -94,6 +105,41 @@ def test_ready_masks_need_no_background(recording, tmp_path):
         look_at(made.copied(recording, tmp_path / "without", without=["masks"]), Options(masks=True))
 
 
+def test_where_plain_masks_are_tracked_the_person_is_measured_in_clean_ones(recording, look):
+    plain = prepare(str(recording), make_options({"silhouette": {"method": "averaging"}}), np.random.default_rng(0))
+    assert plain.silhouettes.segmenter.key == "averaging"
+    assert plain.look.key == "averaging: as set"
+    assert plain.look.exact_overlap == pytest.approx(look.exact_overlap_plain, abs=1e-6)
+    assert plain.look.person["silhouettes"] == look.key.split(":")[0]
+    assert look.person["silhouettes"] is None
+    clean = prepare(str(recording), Options(), np.random.default_rng(0))
+    assert plain.look.person["sizes"] == clean.look.person["sizes"]
+    assert clean.clear is clean.silhouettes
+
+
+@pytest.mark.parametrize(("settings", "key", "cleaned"), [
+    ({"method": "averaging", "clean": True}, "both", True), ({"method": "brightness", "clean": False, "factor": 3.0}, "brightness", True),
+    ({"method": "mog2", "clean": False}, "mog2", True),
+])  # fmt: skip
+def test_silhouettes_with_specks_are_not_measured_in(recording, settings, key, cleaned):
+    options = make_options({"silhouette": settings})
+    footage = open_footage(recording, options)
+    sample = take_sample(footage)
+    seen = silhouettes(footage, sample, options)
+    clear = clear_silhouettes(footage, sample, seen, options).segmenter
+    assert (clear.key, clear.settings.cleaned) == (key, cleaned)
+    assert clear.settings.factor == (2.0 if settings["method"] == "averaging" else options.silhouette.factor)
+
+
+@pytest.mark.parametrize("settings", [{}, {"method": "brightness"}, {"method": "mog2"}, {"clean": True}])
+def test_silhouettes_that_are_clean_are_measured_in(recording, settings):
+    options = make_options({"silhouette": settings})
+    footage = open_footage(recording, options)
+    sample = take_sample(footage)
+    seen = silhouettes(footage, sample, options)
+    assert clear_silhouettes(footage, sample, seen, options) is seen
+
+
 # Doubts
 
 
@@ -133,7 +179,6 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
 def look_at_masks(recording):
     """The look without the search for the person."""
     from shadowpuppet import look as module
-    from shadowpuppet.footage import silhouettes
 
     footage = open_footage(recording, Options())
     sample = take_sample(footage)
@@ -213,6 +258,13 @@ def test_empty_references_and_those_of_another_size_are_refused(recording, tmp_p
     _write(empty / "references" / "front_t_pose.png", made.images(recording / "background" / "cam.mp4")[0])
     with pytest.raises(RecordingError, match=r"front_t_pose.png: the silhouette is empty, expected the person in the posture front_t_pose"):
         look_at(empty)
+    changed = made.copied(recording, tmp_path / "changed")  # the light, say: the mask is of all
+    for name in POSTURES:
+        image = made.images(recording / "references" / f"{name}.png")[0]
+        _write(changed / "references" / f"{name}.png", 255 - image)
+        with pytest.raises(RecordingError, match=rf"{name}.png: the silhouette covers \d+ % of the picture, expected the person in the "):
+            look_at(changed)
+        _write(changed / "references" / f"{name}.png", image)
     large = made.copied(recording, tmp_path / "large")
     _write(large / "references" / "front_t_pose.png", np.zeros((240, 320, 3), np.uint8))
     with pytest.raises(RecordingError, match=r"front_t_pose.png: found a reference of 320 x 240 pixels, expected 160 x 120 as the film"):
@@ -246,6 +298,8 @@ def test_arms_that_are_not_seen_and_trunks_that_are_too_deep_show_a_wrong_postur
     wide = 2 * DEEP * max(sizes.shoulder_width, sizes.torso_bottom_width)
     deep = replace(fit, guess=replace(fit.guess, sizes=sizes.with_values(torso_top_depth=wide, torso_bottom_depth=wide)))
     assert "expected less depth than width" in str(wrong_posture(camera, mask, name, deep, pose))
+    broad = replace(fit, guess=replace(fit.guess, sizes=sizes.with_values(torso_bottom_width=0.7)), overlaps={"front_t_pose": 0.9})
+    assert "the trunk is 0.70 m wide, expected under 0.58" in str(wrong_posture(camera, mask, "front_t_pose", broad, pose))
     assert "by 0.30 only" in str(wrong_posture(camera, mask, name, replace(fit, overlaps={name: 0.3}), pose))
 
 

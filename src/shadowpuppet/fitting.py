@@ -16,6 +16,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import POSTURES, Fit, Guess, find_person, fit_references
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
+from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
 from shadowpuppet.tracking import MonocularTracker
 
@@ -27,6 +28,9 @@ SEEN = 0.6
 """Share of a level forearm that lies in the silhouette, under which the arms were not level: sizes can hide a wrong posture."""
 DEEP = 1.2
 """Depth of the fitted trunk over its width from which on it was not seen from the side; right ones have 0.75 to 0.82."""
+BROAD = 0.33
+"""Width of the fitted trunk's lower edge over the height from which on it was fitted to more than a person. Right ones have 0.13 to 0.2,
+the broadest of people (ANSUR II; Gordon et al. 2014) 0.27."""
 POOR = 0.75
 """Overlap with the film's first silhouette under which the body is in doubt; bodies that fit have 0.85 to 0.95."""
 LONGEST_REFERENCE = 60
@@ -66,9 +70,9 @@ class Found:
 def find(footage: Footage, sample: Sample, seen: Silhouettes, options: Options, rng: np.random.Generator) -> Found:
     """Sizes and place. Raises `TrackingError` where nobody is found or a reference shows another posture, or `FormatError`."""
     for_fit, for_start = rng.spawn(2)
-    masks = list(islice((mask for mask in map(seen, chain(sample.first, sample.shots)) if mask.any()), FIRST))
+    masks = list(islice(filter(may_be_person, map(seen, chain(sample.first, sample.shots))), FIRST))
     if not masks:
-        raise TrackingError(f"{footage.view.video}: the silhouettes are empty, expected a person in them")
+        raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
     fit, source = _fitted(footage, masks, seen, options, for_fit)
     tracker = MonocularTracker(fit.guess.picture(footage.camera, options.tracker.body), options.tracker)
     return Found(fit, source, tracker.start(for_start, masks[0]).overlap)
@@ -117,8 +121,9 @@ def _reference(footage: Footage, seen: Silhouettes, reference: Reference) -> Mas
     except SilhouetteError as error:
         raise RecordingError(f"{path}: {error}") from None
     middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # in a film of the posture, whoever walks in is in few frames
-    if not middle.any():
-        raise RecordingError(f"{path}: the silhouette is empty, expected the person in the posture {reference.name} before the "
+    if not may_be_person(middle):
+        found = f"covers {100 * middle.mean():.0f} % of the picture" if middle.any() else "is empty"
+        raise RecordingError(f"{path}: the silhouette {found}, expected the person in the posture {reference.name} before the "
                              "background of the film; take it again, or remove it: without it, sizes come from proportions")
     return middle
 
@@ -139,6 +144,9 @@ def wrong_posture(camera: Camera, mask: Mask, name: str, fit: Fit, pose: Array) 
     if name == "side_arms_hanging":
         deep, wide = (sizes.torso_top_depth + sizes.torso_bottom_depth) / 2, (sizes.shoulder_width + sizes.torso_bottom_width) / 2
         return f"the trunk is {deep:.2f} m deep and {wide:.2f} m wide, expected less depth than width" if deep > DEEP * wide else None
+    if sizes.torso_bottom_width > BROAD * fit.guess.height:
+        return (f"the trunk is {sizes.torso_bottom_width:.2f} m wide, expected under {BROAD * fit.guess.height:.2f}: the silhouette, "
+                f"{100 * mask.mean():.0f} % of the picture, is of more than the person")
     seen = _forearms_seen(camera, mask, fit.guess, pose)
     return f"{100 * seen:.0f} % of the level forearms are in the silhouette, expected nearly all" if seen < SEEN else None
 
@@ -149,7 +157,7 @@ def _forearms_seen(camera: Camera, mask: Mask, guess: Guess, pose: Array) -> flo
     pixels = dict(zip(picture.body.landmark_names, camera.project(picture.points_world(pose[None])[0])))
     along = np.linspace(0, 1, 20)[:, None]
     line = np.concatenate([pixels[f"{side}_elbow"] * (1 - along) + pixels[f"{side}_wrist"] * along for side in ("left", "right")])
-    x, y = np.rint(line).astype(int).T
+    x, y = np.rint(line[np.isfinite(line).all(1)]).astype(int).T
     inside = (x >= 0) & (y >= 0) & (x < camera.size[0]) & (y < camera.size[1])
     return float(mask[y[inside], x[inside]].mean()) if inside.any() else 1.0
 

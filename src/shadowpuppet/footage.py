@@ -15,7 +15,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.options import Options
-from shadowpuppet.silhouette import Segmenter, background_from_film, learn_background, ready_mask
+from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
 
 Mask = NDArray[np.bool_]
@@ -231,6 +231,18 @@ def silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouett
     seen = Silhouettes(source, None, footage.region, None if footage.region is None else first)
     segmenter = learn_background(scene, options.silhouette, film=[seen.visible(image) for image in images])
     return replace(seen, segmenter=segmenter)
+
+
+def clear_silhouettes(footage: Footage, sample: Sample, seen: Silhouettes, options: Options) -> Silhouettes:
+    """Silhouettes that a person can be measured in: those that are tracked in, `seen`, where these are clean; otherwise clean ones.
+
+    A filter finds a body among specks and holes once its sizes are known; sizes and postures cannot be told from them.
+    """
+    asked = options.silhouette
+    if seen.segmenter is None or (asked.cleaned and asked.method != "averaging"):
+        return seen
+    clean = SilhouetteSettings() if asked.method == "averaging" else replace(asked, clean=None)
+    return silhouettes(footage, sample, replace(options, silhouette=clean))
 
 
 def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:

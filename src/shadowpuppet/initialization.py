@@ -28,9 +28,9 @@ POSTURES: Mapping[str, Mapping[str, float]] = {
 """The known postures d_ref of the reference pictures, for O1, O2 and O3 in this order."""
 POSTURE_OF = dict(zip(SUBSETS, POSTURES, strict=True))
 """The posture that each subset of sizes is fitted in."""
-STRETCH = (0.2, 2.0)
-"""Height that a person would have by the distance that is told and their extent in the picture, over the one told or usual: outside
-these one of the two is wrong. Wide, for arms may hang or end outside the picture."""
+NEAREST, FARTHEST = 0.3, 2.0
+"""A distance that is told, over that at which the upper body, or the whole person or their level arms, look as large as in a reference:
+outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,23 +171,23 @@ def _places(camera: Camera, mask: Mask, height: float | None, distance: float | 
 def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, distance: float | None) -> Guess:
     """Sizes from the height, and the place where a body of these sizes has its crown where the mask of the posture `name` has.
 
-    Raises `TrackingError` where the distance does not go with the mask's extent, and the height where that is told too.
+    Raises `TrackingError` where nobody who is so far away looks as large as in the mask.
     """
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    wide, high = max(columns[-1] - columns[0], 1), max(rows[-1] - rows[0], 1)
     focal, tall = camera.matrix[0, 0], height or AVERAGE_HEIGHT
     sizes = sizes_from_height(tall)
     reach = sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length
-    extent, measure = (columns[-1] - columns[0], 2 * reach) if name != "side_arms_hanging" else (
-        rows[-1] - rows[0], sizes.torso_height + sizes.head_height + sizes.neck_gap + sizes.waist_height)
+    upper = focal * (sizes.torso_height + sizes.head_height + sizes.neck_gap + sizes.waist_height) / high
+    far = upper if name == "side_arms_hanging" else focal * 2 * reach / wide
     if distance is not None:
-        spans = distance * extent / focal  # metres
-        least = spans if name == "side_arms_hanging" else spans * tall / measure  # from the side all of the legs may be in the picture
-        if not STRETCH[0] <= least / tall <= STRETCH[1]:
-            raise TrackingError(f"distance: found {distance:g} metres, at which the person in {name} would be {least:.2g} m tall; "
-                                f"expected about {distance * tall / least:.2g} metres, for a height of {tall:.2f}")
-        tall = tall if height is not None else tall * spans / measure
-        sizes = sizes_from_height(tall)
-    far = distance if distance is not None else focal * measure / max(extent, 1)
+        whole = focal * tall / high if name == "side_arms_hanging" else far
+        for end, wrong in ((f"least {upper:.1f}", distance < NEAREST * upper), (f"most {whole:.1f}", distance > FARTHEST * whole)):
+            if wrong:
+                raise TrackingError(f"distance: found {distance:g} metres, expected at {end}, by how large a person of {tall:.2f} m is "
+                                    f"in {name}")
+        tall = tall if height is not None else tall * distance / far
+        sizes, far = sizes_from_height(tall), distance
     down = camera.rays(np.array([columns.mean(), rows[0]], float))
     up = place(camera, 0.0, 0.0)[:3, 2]
     crown = down / abs(down[2]) * far

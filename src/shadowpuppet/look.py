@@ -11,7 +11,7 @@ import numpy as np
 from shadowpuppet.diagnostics import MaskQuality, mask_quality
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.fitting import Found, find, told_scale
-from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes, open_footage, silhouettes, take_sample
+from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes, clear_silhouettes, open_footage, silhouettes, take_sample
 from shadowpuppet.metrics import overlap
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette import ready_mask
@@ -63,7 +63,8 @@ class Look:
     quality: MaskQuality
     """Of the silhouettes in the frames looked at."""
     person: dict[str, Any] | None = None
-    """Sizes (m), place (m) and overlaps of the fitted body; None where it was not fitted."""
+    """Sizes (m), place (m) and overlaps of the fitted body, and which silhouettes it was fitted in where these are others than those
+    that are tracked in; None where it was not fitted."""
     doubts: tuple[str, ...] = ()
     """What may harm the run, and the remedy, a sentence each."""
     refusal: str | None = None
@@ -75,7 +76,11 @@ class Prepared:
     """All that a run needs."""
 
     footage: Footage
+    sample: Sample
     silhouettes: Silhouettes
+    """In which the person is tracked."""
+    clear: Silhouettes
+    """In which the person is found and measured; the same where these are clean."""
     found: Found | None
     """None where tracking is hopeless."""
     look: Look
@@ -87,14 +92,17 @@ def prepare(path: str, options: Options, rng: np.random.Generator) -> Prepared:
     sample = take_sample(footage, options.masks)
     seen = silhouettes(footage, sample, options)
     look = _first_look(footage, sample, seen)
+    clear = seen if look.refusal else clear_silhouettes(footage, sample, seen, options)
+    prepared = Prepared(footage, sample, seen, clear, None, look)
     if look.refusal is not None:
-        return Prepared(footage, seen, None, look)
-    found = find(footage, sample, seen, options, rng)
+        return prepared
+    found = find(footage, sample, clear, options, rng)
     guess = found.fit.guess
-    person = {"source": found.source, "height": float(guess.height), "distance": float(guess.distance), "elevation": float(guess.elevation),
-              "overlaps": dict(found.fit.overlaps), "start_overlap": found.start,
+    others = clear.segmenter.key if clear is not seen and clear.segmenter is not None else None
+    person = {"source": found.source, "silhouettes": others, "height": float(guess.height), "distance": float(guess.distance),
+              "elevation": float(guess.elevation), "overlaps": dict(found.fit.overlaps), "start_overlap": found.start,
               "sizes": dict(zip(guess.sizes.names(), guess.sizes.to_array().tolist()))}
-    return Prepared(footage, seen, found, replace(look, person=person, doubts=(*look.doubts, *found.doubts())))
+    return replace(prepared, found=found, look=replace(look, person=person, doubts=(*look.doubts, *found.doubts())))
 
 
 def check(prepared: Prepared) -> Found:

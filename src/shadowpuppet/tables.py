@@ -145,8 +145,9 @@ def _quality(look: Look) -> str:
 
 def _person(person: Mapping[str, Any]) -> str:
     fits = ", ".join(f"{name} {value:.2f}" for name, value in person["overlaps"].items()) if person["source"] == "references" else ""
+    clean = f"; all this in clean silhouettes by {person['silhouettes']}: plain ones show no posture" if person["silhouettes"] else ""
     return (f"height {person['height']:.2f} m at {person['distance']:.2f} m; sizes from {person['source']}"
-            + (f" (overlap: {fits})" if fits else "") + f"; overlaps the film's first silhouette by {person['start_overlap']:.2f}")
+            + (f" (overlap: {fits})" if fits else "") + f"; overlaps the film's first silhouette by {person['start_overlap']:.2f}{clean}")
 
 
 def _number(value: float) -> str:
