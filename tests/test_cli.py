@@ -360,6 +360,12 @@ def test_no_references_no_height_no_distance(shell, recording, tmp_path):
     assert len(read_run(tmp_path / "run").motion) == made.FRAMES
 
 
+def test_a_distance_that_the_references_do_not_bear_out(shell, recording):
+    said = refused(shell, "info", recording, "--distance", "18", "--height", "1.75")
+    assert "tiny: distance: found 18 metres, expected at most 2." in said
+    assert "np.float64" not in said
+
+
 def test_references_in_the_wrong_posture(shell, spoilt):
     for name in ("front_t_pose", "front_arms_t_pose"):
         source = spoilt / "references" / "side_arms_hanging.png"

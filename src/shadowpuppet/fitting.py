@@ -73,7 +73,10 @@ def find(footage: Footage, sample: Sample, seen: Silhouettes, options: Options, 
     masks = list(islice(filter(may_be_person, map(seen, chain(sample.first, sample.shots))), FIRST))
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
-    fit, source = _fitted(footage, masks, seen, options, for_fit)
+    try:
+        fit, source = _fitted(footage, masks, seen, options, for_fit)
+    except TrackingError as error:
+        raise TrackingError(f"{footage.recording.path}: {error}") from None
     tracker = MonocularTracker(fit.guess.picture(footage.camera, options.tracker.body), options.tracker)
     return Found(fit, source, tracker.start(for_start, masks[0]).overlap)
 
