@@ -301,6 +301,16 @@ def test_a_distance_that_does_not_go_with_the_picture_is_said(height, name, dist
         fit_references(np.random.default_rng(0), CAMERA, {name: references()[name]}, height=height, distance=distance)
 
 
+@pytest.mark.parametrize("name", POSTURES)
+def test_a_line_across_the_picture_is_not_taken_for_the_person_s_size(name):
+    """As where a floor ends, which a picture shows sharper than the film of the empty scene."""
+    mask = references()[name].copy()
+    mask[:, 20:22] |= name == "side_arms_hanging"
+    mask[50:52] |= name != "side_arms_hanging"
+    brief = InitializationSettings(rounds=1, sweeps=1)
+    assert fit_references(np.random.default_rng(0), CAMERA, {name: mask}, distance=4.0, settings=brief).guess.distance == 4.0
+
+
 # Legs -----------------------------------------------------------------------------------------------------------------
 
 

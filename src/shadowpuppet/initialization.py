@@ -28,9 +28,11 @@ POSTURES: Mapping[str, Mapping[str, float]] = {
 """The known postures d_ref of the reference pictures, for O1, O2 and O3 in this order."""
 POSTURE_OF = dict(zip(SUBSETS, POSTURES, strict=True))
 """The posture that each subset of sizes is fitted in."""
+THICK = 1 / 60
+"""Pixels that a row or column of a person has at least, as a share of the picture's height: specks and lines have less."""
 NEAREST, FARTHEST = 0.3, 2.0
-"""A distance that is told, over that at which the upper body, or the whole person or their level arms, look as large as in a reference:
-outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
+"""A distance that is told, over that at which the upper body (nearest), or the whole person or their level arms (farthest), look as
+large as in a reference: outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,26 +170,45 @@ def _places(camera: Camera, mask: Mask, height: float | None, distance: float | 
     return out
 
 
+def _span(sizes: CardboxSizes) -> float:
+    """From one hand's end to the other's, arms level, metres."""
+    return 2 * (sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length)
+
+
+def _upper(sizes: CardboxSizes) -> float:
+    """From the waist's lower edge to the crown, metres."""
+    return sizes.torso_height + sizes.head_height + sizes.neck_gap + sizes.waist_height
+
+
+def _check_distance(distance: float, tall: float, focal: float, name: str, mask: Mask) -> None:
+    """Raise `TrackingError` where nobody so `tall` (m) who is so far away (m) looks as large as the mask of the posture `name`."""
+    thick = max(round(THICK * len(mask)), 2)
+    along = (np.flatnonzero(counts >= min(thick, counts.max())) for counts in (mask.sum(0), mask.sum(1)))
+    wide, high = (max(int(found[-1] - found[0]), 1) for found in along)
+    sizes = sizes_from_height(tall)
+    least = focal * _upper(sizes) / high
+    most = focal * tall / high if name == "side_arms_hanging" else focal * _span(sizes) / wide
+    for end, wrong in ((f"least {least:.1f}", distance < NEAREST * least), (f"most {most:.1f}", distance > FARTHEST * most)):
+        if wrong:
+            raise TrackingError(f"distance: found {distance:g} metres, expected at {end}, by how large a person of {tall:.2f} m is in "
+                                f"{name}")
+
+
 def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, distance: float | None) -> Guess:
     """Sizes from the height, and the place where a body of these sizes has its crown where the mask of the posture `name` has.
 
     Raises `TrackingError` where nobody who is so far away looks as large as in the mask.
     """
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    wide, high = max(columns[-1] - columns[0], 1), max(rows[-1] - rows[0], 1)
-    focal, tall = camera.matrix[0, 0], height or AVERAGE_HEIGHT
-    sizes = sizes_from_height(tall)
-    reach = sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length
-    upper = focal * (sizes.torso_height + sizes.head_height + sizes.neck_gap + sizes.waist_height) / high
-    far = upper if name == "side_arms_hanging" else focal * 2 * reach / wide
+    focal, tall, aside = camera.matrix[0, 0], height or AVERAGE_HEIGHT, name == "side_arms_hanging"
     if distance is not None:
-        whole = focal * tall / high if name == "side_arms_hanging" else far
-        for end, wrong in ((f"least {upper:.1f}", distance < NEAREST * upper), (f"most {whole:.1f}", distance > FARTHEST * whole)):
-            if wrong:
-                raise TrackingError(f"distance: found {distance:g} metres, expected at {end}, by how large a person of {tall:.2f} m is "
-                                    f"in {name}")
-        tall = tall if height is not None else tall * distance / far
-        sizes, far = sizes_from_height(tall), distance
+        _check_distance(distance, tall, focal, name, mask)
+    sizes = sizes_from_height(tall)
+    extent, measure = (rows[-1] - rows[0], _upper(sizes)) if aside else (columns[-1] - columns[0], _span(sizes))
+    if distance is not None and height is None:
+        tall *= distance * extent / focal / measure
+        sizes = sizes_from_height(tall)
+    far = distance if distance is not None else focal * measure / max(extent, 1)
     down = camera.rays(np.array([columns.mean(), rows[0]], float))
     up = place(camera, 0.0, 0.0)[:3, 2]
     crown = down / abs(down[2]) * far
