@@ -125,9 +125,10 @@ def _reference(footage: Footage, seen: Silhouettes, reference: Reference) -> Mas
         raise RecordingError(f"{path}: {error}") from None
     middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # in a film of the posture, whoever walks in is in few frames
     if not may_be_person(middle):
-        found = f"covers {100 * middle.mean():.0f} % of the picture" if middle.any() else "is empty"
-        raise RecordingError(f"{path}: the silhouette {found}, expected the person in the posture {reference.name} before the "
-                             "background of the film; take it again, or remove it: without it, sizes come from proportions")
+        covers = f"the silhouette covers {100 * middle.mean():.0f} % of the picture"
+        found = covers if middle.any() else "the silhouette is empty"
+        raise RecordingError(f"{path}: {found}, expected the person in the posture {reference.name} before the background of the "
+                             "film; take it again, or remove it: without it, sizes come from proportions")
     return middle
 
 
