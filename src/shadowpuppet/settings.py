@@ -16,6 +16,7 @@ from pydantic.dataclasses import dataclass
 from shadowpuppet.errors import SettingsError, choices, shown
 
 Settings = TypeVar("Settings")
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -24,7 +25,7 @@ def checked(kind: type[Settings]) -> type[Settings]:
 
     `Kind(name=value)` raises `SettingsError` for an unknown name or an impossible value, as `validate` does.
     """
-    made: Any = dataclass(frozen=True, kw_only=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))(kind)
+    made: Any = dataclass(frozen=True, kw_only=True, config=STRICT)(kind)
     check = made.__init__
 
     @wraps(check)
