@@ -135,7 +135,8 @@ def draw(found: Mapping[str, Mapping[str, list[dict[str, float]]]], file: Path) 
     figure, axes = plt.subplots(figsize=(7, 4.2), layout="constrained")
     for cycles in (1, 2, 3, 5):
         rows = [row for row in TRADE if f", {cycles} cycle" in row]
-        axes.plot([mean(row, "ms") for row in rows], [mean(row, "mean") for row in rows], "o-", ms=4, label=f"{cycles} cycle{'s' * (cycles > 1)}")
+        label = f"{cycles} cycle{'s' * (cycles > 1)}"
+        axes.plot([mean(row, "ms") for row in rows], [mean(row, "mean") for row in rows], "o-", ms=4, label=label)
         for row in rows if cycles == 3 else ():
             axes.annotate(row.split(",")[0], (mean(row, "ms"), mean(row, "mean")), textcoords="offset points", xytext=(4, 5), fontsize=8)
     for row, mark in (("default", "k*"), ("liu2011", "r^")):
@@ -151,7 +152,7 @@ def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rows", default="default;liu2011", help="names, with ; between them: " + "; ".join(ROWS))
-    parser.add_argument("--recordings", default="", help="names, with ; between them: " + "; ".join(spec.name for spec in proving_ground()))
+    parser.add_argument("--recordings", default="", help="names, with ; between them; all without")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--folder", type=Path, default=HERE, help="where the recordings are, or are made")
     parser.add_argument("--each", action="store_true", help="print every recording's error, too")
@@ -164,8 +165,8 @@ def main() -> None:
     unknown = [row for row in chosen if row not in ROWS]
     if unknown:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
-    found = prove(made(args.folder, filter(None, args.recordings.split(";"))), {row: ROWS[row] for row in dict.fromkeys(chosen)}, args.seeds,
-                  args.workers)
+    paths = made(args.folder, filter(None, args.recordings.split(";")))
+    found = prove(paths, {row: ROWS[row] for row in dict.fromkeys(chosen)}, args.seeds, args.workers)
     text = "\n\n".join([table(found), *([each(found)] if args.each else [])])
     print(text)
     if args.markdown:

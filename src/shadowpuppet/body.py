@@ -105,7 +105,7 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     joints = [Joint(shoulder, "torso", (0.0, y, z)), Joint(elbow, shoulder, (0.0, 0.0, -sizes.upper_arm_length))]
     dofs = [
         Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190]), rest=0.8, spread=(2.0, 2.0)),
-        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100]), rest=0.2, spread=(0.25, 0.7)),
+        Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100]), spread=(0.3, 0.7)),
         Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95]), spread=(1.0, 1.0)),
         Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150]), spread=(1.2, 1.2)),
     ]
