@@ -42,7 +42,14 @@ SEGMENTS = (
         for side in ("left", "right")
         for name in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")
     ),
+    "left_toes",
+    "right_toes",
 )
+SIDES = ("left", "right")
+TOE_OUT = 0.12
+"""How far the feet of a standing person point outward, rad."""
+SPAN = 0.999
+"""Share of its length that a leg may stretch to: knees are never quite straight."""
 MIRROR = np.array([1.0, -1.0, -1.0])
 HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
@@ -61,6 +68,21 @@ class Figure(NamedTuple):
     """How far the fingers of the left and right hand are bent, of shape (T, 2), 0 to 1."""
 
 
+class Stance(NamedTuple):
+    """Where pelvis and feet are in T postures; legs follow from it by two-bone inverse kinematics."""
+
+    pelvis: Array
+    """The pelvis' centre, of shape (T, 3), metres, world; lowered where a leg would not reach its ankle."""
+    ankles: Array
+    """Left and right ankle, of shape (T, 2, 3), metres, world."""
+    feet: Array
+    """Left and right foot to world, of shape (T, 2, 3, 3); identity stands flat, facing -Y."""
+    toes: Array
+    """How far the left and right toes are bent up against the foot, of shape (T, 2), rad."""
+    ahead: Array
+    """Where left and right knee look, of shape (T, 2, 3)."""
+
+
 def turns(*vector: Array) -> Array:
     """Rotation matrices (T, 3, 3) of rotation vectors given by their components (T,)."""
     from scipy.spatial.transform import Rotation
@@ -74,13 +96,32 @@ def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     stance: half the distance between the ankles, as a fraction of the leg's length. Feet stay where they are: the pelvis sinks
     as far as both legs need, and hips and knees follow from its place.
     """
+    return figure(body, postures, planted(body, postures, stance))
+
+
+def planted(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
+    """The `Stance` of `pose`: feet beside each other about the origin, the pelvis above them as high as the legs allow."""
+    q = dict(zip(CHANNELS, np.asarray(postures, float).T))
+    yaw = _yaw(q)
+    half, height = stance * (body.length("thigh") + body.length("shank")), body.rest()["left_ankle"][2]
+    sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
+    ankles = np.stack([yaw @ np.array([sign * half, 0, height]) for sign in (1, -1)], 1)
+    feet = np.stack([yaw @ turns(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
+    ahead = np.repeat((yaw @ np.array([0.0, -1.0, 0.0]))[:, None], 2, 1)
+    return Stance(sway + [0, 0, np.inf], ankles, feet, np.zeros((len(yaw), 2)), ahead)
+
+
+def figure(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
+    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`; its pelvis and feet count, not `sway` in the postures.
+
+    soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
+    """
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
     rest = body.rest()
     joint: dict[str, Array] = {}
     frame: dict[str, tuple[Array, Array]] = {}
-    yaw = turns(0 * q["turn"], 0 * q["turn"], q["turn"])
-    pelvis = yaw @ turns(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
-    joint["pelvis"] = _legs(body, q, yaw, pelvis, stance, joint, frame)
+    pelvis = _yaw(q) @ turns(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
+    joint["pelvis"] = _legs(body, pelvis, stance, soft, joint, frame)
     frame["pelvis"] = pelvis, joint["pelvis"]
     half = turns(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
     abdomen, thorax = pelvis @ half, pelvis @ half @ half
@@ -92,14 +133,24 @@ def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     joint["head"] = joint["neck"] + neck @ (rest["head"] - rest["neck"])
     frame |= {"abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
     frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
-    for side in ("left", "right"):
+    for side in SIDES:
         _arm(rest, q, side, thorax, thoracic, joint, frame)
+    return assembled(joint, frame, np.stack([q["left_curl"], q["right_curl"]], 1))
+
+
+def assembled(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
+    """A `Figure` of joints (T, 3) by name and of segments' frames and origins by name; fingers bent by `curl` (T, 2)."""
     return Figure(
         np.stack([joint[name] for name in JOINTS], 1),
         np.stack([frame[name][0] for name in SEGMENTS], 1),
         np.stack([frame[name][1] for name in SEGMENTS], 1),
-        np.stack([q["left_curl"], q["right_curl"]], 1),
+        curl,
     )
+
+
+def _yaw(q: dict[str, Array]) -> Array:
+    """The figure's heading, of shape (T, 3, 3)."""
+    return turns(0 * q["turn"], 0 * q["turn"], q["turn"])
 
 
 def _arm(
@@ -143,37 +194,48 @@ def _arm(
     }
 
 
-def _legs(body: Mannequin, q: dict, yaw: Array, pelvis: Array, stance: float, joint: dict, frame: dict) -> Array:
-    """The pelvis' centre (T, 3) over planted feet; fills in both legs by two-bone inverse kinematics, knees forward."""
+def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: dict, frame: dict) -> Array:
+    """The pelvis' centre (T, 3), no higher than both legs reach; fills in both legs."""
     thigh, shank = body.length("thigh"), body.length("shank")
     rest = body.rest()
-    ankles, hips = {}, {}
-    for side, sign in (("left", 1), ("right", -1)):
-        ankles[side] = yaw @ np.array([sign * stance * (thigh + shank), 0, rest[f"{side}_ankle"][2]])
-        hips[side] = pelvis @ (rest[f"{side}_hip"] - rest["pelvis"])
-    sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
-    span = 0.999 * (thigh + shank)
+    hips = [pelvis @ (rest[f"{side}_hip"] - rest["pelvis"]) for side in SIDES]
+    ankles = [stance.ankles[:, n] for n in (0, 1)]
+    sway, span = np.where([True, True, False], stance.pelvis, 0.0), SPAN * (thigh + shank)
     heights = [
-        ankles[s][:, 2] - hips[s][:, 2] + np.sqrt(span**2 - ((sway + hips[s] - ankles[s])[:, :2] ** 2).sum(1)) for s in hips
+        ankle[:, 2] - hip[:, 2] + np.sqrt(np.maximum(span**2 - ((sway + hip - ankle)[:, :2] ** 2).sum(1), 0))
+        for hip, ankle in zip(hips, ankles)
     ]
-    centre = sway + np.minimum(*heights)[:, None] * [0, 0, 1]
-    for side in ("left", "right"):
-        hip, ankle = centre + hips[side], ankles[side]
-        down = ankle - hip
-        reach = np.linalg.norm(down, axis=1, keepdims=True)
-        down /= reach
-        ahead = yaw @ np.array([0.0, -1.0, 0.0])
-        ahead -= (ahead * down).sum(1, keepdims=True) * down
-        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-        cosine = np.clip((thigh**2 + reach**2 - shank**2) / (2 * thigh * reach), -1, 1)
-        knee = hip + thigh * (cosine * down + np.sqrt(1 - cosine**2) * ahead)
+    centre = sway + lesser(lesser(*heights, soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
+    for n, side in enumerate(SIDES):
+        hip, ankle, ahead, foot = centre + hips[n], ankles[n], stance.ahead[:, n], stance.feet[:, n]
+        knee, ahead = _bent(hip, ankle, ahead, thigh, shank)
+        toes = foot @ turns(-stance.toes[:, n], *np.zeros((2, 1)))
         joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
         frame |= {
             f"{side}_thigh": (_upright(hip - knee, ahead), hip),
             f"{side}_shank": (_upright(knee - ankle, ahead), knee),
-            f"{side}_foot": (yaw @ turns(*np.zeros((2, 1)), np.array([0.12 if side == "left" else -0.12])), ankle),
+            f"{side}_foot": (foot, ankle),
+            f"{side}_toes": (toes, ankle + foot @ body.ball()),
         }
     return centre
+
+
+def _bent(hip: Array, ankle: Array, ahead: Array, thigh: float, shank: float) -> tuple[Array, Array]:
+    """The knee (T, 3) between hip and ankle (T, 3), and the part of `ahead` square to the leg."""
+    down = ankle - hip
+    reach = np.linalg.norm(down, axis=1, keepdims=True)
+    down /= reach
+    ahead = ahead - (ahead * down).sum(1, keepdims=True) * down
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    cosine = np.clip((thigh**2 + reach**2 - shank**2) / (2 * thigh * reach), -1, 1)
+    return hip + thigh * (cosine * down + np.sqrt(1 - cosine**2) * ahead), ahead
+
+
+def lesser(a: Array, b: Array, soft: float) -> Array:
+    """The smaller of `a` and `b`, rounded off where they come closer than `soft`."""
+    if soft == 0:
+        return np.minimum(a, b)
+    return np.minimum(a, b) - np.maximum(soft - np.abs(np.where(np.isinf(b), a + soft, b) - a), 0) ** 2 / (4 * soft)
 
 
 def _upright(up: Array, ahead: Array) -> Array:

@@ -126,6 +126,10 @@ class Mannequin:
         factor = self.arm_length if name in ("upper_arm", "forearm", "hand") else 1.0
         return float(np.interp(self.build, (0, 1), FRACTIONS[name]) * self.stature * factor)
 
+    def ball(self) -> Array:
+        """The ball of the foot, about which the toes bend, (3,), metres, from the ankle of a flat foot facing -Y."""
+        return np.array([0, -0.48 * self.measure("foot_length"), 0.02 - self.length("ankle")])
+
     def rest(self) -> dict[str, Array]:
         """Joint centres (3,), metres, of the person standing with arms level to the sides, facing -Y; left is +X.
 

@@ -1,0 +1,243 @@
+"""One cycle of walking or jogging: what published joint angles say of a foot and the pelvis, fitted to a body and a speed.
+
+The angles alone would let feet slide and sink a little. So the cycle is taken apart into what must hold on any path (a foot
+stands still from contact to toe-off, rolling over heel and ball) and what the angles say beyond: how the foot swings and how the
+pelvis rises and sinks. `gait.py` puts it together again over footprints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
+from shadowpuppet.synthetic.mannequin import Mannequin
+
+GRAVITY = 9.81
+POINTS = 200
+"""Phases at which a cycle is computed."""
+FLAT = np.radians(5.0)
+"""Pitch of the foot, rad, below which it lies almost flat while it carries."""
+CLEARANCE = 0.02
+"""Least height of the ball of a swinging foot, in its middle, in leg lengths."""
+
+
+class Sole(NamedTuple):
+    """The foot in its plane, metres: forward from below the ankle, and up."""
+
+    heel: float
+    """How far behind the ankle it rolls off at the back."""
+    ball: float
+    """How far before the ankle the ball lies."""
+    tip: float
+    """How far before the ankle the toes end."""
+    ankle: float
+    """The ankle's height over the floor."""
+
+    @classmethod
+    def of(cls, body: Mannequin) -> Sole:
+        """Of a body."""
+        return cls(*(share * body.measure("foot_length") for share in (0.14, 0.48, 0.72)), body.length("ankle"))
+
+    def rolled(self, pitch: Array) -> tuple[Array, Array]:
+        """The ankle of a foot that stands with `pitch` (rad, toes up), forward and up from the point below it when flat.
+
+        It rolls over the heel, or over the ball, and from some 20 degrees on over the tips of the toes, too.
+        """
+        c, s = np.cos(pitch), np.sin(pitch)
+        late = smooth((-pitch - np.radians(20)) / np.radians(60))
+        lever = np.where(pitch > 0, -self.heel, self.ball + late * (self.tip - self.ball))
+        return lever - lever * c - self.ankle * s, -lever * s + self.ankle * c
+
+
+class Gait(NamedTuple):
+    """A way to go."""
+
+    carries: float
+    """Share of the cycle that a foot stands."""
+    bow: float
+    """How far the pelvis is tilted forward against standing, degrees."""
+    thigh: Callable[[Array], Array]
+    """Angle of the thigh before the vertical at a phase, degrees."""
+    knee: Callable[[Array], Array]
+    """Flexion, degrees."""
+    ankle: Callable[[Array], Array]
+    """Dorsiflexion, degrees."""
+    obliquity: Callable[[Array], Array]
+    """How far the pelvis is raised on the side of the leg, degrees."""
+    rotation: Callable[[Array], Array]
+    """How far it is turned forward on that side, degrees."""
+
+
+WALKING = Gait(
+    0.62,
+    0.3,
+    lambda p: curve(WALK["hip"], p) - curve(WALK["tilt"], p),
+    lambda p: curve(WALK["knee"], p) + KNEE_ZERO,
+    lambda p: curve(WALK["ankle"], p) + 0.5 * KNEE_ZERO,
+    lambda p: curve(WALK["obliquity"], p),
+    lambda p: curve(WALK["rotation"], p),
+)
+JOGGING = Gait(
+    0.38,
+    6.0,
+    lambda p: curve(RUN["hip"], p) - 3.0,
+    lambda p: curve(RUN["knee"], p),
+    lambda p: curve(RUN["ankle"], p),
+    lambda p: 4.0 * np.cos(2 * np.pi * (p - 0.15)),
+    lambda p: 5.0 * np.cos(2 * np.pi * (p - 0.03)),
+)
+"""Jogging: the pelvis' small motions in the frontal and horizontal plane by the sizes of Novacheck (1998, fig. 4)."""
+assert STANDING_TILT == 10.0  # what WALKING.bow is counted from: 10.3 on average
+
+
+def stride_of(speed: float, leg: float, jogging: bool) -> float:
+    """Length (m) of a stride at `speed` (m/s) of a person whose hips are `leg` (m) high.
+
+    Walking: it grows with the root of the speed (Inman 1981), and is 1.2 hip heights at one hip height a second: so long that
+    the angles of `WALK` need no widening at the speed of those who walked; other sizes go alike at equal Froude number. Jogging:
+    2.3 hip heights times the Froude number to the 0.3 (Alexander 1989).
+    """
+    if jogging:
+        return 2.3 * leg * (speed**2 / (GRAVITY * leg)) ** 0.3
+    return 1.2 * leg * (speed / np.sqrt(0.9 * leg)) ** 0.5
+
+
+class Cycle:
+    """A gait of a body at a speed (m/s)."""
+
+    def __init__(self, body: Mannequin, gait: Gait, speed: float, stride: float) -> None:
+        """stride: its length, metres."""
+        self.body, self.gait, self.speed, self.stride = body, gait, speed, stride
+        self.sole = Sole.of(body)
+        self.leg = body.length("thigh") + body.length("shank")
+        self.amplitude = self._amplitude()
+        phase = np.arange(POINTS) / POINTS
+        thigh, shank, pitch = self._angles(phase, self.amplitude)
+        base, drop = self._foot(phase, thigh, shank, pitch)
+        carried = phase <= gait.carries
+        self.lead = float(base[carried].mean())
+        """Where a foot stands before the pelvis at its contact, metres."""
+        self.middle = self.lead / stride
+        """Phase at which it is below the pelvis."""
+        self.height = _harmonics(phase, drop + self.sole.rolled(pitch)[1], np.where(phase < 0.8 * gait.carries, 1.0, 0.02) * carried)
+        self._pitch = _periodic(pitch + self._more_pitch(phase, pitch))
+        swing = np.linspace(gait.carries, 1, 60)
+        self._progress, self._lift = self._swing(swing)
+
+    def pitch(self, phase: Array) -> Array:
+        """Pitch of the foot, rad, toes up, at phases of its leg."""
+        return self._pitch(phase % 1)
+
+    def progress(self, phase: Array) -> Array:
+        """How much of the way to the next footprint is behind the foot, 0 to 1; 0 while it carries."""
+        return np.where(phase % 1 > self.gait.carries, self._progress(np.maximum(phase % 1, self.gait.carries)), 0.0)
+
+    def lift(self, phase: Array) -> Array:
+        """How far the foot is lifted beyond what its pitch asks for, metres."""
+        return np.where(phase % 1 > self.gait.carries, self._lift(np.maximum(phase % 1, self.gait.carries)), 0.0)
+
+    def _angles(self, phase: Array, amplitude: float) -> tuple[Array, Array, Array]:
+        """Thigh and shank before the vertical, and the foot's pitch, rad: swings `amplitude` times as wide as published."""
+        whole = np.arange(POINTS) / POINTS
+        mean, more = self.gait.thigh(whole).mean(), np.sqrt(amplitude)
+        least = self.gait.knee(whole).min()
+        thigh = np.radians(mean + amplitude * (self.gait.thigh(phase) - mean))
+        shank = thigh - np.radians(least + more * (self.gait.knee(phase) - least))
+        pitch = shank + np.radians(more * self.gait.ankle(phase))
+        return thigh, shank, pitch * np.abs(pitch) / (np.abs(pitch) + FLAT)
+
+    def _foot(self, phase: Array, thigh: Array, shank: Array, pitch: Array) -> tuple[Array, Array]:
+        """Where the flat foot's ankle would lie along the way, and how far the ankle is below the pelvis, metres."""
+        long, short, half = self.body.length("thigh"), self.body.length("shank"), self.body.rest()["left_hip"][0]
+        turned, raised = np.radians(self.gait.rotation(phase)), np.radians(self.gait.obliquity(phase))
+        ahead = long * np.sin(thigh) + short * np.sin(shank) + half * np.sin(turned)
+        drop = long * np.cos(thigh) + short * np.cos(shank) - half * np.sin(raised)
+        return self.stride * phase + ahead - self.sole.rolled(pitch)[0], drop
+
+    def _amplitude(self) -> float:
+        """How much wider than published the leg swings so that at this speed a carrying foot stays where it is."""
+        from scipy.optimize import brentq
+
+        phase = np.linspace(0.02, self.gait.carries - 0.02, 80)
+
+        def slope(amplitude: float) -> float:
+            return float(np.polyfit(phase, self._foot(phase, *self._angles(phase, amplitude))[0], 1)[0])
+
+        low, high = 0.2, 2.2
+        if slope(low) < 0 or slope(high) > 0:
+            return low if slope(low) < 0 else high
+        return float(brentq(slope, low, high, xtol=1e-4))  # pyright: ignore[reportArgumentType]
+
+    def _more_pitch(self, phase: Array, pitch: Array) -> Array:
+        """By how much more the heel rises late in stance so that the knee bends as published over a foot that stays: rad.
+
+        Over a foot that does not slip at all, small errors of the published angles would stretch or bend the knee by far more.
+        """
+        from scipy.ndimage import gaussian_filter1d
+
+        long, short, half = self.body.length("thigh"), self.body.length("shank"), self.body.rest()["left_hip"][0]
+        knee = self._angles(phase, self.amplitude)[:2]
+        wanted = np.sqrt(long**2 + short**2 + 2 * long * short * np.cos(knee[0] - knee[1]))
+        turned, raised = np.radians(self.gait.rotation(phase)), np.radians(self.gait.obliquity(phase))
+        tries = np.radians(np.arange(-10.0, 31.0, 0.5))
+        forward, up = self.sole.rolled(pitch[:, None] - tries)
+        ahead = (self.lead - self.stride * phase - half * np.sin(turned))[:, None] + forward
+        down = (self.height(phase) + half * np.sin(raised))[:, None] - up
+        off = np.abs(np.hypot(ahead, down) - wanted[:, None]) + 0.03 * tries**2
+        late = (phase > 0.55 * self.gait.carries) & (phase <= self.gait.carries)
+        more = np.where(late, tries[off.argmin(1)], 0.0)
+        last = int(np.flatnonzero(late)[-1])
+        after = np.arange(last + 1, POINTS)
+        more[after] = more[last] * (1 - smooth((phase[after] - phase[last]) / 0.25))
+        return -gaussian_filter1d(more, 0.02 * POINTS, mode="wrap")
+
+    def _swing(self, phase: Array) -> tuple[Callable, Callable]:
+        """`progress` and `lift` between toe-off and contact: the published way, less what would jerk at its ends."""
+        from scipy.interpolate import CubicSpline
+
+        thigh, shank, pitch = self._angles(phase, self.amplitude)
+        pitch = self._pitch(phase)
+        base, drop = self._foot(phase, thigh, shank, pitch)
+        forward = (base - self.lead) / self.stride
+        up = self.height(phase) - drop - self.sole.rolled(pitch)[1]
+        part = (phase - self.gait.carries) / (1 - self.gait.carries)
+        clear = CLEARANCE * self.leg * 16 * (part * (1 - part)) ** 2
+        progress, lift = forward - _ends(phase, forward, (0, 1)), np.hypot(np.maximum(up - _ends(phase, up), 0), clear)
+        still = [(1, 0.0), (1, 0.0)]
+        return CubicSpline(phase, progress, bc_type=still), CubicSpline(phase, lift, bc_type=still)
+
+
+def smooth(x: Array) -> Array:
+    """From 0 to 1 as x goes from 0 to 1, with no jump in speed or acceleration (a quintic)."""
+    x = np.clip(x, 0, 1)
+    return x**3 * (10 - 15 * x + 6 * x * x)
+
+
+def _ends(x: Array, y: Array, wanted: tuple[float, float] = (0, 0)) -> Array:
+    """What to take off `y` (n,) at `x` (n,) so that it has `wanted` values and no slopes at its ends: a cubic."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    return CubicHermiteSpline(x[[0, -1]], y[[0, -1]] - wanted, np.gradient(y, x)[[0, -1]])(x)
+
+
+def _periodic(values: Array) -> Callable:
+    """A periodic cubic through values (n,) at 0, 1/n, ..."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(np.linspace(0, 1, len(values) + 1), np.append(values, values[0]), bc_type="periodic")
+
+
+def _harmonics(phase: Array, wanted: Array, weight: Array) -> Callable[[Array], Array]:
+    """What both legs, half a cycle apart, want on average, by `weight`: the first two harmonics of a step."""
+
+    def waves(p: Array) -> Array:
+        return np.stack([np.ones_like(p), *(f(4 * np.pi * k * p) for k in (1, 2) for f in (np.cos, np.sin))], -1)
+
+    basis = waves(phase)
+    ridge = np.diag([0, 0, 0, 1, 1]) * 0.05 * weight.sum()
+    weights = np.linalg.solve(basis.T @ (weight[:, None] * basis) + ridge, basis.T @ (weight * wanted))
+    return lambda p: waves(np.asarray(p, float)) @ weights
