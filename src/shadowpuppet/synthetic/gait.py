@@ -23,6 +23,8 @@ WIDTH = {False: 0.055, True: 0.03}
 """Half the distance of the feet's tracks in leg lengths, walking and jogging."""
 SPEED = {False: 1.35, True: 2.6}
 """Comfortable speeds of an adult, m/s; others at equal Froude number."""
+RISES, SETTLES = 0.3, 0.22
+"""Phases of the leg at which the heel begins to rise, and at which the foot lies flat again."""
 
 
 class Prints(NamedTuple):
@@ -64,21 +66,25 @@ class Walk:
         """Phase of the left leg, length gone, and how fully the person goes (0 to 1), at every tick."""
         self.ticks = np.arange(-1.0, self.seconds + 1.0 + TICK, TICK)
         period = self.cycle.stride / self.speed
-        ramp = min(1.3 * period, 0.45 * self.seconds)
-        self.fully = smooth(self.ticks / ramp) * smooth((self.seconds - self.ticks) / ramp)
+        stops = self.seconds - 0.8 * period  # the feet come beside each other after it
+        ramp = min(1.3 * period, 0.45 * stops)
+        starts = smooth(self.ticks / ramp)
+        self.fully = starts * smooth((self.seconds - self.ticks) / (ramp + 0.5 * period))
         cadence = (1 + 0.012 * band_noise(self.ticks, 0.4, rng)) / period
         self.phase = 0.5 + np.cumsum(cadence * TICK) - np.sum(cadence[self.ticks < 0] * TICK)
         slow = 1 / (1 + 0.2 * self.path.bend**2 * (self.cycle.leg / 0.86) ** 2)
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
-        pace = self.speed * self.fully * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
+        pace = self.speed * starts * smooth((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
         self.gone = np.interp(np.cumsum(pace) * TICK, due, self.path.samples)
 
     def _prints(self, side: int, rng: np.random.Generator) -> Prints:
         phase = self.phase - 0.5 * side
         strides = np.arange(np.floor(phase[0]) - 1, np.ceil(phase[-1]) + 2)
-        when = strides + self.cycle.middle
-        along = np.interp(when, phase, self.gone)
-        goes = np.interp(when, phase, self.fully, 0, 0) > 0.02
+        along = np.interp(strides + self.cycle.middle, phase, self.gone)
+        first, last = np.interp([0.0, self.seconds], self.ticks, phase)
+        before, after = strides - 1 + RISES < first, strides >= np.floor(last - SETTLES)
+        along = np.where(before, 0.0, np.where(after, self.gone[-1], along))
+        goes = ~(before | after)
         sign = 1 - 2 * side
         width = np.where(goes, WIDTH[self.jogging], 0.13) * self.cycle.leg * sign
         jitter = 0.012 * np.clip(rng.standard_normal((2, len(strides))), -2, 2) * np.where(goes, self.cycle.leg, 0)

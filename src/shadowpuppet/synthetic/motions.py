@@ -257,22 +257,44 @@ def compose(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Gene
     Key postures are joined by shape-preserving cubics and rounded over 0.1 s; the first stands `LEAD` seconds, and the arms are
     lowered `TAIL` seconds after the last. still: factor on the involuntary part (0: a robot).
     """
-    from scipy.interpolate import PchipInterpolator
+    return settled(through(keys_of(gestures, rng), t) + still * involuntary(t, rng))
 
+
+def keys_of(gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> Keys:
+    """Key postures of gestures `(name, seconds)` one after another, standing before and after."""
     begin, keys = LEAD, [(0.0, {}), (0.5 * LEAD, {})]
     for name, seconds in gestures:
         keys += [(begin + when, posture) for when, posture in MOTIONS[name](seconds, rng)]
         begin += seconds
-    keys += [(begin + TAIL, {}), (begin + TAIL + 1, {})]
-    table = np.zeros((len(keys), len(CHANNELS)))
+    return [*keys, (begin + TAIL, {}), (begin + TAIL + 1, {})]
+
+
+def through(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
+    """Values (T, names) at times `t` (s) on the way through `keys`; what a key does not name stands, or is 0.
+
+    rounding: seconds before and after a time that are averaged.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    table = np.zeros((len(keys), len(names)))
     for row, (_, posture) in zip(table, keys):
         for name, value in (STANDING | posture).items():
-            row[CHANNELS.index(name)] = value
+            if name in names:
+                row[names.index(name)] = value
     path = PchipInterpolator([when for when, _ in keys], table)
+    return rounded(lambda when: path(np.clip(when, 0, None)), t, rounding)
+
+
+def rounded(values: Callable[[Array], Array], t: Array, rounding: float) -> Array:
+    """`values` about times `t` (T,), s, averaged over `rounding` seconds before and after."""
     window = np.linspace(-1, 1, 9)
     weight = np.exp(-2 * window**2) / np.exp(-2 * window**2).sum()
-    smooth = sum(w * path(np.clip(t + 0.16 * x, 0, None)) for w, x in zip(weight, window))
-    postures = smooth + still * involuntary(t, rng)
+    return sum(w * values(t + rounding * x) for w, x in zip(weight, window))
+
+
+def settled(postures: Array) -> Array:
+    """Postures (T, `CHANNELS`) with elbows and fingers kept from bending backward."""
+    postures = postures.copy()
     for side in ("left", "right"):
         for name, (low, high) in {"curl": (0.0, 1.5), "elbow": (0.02, 2.5)}.items():
             column = CHANNELS.index(f"{side}_{name}")

@@ -13,7 +13,7 @@ from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions
 from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.kinematics import CHANNELS, Figure, pose
+from shadowpuppet.synthetic.kinematics import Figure, pose
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.parts import dressed
 from shadowpuppet.synthetic.renderer import Renderer
@@ -68,11 +68,10 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator, tell: C
 
 def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
     """Times (T,), seconds, and the figure of `spec` in its motion at those times."""
-    gestures = [(gesture.motion, gesture.seconds) for gesture in spec.motion]
-    times = np.arange(int(motions.duration(gestures) * spec.rate + 1e-6) + 1) / spec.rate
-    postures = motions.compose(gestures, times, rng, spec.still)
-    postures[:, CHANNELS.index("turn")] += np.radians(spec.turn_deg)
-    return times, pose(spec.body, postures)
+    from shadowpuppet.synthetic.performance import perform, seconds_of
+
+    times = np.arange(int(seconds_of(spec.motion) * spec.rate + 1e-6) + 1) / spec.rate
+    return times, perform(spec.body, spec.motion, times, rng, spec.still, np.radians(spec.turn_deg))
 
 
 class Studio:
