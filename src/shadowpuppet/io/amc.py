@@ -1,0 +1,209 @@
+"""AMC files (Acclaim): motion capture over an ASF skeleton (`asf.py`), as joints in metres.
+
+The files of the CMU graphics lab motion capture database are of this kind; other skeletons are read, too, but the names of their
+bones must be the same for joints of ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from shadowpuppet.errors import FormatError
+from shadowpuppet.geometry import Array
+from shadowpuppet.io._files import read_text
+from shadowpuppet.io._table import shorten
+from shadowpuppet.io.asf import Skeleton, euler, read_asf
+from shadowpuppet.motion import JointTable
+
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+"""From the file's world (y up, a person at rest faces z) to ours (z up, facing -y)."""
+
+ENDS = {
+    "neck": "thorax", "head": "upperneck", "crown": "head", "lumbar": "lowerback",
+    **{
+        f"{side}_{joint}": f"{side[0]}{bone}"
+        for side in ("left", "right")
+        for joint, bone in (("shoulder", "clavicle"), ("elbow", "humerus"), ("wrist", "wrist"), ("hand", "hand"), ("thumb", "thumb"),
+                            ("hip", "hipjoint"), ("knee", "femur"), ("ankle", "tibia"), ("ball", "foot"), ("toes", "toes"))
+    },
+}  # fmt: skip
+"""Joints, ours and some more that tell how segments are turned, and the bone at whose far end each lies. `pelvis` lies between the
+hips, `face` before the crown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """Motion of a skeleton."""
+
+    skeleton: Skeleton
+    root: Array
+    """Place of the root, of shape (T, 3), metres, the file's world."""
+    turn: Array
+    """Its rotation, of shape (T, 3, 3)."""
+    angles: Array
+    """Angles of every bone about x, y and z of its axis, of shape (T, B, 3), rad; 0 where it cannot turn."""
+
+    @cached_property
+    def rotations(self) -> Array:
+        """Bones' rotations against the pose of zero angles, of shape (T, B, 3, 3), the file's world."""
+        found = np.empty((len(self.root), len(self.skeleton.bones), 3, 3))
+        for n, bone in enumerate(self.skeleton.bones):
+            above = self.turn if bone.parent < 0 else found[:, bone.parent]
+            own = bone.axis @ euler(bone.order, self.angles[:, n]) @ bone.axis.T if bone.dofs else np.eye(3)
+            found[:, n] = above @ own
+        return found
+
+    @cached_property
+    def ends(self) -> Array:
+        """Bones' far ends, of shape (T, B, 3), metres, the file's world."""
+        found = np.empty((len(self.root), len(self.skeleton.bones), 3))
+        for n, bone in enumerate(self.skeleton.bones):
+            start = self.root if bone.parent < 0 else found[:, bone.parent]
+            found[:, n] = start + self.rotations[:, n] @ (bone.direction * bone.length)
+        return found
+
+    def joints(self, rate: float = 120.0) -> JointTable:
+        """Joints of `ENDS`, `pelvis` and `face` at `rate` frames a second, from 0 s; metres, z up.
+
+        Raises `FormatError` where the skeleton has no bone of a name that is needed.
+        """
+        places = {name: self.ends[:, self.skeleton.index(bone)] for name, bone in ENDS.items()}
+        places["pelvis"] = (places["left_hip"] + places["right_hip"]) / 2
+        places["face"] = places["crown"] + self.rotations[:, self.skeleton.index("head")] @ np.array([0, 0, 0.15])
+        positions = np.stack(list(places.values()), 1) @ Z_UP.T
+        return JointTable(np.arange(len(positions)) / rate, tuple(places), positions)
+
+    @property
+    def at_rest(self) -> Capture:
+        """One frame with all angles zero."""
+        zero = np.zeros((1, len(self.skeleton.bones), 3))
+        return Capture(self.skeleton, np.zeros((1, 3)), np.eye(3)[None], zero)
+
+
+def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
+    """The motion in an AMC file. Raises `FormatError`, naming the line, where it is malformed or not of this skeleton."""
+    path = Path(path)
+    lines = read_text(path).splitlines()
+    first, degrees = _header(path, lines, skeleton)
+    names, counts = _layout(path, lines, first, skeleton)
+    values = _fast(lines[first:], names, counts)
+    if values is None:
+        values = _careful(path, lines, first, names, counts)
+    angle = np.pi / 180 if degrees else 1.0
+    frames, angles = values[:, 1:], np.zeros((len(values), len(skeleton.bones), 3))
+    if (np.diff(values[:, 0]) <= 0).any():
+        bad = values[int((np.diff(values[:, 0]) <= 0).argmax()) + 1, 0]
+        raise FormatError(f"{path}: frame {bad:g} comes after one with a number that is not smaller, expected increasing numbers")
+    at, root = 0, np.zeros((len(values), 6))
+    for name, count in zip(names, counts):
+        part = frames[:, at : at + count]
+        at += count
+        if name == "root":
+            root[:, ["txtytzrxryrz".index(dof) // 2 for dof in skeleton.root_dofs]] = part
+        elif count:
+            place = skeleton.index(name)
+            angles[:, place, ["xyz".index(dof[1]) for dof in skeleton.bones[place].dofs]] = angle * part
+    return Capture(skeleton, root[:, :3] * skeleton.unit, euler(skeleton.root_order, angle * root[:, 3:]), angles)
+
+
+def read_mocap(path: str | Path, skeleton: str | Path | None = None) -> Capture:
+    """The motion in an AMC file over the skeleton in `skeleton`, an ASF file, or in the one found beside it.
+
+    Beside `02_10.amc` those are `02_10.asf`, `02.asf`, or the only .asf file there is. Raises `FormatError`.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".amc":
+        raise FormatError(f"{path}: found the ending {path.suffix!r}, expected .amc")
+    return read_amc(path, read_asf(skeleton or _beside(path)))
+
+
+def _beside(path: Path) -> Path:
+    there = sorted(p for p in path.parent.glob("*") if p.suffix.lower() == ".asf")
+    for stem in (path.stem, path.stem.split("_")[0]):
+        for other in there:
+            if other.stem == stem:
+                return other
+    if len(there) == 1:
+        return there[0]
+    raise FormatError(f"{path}: found {len(there)} .asf files beside it, expected {path.stem}.asf or {path.stem.split('_')[0]}.asf")
+
+
+def _header(path: Path, lines: list[str], skeleton: Skeleton) -> tuple[int, bool]:
+    """Index of the first frame's line, and whether angles are degrees."""
+    degrees = skeleton.degrees
+    for n, line in enumerate(lines):
+        word = line.split("#")[0].strip()
+        if word.isdigit():
+            return n, degrees
+        if word.upper() in (":DEGREES", ":RADIANS"):
+            degrees = word.upper() == ":DEGREES"
+        elif word and not word.startswith(":"):
+            raise FormatError(f"{path}: line {n + 1}: found {shorten([word])!r}, expected a frame's number")
+    raise FormatError(f"{path}: found no frames, expected lines with a number before each")
+
+
+def _layout(path: Path, lines: list[str], first: int, skeleton: Skeleton) -> tuple[list[str], list[int]]:
+    """Names of the first frame's lines, and how many values each must have."""
+    wanted = {"root": 6} | {bone.name: len(bone.dofs) for bone in skeleton.bones}
+    names: list[str] = []
+    for n, line in enumerate(lines[first + 1 :], first + 2):
+        words = line.split()
+        if not words:
+            continue
+        if words[0].isdigit():
+            break
+        if words[0] not in wanted or words[0] in names:
+            what = "is there twice in the frame" if words[0] in names else f"is no bone of {skeleton.path.name}"
+            raise FormatError(f"{path}: line {n}: {shorten(words[:1])!r} {what}, expected each bone that moves once")
+        names.append(words[0])
+    missing = [name for name, count in wanted.items() if count and name not in names]
+    if missing:
+        raise FormatError(f"{path}: line {first + 1}: the frame has no {missing[0]!r}, expected every bone that moves")
+    return names, [wanted[name] for name in names]
+
+
+def _fast(lines: list[str], names: list[str], counts: list[int]) -> Array | None:
+    """Frame numbers and values (T, 1 + n) of a well-formed file; None where anything is odd."""
+    words = " ".join(lines).split()
+    width = 1 + len(names) + sum(counts)
+    if len(words) % width:
+        return None
+    table = np.array(words).reshape(-1, width)
+    at = 1 + np.cumsum([0, *(count + 1 for count in counts[:-1])])
+    if not (table[:, at] == names).all():
+        return None
+    try:
+        values = np.delete(table, at, 1).astype(float)
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False
+
+
+
+def _careful(path: Path, lines: list[str], first: int, names: list[str], counts: list[int]) -> NoReturn:
+    """Find the line that is malformed, and raise `FormatError` with it."""
+    due = [("", 0), *zip(names, counts)]
+    place = 0
+    for n, line in enumerate(lines[first:], first + 1):
+        words = line.split()
+        if not words:
+            continue
+        name, count = due[place]
+        expected = f"{name} and {count} number{'s' if count != 1 else ''}" if name else "a frame's number"
+        right = words[0] == name if name else words[0].isdigit()
+        if not right or len(words) != count + 1 or not all(_is_number(word) for word in words[1:]):
+            raise FormatError(f"{path}: line {n}: found {shorten(words)!r}, expected {expected}")
+        place = (place + 1) % len(due)
+    raise FormatError(f"{path}: line {len(lines)}: the file ends within a frame, expected {due[place][0]}")

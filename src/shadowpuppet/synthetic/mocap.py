@@ -1,0 +1,230 @@
+"""Motion capture on the mannequin: each segment points where the measured one points, on the mannequin's own lengths.
+
+Limbs take directions from the measured joints, so the swing of a segment is exact; how it is turned about itself comes from the
+planes of elbow and knee, and from thumbs and toes. Trunk, head and feet take over how far they are turned from the capture's
+posture at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shadowpuppet.errors import SettingsError
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion import JointTable
+from shadowpuppet.synthetic.kinematics import SIDES, Figure, assembled, turns
+from shadowpuppet.synthetic.mannequin import Mannequin
+
+if TYPE_CHECKING:
+    from shadowpuppet.io.amc import Capture
+    from shadowpuppet.synthetic.spec import Gesture
+
+Points = dict[str, Array]
+
+
+def play(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
+    """The figure of `body` at times `t` (T,), s, moving as in the one file of `gestures`; at first it faces -Y turned by `turn`.
+
+    The middle of the area it covers lies at the origin. Raises `FormatError` where a file cannot be used.
+    """
+    gesture, capture = _one(gestures)
+    table = capture.joints(gesture.file_rate)
+    shown = _at(table, t + gesture.start)
+    figure = retarget(body, shown, capture.at_rest.joints())
+    pelvis = figure.rotation[:, 0]
+    heading = turn - float(np.arctan2(-pelvis[0, 0, 1], pelvis[0, 1, 1]))
+    R = turns(*np.zeros((2, 1)), np.array([heading]))[0]
+    joints, origin = figure.joints @ R.T, figure.origin @ R.T
+    middle = np.append((joints[:, 0, :2].max(0) + joints[:, 0, :2].min(0)) / 2, 0.0)
+    return Figure(joints - middle, R @ figure.rotation, origin - middle, figure.curl)
+
+
+def seconds_of(gestures: Sequence[Gesture]) -> float:
+    """How long the file of `gestures` plays."""
+    gesture, capture = _one(gestures)
+    there = (len(capture.root) - 1) / gesture.file_rate - gesture.start
+    if there <= 0:
+        raise SettingsError(f"start: found {gesture.start:g} s, but {gesture.file} has only {there + gesture.start:.2f} s")
+    return min(gesture.seconds, there)
+
+
+def _one(gestures: Sequence[Gesture]) -> tuple[Gesture, Capture]:
+    from shadowpuppet.io.amc import read_mocap
+
+    if len(gestures) != 1 or gestures[0].file is None:
+        raise SettingsError(f"motion: found mocap among {len(gestures)} motions, expected it alone")
+    return gestures[0], read_mocap(gestures[0].file)
+
+
+def _at(table: JointTable, t: Array) -> JointTable:
+    """The table at other times, by cubics."""
+    from scipy.interpolate import CubicSpline
+
+    t = np.clip(t, table.times[0], table.times[-1])
+    if len(table.times) < 3:
+        return JointTable(np.arange(len(t)) + 0.0, table.names, np.repeat(table.positions[:1], len(t), 0))
+    return JointTable(np.arange(len(t)) + 0.0, table.names, CubicSpline(table.times, table.positions)(t))
+
+
+def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
+    """`body` in the postures of `table`, one a row; `rest` has one row: the same skeleton upright, arms level, facing -Y.
+
+    Both have the joints of `io.amc.ENDS`, `pelvis` and `face`. Where the body stands follows the measured pelvis in proportion to
+    the legs; its soles are brought to the floor where they are lowest.
+    """
+    p: Points = dict(zip(table.names, table.positions.swapaxes(0, 1)))
+    calm: Points = dict(zip(rest.names, rest.positions.swapaxes(0, 1)))
+    bones = body.rest()
+    joint: Points = {}
+    frame: dict[str, tuple[Array, Array]] = {}
+    legs = _length(calm, "hip", "knee") + _length(calm, "knee", "ankle")
+    joint["pelvis"] = p["pelvis"] * (body.length("thigh") + body.length("shank")) / legs
+    trunk = {name: _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for name, axes in TRUNK.items()}
+    pelvis, thorax, head = trunk["pelvis"], trunk["thorax"], trunk["head"]
+    abdomen, neck = _between(pelvis, thorax), _between(thorax, head)
+    lumbar = joint["pelvis"] + pelvis @ (bones["lumbar"] - bones["pelvis"])
+    thoracic = lumbar + abdomen @ (bones["thoracic"] - bones["lumbar"])
+    joint["neck"] = thoracic + thorax @ (bones["neck"] - bones["thoracic"])
+    joint["head"] = joint["neck"] + neck @ (bones["head"] - bones["neck"])
+    frame |= {"pelvis": (pelvis, joint["pelvis"]), "abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
+    frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
+    for side in SIDES:
+        _arm(bones, p, calm, side, thorax, thoracic, joint, frame)
+        _leg(body, bones, p, calm, side, pelvis, joint, frame)
+    return _on_the_floor(body, assembled(joint, frame, np.full((len(table.times), 2), 0.35)))
+
+
+TRUNK = {
+    "pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"),
+    "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
+    "head": ("head", "crown", "crown", "face"),
+}
+"""How a segment of the trunk is turned: up from the first joint to the second; from the third to the fourth, left or ahead."""
+
+
+def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
+    """Frames (T, 3, 3) whose z points from joint to joint, and whose x, or any fixed direction, is as near as can be to another."""
+    z = _unit(p[high] - p[low])
+    x = p[end] - p[start]
+    x = _unit(x - (x * z).sum(1, keepdims=True) * z)
+    return np.stack([x, np.cross(z, x), z], -1)
+
+
+def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thoracic: Array, joint: Points, frame: dict) -> None:
+    """Clavicle, upper arm, forearm, hand."""
+    sign = 1.0 if side == "left" else -1.0
+    along = np.array([sign, 0, 0])
+    now = _unit(np.einsum("tji,tj->ti", thorax, p[f"{side}_shoulder"] - p["neck"]))
+    clavicle = thorax @ _swing(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now)
+    upper, fore = (_unit(p[f"{side}_{b}"] - p[f"{side}_{a}"]) for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
+    hinge = _steady(-sign * np.cross(upper, fore), thorax @ (along + [0, 0, 0.3]))
+    upper_arm, bare = (_along_x(sign * axis, hinge) for axis in (upper, fore))
+    hand_axis = _unit(p[f"{side}_hand"] - p[f"{side}_wrist"])
+    thumb = p[f"{side}_thumb"] - p[f"{side}_wrist"]
+    hand = _along_x(sign * hand_axis, np.cross(sign * hand_axis, -thumb))
+    forearm = _between(bare, _swing(hand[..., 0], bare[..., 0]) @ hand)  # turned about itself by half of what the hand is
+    at = {name: bones[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
+    sternum = thoracic + thorax @ (at["clavicle"] - bones["thoracic"])
+    shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
+    elbow = shoulder + upper_arm @ (at["elbow"] - at["shoulder"])
+    wrist = elbow + bare @ (at["wrist"] - at["elbow"])
+    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist}
+    joint[f"{side}_hand"] = wrist + hand @ (at["hand"] - at["wrist"])
+    frame |= {
+        f"{side}_clavicle": (clavicle, sternum),
+        f"{side}_upper_arm": (upper_arm, shoulder),
+        f"{side}_forearm": (forearm, elbow),
+        f"{side}_hand": (hand, wrist),
+    }
+
+
+def _leg(
+    body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict
+) -> None:
+    """Thigh, shank, foot, toes."""
+    hip, knee, ankle = (p[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))
+    ahead = _steady(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
+    thigh, shank = (_along_z(_unit(a - b), -ahead) for a, b in ((hip, knee), (knee, ankle)))
+    axes = (f"{side}_ankle", f"{side}_ball", f"{side}_ankle", f"{side}_knee")
+    foot = _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2)
+    bend = _bend(p, side) - _bend(calm, side)
+    joint[f"{side}_hip"] = joint["pelvis"] + pelvis @ (bones[f"{side}_hip"] - bones["pelvis"])
+    joint[f"{side}_knee"] = joint[f"{side}_hip"] - thigh @ np.array([0, 0, body.length("thigh")])
+    joint[f"{side}_ankle"] = joint[f"{side}_knee"] - shank @ np.array([0, 0, body.length("shank")])
+    at = joint[f"{side}_ankle"]
+    frame |= {
+        f"{side}_thigh": (thigh, joint[f"{side}_hip"]),
+        f"{side}_shank": (shank, joint[f"{side}_knee"]),
+        f"{side}_foot": (foot, at),
+        f"{side}_toes": (foot @ turns(-bend, 0 * bend, 0 * bend), at + foot @ body.ball()),
+    }
+
+
+def _bend(p: Points, side: str) -> Array:
+    """How far the toes are bent up against the foot, rad, of shape (T,)."""
+    foot, toes = _unit(p[f"{side}_ball"] - p[f"{side}_ankle"]), _unit(p[f"{side}_toes"] - p[f"{side}_ball"])
+    across = np.cross(foot, _unit(p[f"{side}_knee"] - p[f"{side}_ankle"]))
+    return np.arctan2((np.cross(foot, toes) * _unit(across)).sum(1), (foot * toes).sum(1))
+
+
+def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
+    """Raised or lowered as a whole so that the lowest ankle or ball is as high as in standing, save for the lowest 2 %."""
+    from shadowpuppet.synthetic.kinematics import SEGMENTS
+
+    lowest = []
+    for side in SIDES:
+        ball = figure.origin[:, SEGMENTS.index(f"{side}_toes"), 2] - (body.ball()[2] + body.length("ankle"))
+        lowest += [ball, figure.origin[:, SEGMENTS.index(f"{side}_foot"), 2] - body.length("ankle")]
+    shift = np.array([0, 0, -float(np.percentile(np.min(lowest, 0), 2))])
+    return Figure(figure.joints + shift, figure.rotation, figure.origin + shift, figure.curl)
+
+
+def _steady(plane: Array, usual: Array) -> Array:
+    """Normals of planes (T, 3), long where they are sure; where they are short the neighbours and at last `usual` decide."""
+    from scipy.ndimage import gaussian_filter1d
+
+    size = np.linalg.norm(plane, axis=1).max(initial=1e-9)
+    near = gaussian_filter1d(plane, 4.0, axis=0, mode="nearest") if len(plane) > 1 else plane
+    return plane + 0.5 * near + 0.05 * size * usual
+
+
+def _along_x(x: Array, z: Array) -> Array:
+    """Frames (T, 3, 3) with x along unit vectors `x` and z as near to `z` as can be."""
+    z = _unit(z - (z * x).sum(1, keepdims=True) * x)
+    return np.stack([x, np.cross(z, x), z], -1)
+
+
+def _along_z(z: Array, y: Array) -> Array:
+    """Frames (T, 3, 3) with z along unit vectors `z` and y as near to `y` as can be."""
+    y = _unit(y - (y * z).sum(1, keepdims=True) * z)
+    return np.stack([np.cross(y, z), y, z], -1)
+
+
+def _swing(start: Array, end: Array) -> Array:
+    """The shortest rotations (T, 3, 3) from unit vectors `start` to `end`, (T or 1, 3)."""
+    start, end = np.broadcast_arrays(start, end)
+    axis, cosine = np.cross(start, end), (start * end).sum(1)
+    K = np.zeros((len(axis), 3, 3))
+    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
+    K -= K.swapaxes(1, 2)
+    return np.eye(3) + K + K @ K / np.maximum(1 + cosine, 1e-6)[:, None, None]
+
+
+def _between(a: Array, b: Array) -> Array:
+    """Rotations (T, 3, 3) halfway from `a` to `b`."""
+    from scipy.spatial.transform import Rotation
+
+    half = Rotation.from_matrix(a.swapaxes(1, 2) @ b).as_rotvec() / 2
+    return a @ Rotation.from_rotvec(half).as_matrix()
+
+
+def _length(p: Points, a: str, b: str) -> float:
+    """Mean distance of two joints of both sides."""
+    return float(np.mean([np.linalg.norm(p[f"{side}_{a}"] - p[f"{side}_{b}"]) for side in SIDES]))
+
+
+def _unit(v: Array) -> Array:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
