@@ -132,15 +132,25 @@ def leg(body: Mannequin, clothes: Clothes) -> list[Loft]:
         (1, ankle, 1.1 * ankle),
     ]
     parts.append(Loft("left_shank", np.zeros(3), DOWN, stations_of(rows, lower) + cloth, (0.05, 0.02), 0.03, **trousers))
+    return [*parts, *_foot(body)]
+
+
+def _foot(body: Mannequin) -> list[Loft]:
+    """The left shoe; it bends at the ball."""
     long, broad = body.measure("foot_length"), body.measure("foot_breadth") / 2
-    rows = [
+    rows: Rows = [
         (0, 0.62 * broad, 0.036, 0, -0.030),
         (0.3, 0.72 * broad, 0.045, 0, -0.022),
         (0.7, broad, 0.026, 0, -0.002),
         (0.93, 0.70 * broad, 0.018, 0, 0.006),
     ]
+    whole = _sleeved(stations_of(rows, long), 0.0, 0.0)
     heel = np.array([0, 0.20 * long, 0.030 - body.length("ankle")])
+    bend = int(np.searchsorted(whole[:, 0], 0.20 * long - body.ball()[1]))
+    toes = whole[bend - 1 :] - [whole[bend - 1, 0], 0, 0, 0, 0]
+    tip = heel - [0, whole[bend - 1, 0], 0] - body.ball()
+    shoe: dict[str, Any] = {"materials": ("shoes", "shoes"), "group": "left_leg"}
     return [
-        *parts,
-        Loft("left_foot", heel, FORWARD, stations_of(rows, long), (0.03, 0.02), 0.03, ("shoes", "shoes"), group="left_leg"),
+        Loft("left_foot", heel, FORWARD, whole[: bend + 1], (0.03, 0.012), 0.03, **shoe),
+        Loft("left_toes", tip, FORWARD, toes, (0.012, 0.02), 0.008, **shoe),
     ]
