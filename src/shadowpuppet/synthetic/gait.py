@@ -161,7 +161,7 @@ class Walk:
         bend = 0.5 - 0.5 * np.cos(2 * np.pi * (phase - 0.1))
         if self.jogging:
             amplitude = 26 * self.arms * np.clip(self.speed / 2.6, 0.7, 1.4)
-            degrees = {"front": -14 + amplitude * swing, "elbow": 80 + 24 * bend, "side": 13 - 2 * swing, "roll": -22 - 14 * bend,
+            degrees = {"front": -14 + amplitude * swing, "elbow": 80 + 24 * bend, "side": 15 - 2 * swing, "roll": -10 - 8 * bend,
                        "supination": 25, "curl": 45, "wrist_flex": 5}  # fmt: skip
         else:
             amplitude = 15 * self.arms * np.clip(self.speed / 1.3, 0.3, 1.6)

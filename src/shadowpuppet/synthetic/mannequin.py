@@ -6,13 +6,17 @@ Nothing here is shared with the bodies that trackers fit: joints, lengths and sh
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
+
+Kind = Literal["woman", "man", "child"]
 
 JOINTS = (
     "pelvis",
@@ -67,6 +71,20 @@ HAND_POINT = 0.18
 """Where `*_hand` lies, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
 recordings (0.019 of stature beyond the wrist). The knuckles lie at 0.46."""
 
+BODY_MASS = (25.6, 27.8)
+"""Mean body mass index (kg/m2) of the same women and men."""
+HEAD_MASS = 5.0
+"""Mass of an adult's head, kg."""
+
+GROWTH = {
+    "age": (4, 6, 8, 10, 12, 14),
+    "stature": (1.02, 1.15, 1.275, 1.385, 1.505, 1.62),
+    "body_mass": (15.5, 15.3, 15.9, 16.7, 17.9, 19.2),
+    "legs": (0.906, 0.933, 0.952, 0.973, 0.99, 1.0),
+}
+"""Children by years, means of girls and boys: stature (m) and body mass index (kg/m2), medians of the CDC charts (Kuczmarski et al.
+2000); legs' share of stature against adults', from sitting heights (Fredriks et al. 2005)."""
+
 Factor = Annotated[float, Field(ge=0.7, le=1.4)]
 
 
@@ -88,19 +106,36 @@ class Mannequin:
     """Factor on upper arm, forearm and hand."""
     head_size: Annotated[float, Field(ge=0.85, le=1.15)] = 1.0
     """Factor on the head."""
+    leg_length: Annotated[float, Field(ge=0.88, le=1.08)] = 1.0
+    """Factor on thigh and shank; the trunk makes up for it."""
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, kind: Literal["woman", "man", "child"] | None = None) -> Mannequin:
-        """A plausible person; `kind` is drawn too where it is not given (children, 6 to 12 years, every sixth).
+    def draw(
+        cls,
+        rng: np.random.Generator,
+        kind: Kind | None = None,
+        *,
+        stature: float | None = None,
+        bmi: float | None = None,
+        age: float | None = None,
+    ) -> Mannequin:
+        """A plausible person; `kind` is drawn too where it is not given (children every sixth).
 
-        Standard deviations follow ANSUR II: stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %; children's
-        statures and slighter girths follow Snyder et al. (1977).
+        stature: metres; bmi: body mass index, kg/m2, told by girths; age: years, 4 to 14, of a child. What is not given is drawn: standard
+        deviations follow ANSUR II (stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %), children are 6 to 12 years old
+        (Snyder et al. 1977). A child whose age or stature is given has a child's legs and girths (`GROWTH`).
+        Raises `SettingsError` where there is no such person.
         """
         kind = kind or ("woman", "man", "child")[rng.choice(3, p=[5 / 12, 5 / 12, 1 / 6])]
-        stature, spread, build = {"woman": (1.629, 0.064, 0.0), "man": (1.756, 0.069, 1.0), "child": (1.34, 0.11, 0.5)}[kind]
+        mean, spread, build = {"woman": (1.629, 0.064, 0.0), "man": (1.756, 0.069, 1.0), "child": (1.34, 0.11, 0.5)}[kind]
         z = np.clip(rng.standard_normal(7), -2, 2)
-        return cls(
-            stature=float(stature + spread * z[0]),
+        known = kind == "child" and (age is not None or stature is not None)
+        if age is not None:
+            if kind != "child" or not 4 <= age <= 14:
+                raise SettingsError(f"age: found {age:g} for a {kind}, expected 4 to 14 for a child")
+            mean, spread = float(np.interp(age, GROWTH["age"], GROWTH["stature"])), 0.05
+        person = cls(
+            stature=_within("stature", mean + spread * z[0] if stature is None else stature, 0.9, 2.2),
             build=float(np.clip(build + 0.15 * z[1], 0, 1)),
             girth=float((0.9 if kind == "child" else 1.0) * (1 + 0.08 * z[2])),
             shoulder_width=float(1 + 0.045 * z[3]),
@@ -108,6 +143,23 @@ class Mannequin:
             arm_length=float(1 + 0.025 * z[5]),
             head_size=float(1 + 0.02 * z[6]),
         )
+        if known:
+            age = float(np.interp(person.stature, GROWTH["stature"], GROWTH["age"])) if age is None else age
+            person = replace(person, leg_length=float(np.interp(age, GROWTH["age"], GROWTH["legs"])))
+            usual = float(np.interp(age, GROWTH["age"], GROWTH["body_mass"])) * (1 + 0.08 * float(z[2])) ** 2
+            bmi = usual if bmi is None else bmi
+        return person if bmi is None else replace(person, girth=person.girth_of(bmi))
+
+    def girth_of(self, bmi: float) -> float:
+        """The factor on girths that makes up a body mass index (kg/m2). Raises `SettingsError` beyond the possible factors.
+
+        Mass goes as stature and the square of girths, but for the head, whose mass goes as the stature alone.
+        """
+        mean, stature = (float(np.interp(self.build, (0, 1), pair)) for pair in (BODY_MASS, STATURE))
+        scale = self.stature / stature
+        head, usual = HEAD_MASS * scale, (mean * stature**2 - HEAD_MASS) * scale**3
+        low, high = ((head + usual * factor**2) / self.stature**2 for factor in (0.7, 1.4))
+        return float(np.clip(np.sqrt((_within("bmi", bmi, low, high) * self.stature**2 - head) / usual), 0.7, 1.4))
 
     def measure(self, name: str) -> float:
         """A breadth, depth or girth of `MEASURES` (m) for this person; heads follow the cube root of stature."""
@@ -123,7 +175,8 @@ class Mannequin:
 
     def length(self, name: str) -> float:
         """A segment's length of `FRACTIONS`, metres."""
-        factor = self.arm_length if name in ("upper_arm", "forearm", "hand") else 1.0
+        own = {"thigh": self.leg_length, "shank": self.leg_length, "ankle": 1.0}
+        factor = own.get(name, self.arm_length)
         return float(np.interp(self.build, (0, 1), FRACTIONS[name]) * self.stature * factor)
 
     def ball(self) -> Array:
@@ -159,3 +212,10 @@ class Mannequin:
         for side, sign in (("left", 1), ("right", -1)):
             rest |= {f"{side}_{name}": np.array(p, float) * (sign, 1, 1) for name, p in points.items() if name not in centre}
         return rest
+
+
+def _within(name: str, value: float, low: float, high: float) -> float:
+    """The value. Raises `SettingsError` where it is not between `low` and `high`."""
+    if not low <= value <= high:
+        raise SettingsError(f"{name}: found {value:g}, expected {low:.3g} to {high:.3g}")
+    return float(value)
