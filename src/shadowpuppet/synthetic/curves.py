@@ -6,6 +6,7 @@ the cycle; between them runs a periodic cubic.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -53,7 +54,7 @@ def curve(values: tuple[float, ...], phase: Array) -> Array:
 
 
 @cache
-def _spline(values: tuple[float, ...]):  # noqa: ANN202  (SciPy's spline)
+def _spline(values: tuple[float, ...]) -> Callable[[Array], Array]:
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(np.linspace(0, 1, len(values) + 1), [*values, values[0]], bc_type="periodic")

@@ -40,7 +40,8 @@ class Sole(NamedTuple):
     @classmethod
     def of(cls, body: Mannequin) -> Sole:
         """Of a body."""
-        return cls(*(share * body.measure("foot_length") for share in (0.14, 0.48, 0.72)), body.length("ankle"))
+        long = body.measure("foot_length")
+        return cls(0.14 * long, 0.48 * long, 0.72 * long, body.length("ankle"))
 
     def rolled(self, pitch: Array) -> tuple[Array, Array]:
         """The ankle of a foot that stands with `pitch` (rad, toes up), forward and up from the point below it when flat.
@@ -207,8 +208,7 @@ class Cycle:
         part = (phase - self.gait.carries) / (1 - self.gait.carries)
         clear = CLEARANCE * self.leg * 16 * (part * (1 - part)) ** 2
         progress, lift = forward - _ends(phase, forward, (0, 1)), np.hypot(np.maximum(up - _ends(phase, up), 0), clear)
-        still = [(1, 0.0), (1, 0.0)]
-        return CubicSpline(phase, progress, bc_type=still), CubicSpline(phase, lift, bc_type=still)
+        return CubicSpline(phase, progress, bc_type="clamped"), CubicSpline(phase, lift, bc_type="clamped")
 
 
 def smooth(x: Array) -> Array:

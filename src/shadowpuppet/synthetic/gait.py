@@ -54,7 +54,8 @@ class Walk:
     ) -> None:
         """speed: m/s, or None for a comfortable one; path, size: see `Path`."""
         hip = body.rest()["pelvis"][2]
-        speed = SPEED[jogging] * np.sqrt(hip / 0.93) * float(np.clip(1 + 0.04 * rng.standard_normal(), 0.9, 1.1)) if speed is None else speed
+        if speed is None:
+            speed = float(SPEED[jogging] * np.sqrt(hip / 0.93) * np.clip(1 + 0.04 * rng.standard_normal(), 0.9, 1.1))
         self.body, self.jogging, self.speed, self.seconds = body, jogging, speed, seconds
         self.cycle = Cycle(body, JOGGING if jogging else WALKING, speed, stride_of(speed, hip, jogging))
         self.path = Path(path, size, speed * seconds * 1.15)

@@ -108,7 +108,7 @@ def planted(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
     ankles = np.stack([yaw @ np.array([sign * half, 0, height]) for sign in (1, -1)], 1)
     feet = np.stack([yaw @ turns(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
     ahead = np.repeat((yaw @ np.array([0.0, -1.0, 0.0]))[:, None], 2, 1)
-    return Stance(sway + [0, 0, np.inf], ankles, feet, np.zeros((len(yaw), 2)), ahead)
+    return Stance(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
 
 
 def figure(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
@@ -205,11 +205,11 @@ def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: di
         ankle[:, 2] - hip[:, 2] + np.sqrt(np.maximum(span**2 - ((sway + hip - ankle)[:, :2] ** 2).sum(1), 0))
         for hip, ankle in zip(hips, ankles)
     ]
-    centre = sway + lesser(lesser(*heights, soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
+    centre = sway + lesser(lesser(heights[0], heights[1], soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
     for n, side in enumerate(SIDES):
         hip, ankle, ahead, foot = centre + hips[n], ankles[n], stance.ahead[:, n], stance.feet[:, n]
         knee, ahead = _bent(hip, ankle, ahead, thigh, shank)
-        toes = foot @ turns(-stance.toes[:, n], *np.zeros((2, 1)))
+        toes = foot @ turns(-stance.toes[:, n], np.zeros(1), np.zeros(1))
         joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
         frame |= {
             f"{side}_thigh": (_upright(hip - knee, ahead), hip),

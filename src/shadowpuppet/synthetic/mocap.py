@@ -65,8 +65,8 @@ def _at(table: JointTable, t: Array) -> JointTable:
 
     t = np.clip(t, table.times[0], table.times[-1])
     if len(table.times) < 3:
-        return JointTable(np.arange(len(t)) + 0.0, table.names, np.repeat(table.positions[:1], len(t), 0))
-    return JointTable(np.arange(len(t)) + 0.0, table.names, CubicSpline(table.times, table.positions)(t))
+        return JointTable(np.arange(len(t), dtype=float), table.names, np.repeat(table.positions[:1], len(t), 0))
+    return JointTable(np.arange(len(t), dtype=float), table.names, CubicSpline(table.times, table.positions)(t))
 
 
 def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
@@ -116,11 +116,10 @@ def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
 def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thoracic: Array, joint: Points, frame: dict) -> None:
     """Clavicle, upper arm, forearm, hand."""
     sign = 1.0 if side == "left" else -1.0
-    along = np.array([sign, 0, 0])
     now = _unit(np.einsum("tji,tj->ti", thorax, p[f"{side}_shoulder"] - p["neck"]))
     clavicle = thorax @ _swing(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now)
     upper, fore = (_unit(p[f"{side}_{b}"] - p[f"{side}_{a}"]) for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
-    hinge = _steady(-sign * np.cross(upper, fore), thorax @ (along + [0, 0, 0.3]))
+    hinge = _steady(-sign * np.cross(upper, fore), thorax @ np.array([sign, 0, 0.3]))
     upper_arm, bare = (_along_x(sign * axis, hinge) for axis in (upper, fore))
     hand_axis = _unit(p[f"{side}_hand"] - p[f"{side}_wrist"])
     thumb = p[f"{side}_thumb"] - p[f"{side}_wrist"]

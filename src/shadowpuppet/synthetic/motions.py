@@ -13,6 +13,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.kinematics import CHANNELS, pose
 from shadowpuppet.synthetic.mannequin import JOINTS, Mannequin
+from shadowpuppet.synthetic.restless import band_noise, involuntary, plain
 
 Posture = dict[str, float]
 Keys = list[tuple[float, Posture]]
@@ -157,7 +158,7 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
     own = np.cumsum(pace) * step
     table = np.zeros((len(t), len(CHANNELS)))
     for column, channel in enumerate(CHANNELS):
-        low, high = np.radians(LIMITS.get(_plain(channel), (0, 0)))
+        low, high = np.radians(LIMITS.get(plain(channel), (0, 0)))
         table[:, column] = low + (high - low) * (0.5 + 0.5 * np.tanh(0.9 * band_noise(own, 0.3, rng)))
     for side in ("left", "right"):
         swing = [CHANNELS.index(f"{side}_side"), CHANNELS.index(f"{side}_front")]
@@ -165,11 +166,6 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
         table[:, swing] *= np.minimum(1, np.radians(140) / np.maximum(size, 1e-6))[:, None]
     table = clear_of_trunk(table)
     return [(float(when), dict(zip(CHANNELS, map(float, row)))) for when, row in zip(t, table)]
-
-
-def _plain(channel: str) -> str:
-    """A channel's name without its side."""
-    return channel.removeprefix("left_").removeprefix("right_")
 
 
 def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
@@ -207,49 +203,6 @@ MOTIONS: dict[str, Callable[[float, np.random.Generator], Keys]] = {
     f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)
 }
 """All gestures by name."""
-
-RESTLESS = {
-    "sway_x": (0.006, 0.35),
-    "sway_y": (0.006, 0.35),
-    "spine_bow": (0.8, 0.4),
-    "spine_side": (0.8, 0.4),
-    "spine_twist": (1.0, 0.4),
-    "head_nod": (2.5, 0.4),
-    "head_tilt": (2.0, 0.4),
-    "head_turn": (4.0, 0.35),
-    "side": (1.2, 0.7),
-    "front": (1.2, 0.7),
-    "roll": (1.5, 0.7),
-    "elbow": (1.8, 0.7),
-    "supination": (4.0, 0.5),
-    "wrist_flex": (4.0, 0.6),
-    "wrist_side": (2.0, 0.6),
-    "shrug": (1.0, 0.3),
-    "protract": (1.5, 0.3),
-    "curl": (5.0, 0.4),
-}
-"""Size (degrees; sway in metres) and highest frequency (Hz) of involuntary motion by channel."""
-TREMOR = {"side": 0.25, "front": 0.25, "elbow": 0.35, "wrist_flex": 0.5, "head_nod": 0.15, "spine_side": 0.08}
-"""Size, degrees, of the faster part, up to 5 Hz."""
-
-
-def band_noise(t: Array, highest: float, rng: np.random.Generator, terms: int = 14) -> Array:
-    """Smooth noise of unit variance at times `t` (s) with frequencies up to `highest` (Hz): a random Fourier series."""
-    frequency, phase = rng.uniform(0.12, 1, terms) * highest, rng.uniform(0, 2 * np.pi, terms)
-    return np.sqrt(2 / terms) * np.cos(2 * np.pi * np.multiply.outer(t, frequency) + phase).sum(-1)
-
-
-def involuntary(t: Array, rng: np.random.Generator) -> Array:
-    """Sway, breathing, restlessness and tremor at times `t` (T,), of shape (T, `CHANNELS`)."""
-    total = np.zeros((len(t), len(CHANNELS)))
-    for column, channel in enumerate(CHANNELS):
-        name = _plain(channel)
-        size, highest = RESTLESS.get(name, (0.0, 1.0))
-        size = size if name.startswith("sway") else np.radians(size)
-        total[:, column] = size * band_noise(t, highest, rng) + np.radians(TREMOR.get(name, 0.0)) * band_noise(t, 5.0, rng)
-        total[:, column] += np.radians(0.4) * np.sin(2 * np.pi * 0.25 * t) if name in ("shrug", "spine_bow") else 0.0
-    return total
-
 
 def compose(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
     """Postures (T, `CHANNELS`) at times `t` (s) of gestures `(name, seconds)` one after another.
@@ -289,7 +242,7 @@ def rounded(values: Callable[[Array], Array], t: Array, rounding: float) -> Arra
     """`values` about times `t` (T,), s, averaged over `rounding` seconds before and after."""
     window = np.linspace(-1, 1, 9)
     weight = np.exp(-2 * window**2) / np.exp(-2 * window**2).sum()
-    return sum(w * values(t + rounding * x) for w, x in zip(weight, window))
+    return np.sum([w * values(t + rounding * x) for w, x in zip(weight, window)], 0)
 
 
 def settled(postures: Array) -> Array:

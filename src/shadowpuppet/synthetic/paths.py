@@ -52,7 +52,7 @@ def _line(s: Array, size: float) -> Array:
     lap = size + around
     sharp = np.floor(s / lap) * np.pi + np.clip((s % lap - size) / TURN, 0, np.pi)
     window = np.hanning(61)
-    return np.convolve(np.pad(sharp, 30, "edge"), window / window.sum(), "valid")
+    return np.convolve(np.pad(sharp, 30, "edge"), window / window.sum(), "valid").astype(float)
 
 
 def _ellipse(s: Array, size: float) -> Array:
