@@ -21,8 +21,6 @@ POINTS = 200
 """Phases at which a cycle is computed."""
 FLAT = np.radians(5.0)
 """Pitch of the foot, rad, below which it lies almost flat while it carries."""
-CLEARANCE = 0.02
-"""Least height of the ball of a swinging foot, in its middle, in leg lengths."""
 
 
 class Sole(NamedTuple):
@@ -59,6 +57,8 @@ class Gait(NamedTuple):
 
     carries: float
     """Share of the cycle that a foot stands."""
+    clears: float
+    """Least height of the ball of a swinging foot, in its middle, in leg lengths; it leaves and meets the floor at a slant."""
     bow: float
     """How far the pelvis is tilted forward against standing, degrees."""
     thigh: Callable[[Array], Array]
@@ -75,6 +75,7 @@ class Gait(NamedTuple):
 
 WALKING = Gait(
     0.62,
+    0.022,
     0.3,
     lambda p: curve(WALK["hip"], p) - curve(WALK["tilt"], p),
     lambda p: curve(WALK["knee"], p) + KNEE_ZERO,
@@ -84,6 +85,7 @@ WALKING = Gait(
 )
 JOGGING = Gait(
     0.38,
+    0.06,
     6.0,
     lambda p: curve(RUN["hip"], p) - 3.0,
     lambda p: curve(RUN["knee"], p),
@@ -206,9 +208,9 @@ class Cycle:
         forward = (base - self.lead) / self.stride
         up = self.height(phase) - drop - self.sole.rolled(pitch)[1]
         part = (phase - self.gait.carries) / (1 - self.gait.carries)
-        clear = CLEARANCE * self.leg * 16 * (part * (1 - part)) ** 2
+        clear = self.gait.clears * self.leg * 4 * part * (1 - part)
         progress, lift = forward - _ends(phase, forward, (0, 1)), np.hypot(np.maximum(up - _ends(phase, up), 0), clear)
-        return CubicSpline(phase, progress, bc_type="clamped"), CubicSpline(phase, lift, bc_type="clamped")
+        return CubicSpline(phase, progress, bc_type="clamped"), CubicSpline(phase, lift)
 
 
 def smooth(x: Array) -> Array:

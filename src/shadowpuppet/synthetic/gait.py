@@ -68,7 +68,7 @@ class Walk:
         self.ticks = np.arange(-1.0, self.seconds + 1.0 + TICK, TICK)
         period = self.cycle.stride / self.speed
         stops = self.seconds - 0.8 * period  # the feet come beside each other after it
-        ramp = min(1.3 * period, 0.45 * stops)
+        ramp = min(1.7 * period, 0.45 * stops)
         starts = smooth(self.ticks / ramp)
         self.fully = starts * smooth((self.seconds - self.ticks) / (ramp + 0.5 * period))
         cadence = (1 + 0.012 * band_noise(self.ticks, 0.4, rng)) / period

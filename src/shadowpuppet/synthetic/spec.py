@@ -32,7 +32,7 @@ class Gesture:
     seconds: Annotated[float, Field(ge=2, le=3600)] = 4.0
     """Its length; of a file no more than there is."""
     speed: Annotated[float, Field(ge=0.4, le=5)] | None = None
-    """Of walk (up to about 2.2) and jog (from about 1.6), m/s; without it a comfortable one."""
+    """Of walk (0.4 to 2.0) and jog (1.6 to 5), m/s; without it a comfortable one."""
     path: PathName = "circle"
     """Where walk and jog go: a circle or ellipse to the left, a line there and back, or on the spot as on a treadmill."""
     size: Annotated[float, Field(ge=0.5, le=20)] = 1.2
@@ -46,7 +46,7 @@ class Gesture:
 
     def __post_init__(self) -> None:
         """A speed must fit the gait, and motion capture needs a file."""
-        low, high = {"walk": (0.4, 2.2), "jog": (1.6, 5.0)}.get(self.motion, (0.0, 5.0))
+        low, high = {"walk": (0.4, 2.0), "jog": (1.6, 5.0)}.get(self.motion, (0.0, 5.0))
         if self.speed is not None and not low <= self.speed <= high:
             raise ValueError(f"speed: found {self.speed:g}, expected {low:g} to {high:g} for {self.motion}")
         if (self.motion == "mocap") != (self.file is not None):

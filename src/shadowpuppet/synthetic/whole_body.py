@@ -20,15 +20,15 @@ def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
     begin, end = 0.9, seconds - 0.9
     stand: Posture = GUARD | trunk(turn=-22, spine_twist=-8, pelvis_bow=4, spine_bow=8, head_turn=24, head_nod=4)
     stand |= {"drop": 0.045, "right_heel": np.radians(12), "ahead": 0.03}
-    steps = [Step(0, 0.15, 0.5, 0.15, 0.24, -0.12), Step(1, 0.35, 0.5, -0.16, -0.18, -0.62)]
+    steps = [Step(0, 0.12, 0.36, 0.15, 0.24, -0.12), Step(1, 0.5, 0.36, -0.16, -0.18, -0.62)]
     keys: Keys = [(begin, stand)]
     t, shift = begin + 0.2, np.zeros(2)
     while t < end - 0.75:
         if rng.uniform() < 0.22 and t < end - 1.6:
             shift = np.clip(shift + rng.uniform(-0.12, 0.12, 2), -0.15, 0.15)
             steps += [Step(0, t, 0.25, 0.15 + shift[0], 0.24 + shift[1], -0.12, 0.03)]
-            steps += [Step(1, t + 0.17, 0.25, -0.16 + shift[0], -0.18 + shift[1], -0.62, 0.03)]
-            t += 0.5
+            steps += [Step(1, t + 0.26, 0.25, -0.16 + shift[0], -0.18 + shift[1], -0.62, 0.03)]
+            t += 0.6
             keys.append((t, stand | {"aside": shift[0], "ahead": 0.03 + shift[1]}))
         name = str(rng.choice(["jab", "jab", "cross", "left_hook", "right_hook", "uppercut"]))
         strike = stand | PUNCHES[name] | {"aside": shift[0]}
@@ -36,7 +36,7 @@ def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
         reach = rng.uniform(0.14, 0.2)
         keys += [(t + reach, strike), (t + 2.1 * reach, stand | {"aside": shift[0], "ahead": 0.03 + shift[1]})]
         t += 2.1 * reach + rng.uniform(0.08, 0.45)
-    steps += [Step(1, end, 0.4, -STANCE, 0.0), Step(0, end + 0.2, 0.4, STANCE, 0.0)]
+    steps += [Step(1, end, 0.36, -STANCE, 0.0), Step(0, end + 0.38, 0.36, STANCE, 0.0)]
     return Act(body, seconds, [*keys, (end, keys[-1][1])], steps, rounding=0.06)
 
 
