@@ -85,7 +85,7 @@ WALKING = Gait(
 )
 JOGGING = Gait(
     0.38,
-    0.06,
+    0.045,
     6.0,
     lambda p: curve(RUN["hip"], p) - 3.0,
     lambda p: curve(RUN["knee"], p),

@@ -81,14 +81,21 @@ def perform(
         postures = motions.compose([(g.motion, g.seconds) for g in gestures], t, rng, still)
         postures[:, CHANNELS.index("turn")] += turn
         return pose(body, postures)
-    postures, stance = _joined(_parts(body, gestures, rng), t, turn)
+    parts = _parts(body, gestures, rng)
+    postures, stance = _joined(parts, t, turn)
     restless = still * motions.involuntary(t, rng)
     sway = restless[:, [CHANNELS.index("sway_x"), CHANNELS.index("sway_y")]]
     postures = motions.settled(postures + restless)
-    middle = (stance.pelvis[:, :2].max(0) + stance.pelvis[:, :2].min(0)) / 2 if _goes(gestures) else np.zeros(2)
-    shift = np.append(middle, 0.0)
+    shift = _middle(parts, turn) if _goes(gestures) else np.zeros(3)
     moved = stance._replace(pelvis=stance.pelvis - shift + np.column_stack([sway, 0 * t]), ankles=stance.ankles - shift)
     return figure(body, postures, moved, SOFT)
+
+
+def _middle(parts: Sequence[Part], turn: float) -> Array:
+    """The middle (3,) of the area that the person covers, whatever times are shown."""
+    whole = np.arange(0, motions.LEAD + sum(part.seconds for part in parts), 0.05)
+    places = _joined(parts, whole, turn)[1].pelvis[:, :2]
+    return np.append((places.max(0) + places.min(0)) / 2, 0.0)
 
 
 def _goes(gestures: Sequence[Gesture]) -> bool:

@@ -57,8 +57,8 @@ PUNCHES: dict[str, Posture] = {
 
 def lift(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
     """Bending the knees and the back, lifting something from the floor before the feet, holding it, and putting it back."""
-    deep, bow = rng.uniform(0.24, 0.38), rng.uniform(-6, 6)
-    down = both(front=74, side=6, roll=-8, elbow=12, supination=20, curl=30) | trunk(pelvis_bow=42 + bow, spine_bow=34, head_nod=-20)
+    deep, bow = rng.uniform(0.3, 0.42), rng.uniform(-6, 6)
+    down = both(front=74, side=6, roll=-8, elbow=12, supination=20, curl=30) | trunk(pelvis_bow=46 + bow, spine_bow=36, head_nod=-20)
     down |= {"drop": deep, "ahead": -0.10}
     hold = both(front=28, side=8, roll=-18, elbow=72, supination=50, curl=30) | trunk(spine_bow=-4)
     touch = down | {name: down[name] - np.radians(6) for name in ("left_front", "right_front")}
