@@ -447,3 +447,31 @@ def test_walks_are_made_of_all_channels():
     postures, stance = Walk(MAN, 5.0, np.random.default_rng(1)).at(np.arange(0, 5, 0.1))
     assert postures.shape == (50, len(CHANNELS))
     assert [np.shape(part) for part in stance] == [(50, 3), (50, 2, 3), (50, 2, 3, 3), (50, 2), (50, 2, 3)]
+
+
+def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
+    """Volume within the bare surface, by points on a grid, times the density of water."""
+    from test_synthetic import LIGHTS, naive_distance
+
+    from shadowpuppet.synthetic import Viewpoint
+    from shadowpuppet.synthetic.clothes import Clothes
+    from shadowpuppet.synthetic.kinematics import pose
+    from shadowpuppet.synthetic.motions import LEVEL, posture
+    from shadowpuppet.synthetic.parts import dressed
+    from shadowpuppet.synthetic.renderer import Renderer
+
+    bare = Clothes(looseness=0.0)
+    for stature, build, wanted in ((1.629, 0.0, 25.6), (1.756, 1.0, 27.8)):
+        body = Mannequin(stature=stature, build=build)
+        shape = pose(body, posture(**LEVEL))
+        surface = dressed(body, bare)
+        R, o = shape.rotation[0, surface.segment], shape.origin[0, surface.segment]
+        axes, origin = R @ surface.frame, o + (R @ surface.start[..., None])[..., 0]
+        step = 0.03
+        axis = [np.arange(low + step / 2, high, step) for low, high in ((-1.0, 1.0), (-0.3, 0.25), (0.0, stature + 0.03))]
+        points = np.stack(np.meshgrid(*axis, indexing="ij"), -1).reshape(-1, 3)
+        points = points[(np.abs(points[:, 0]) < 0.3) | (points[:, 2] > 0.7 * stature)] + rng.uniform(-0.5, 0.5, 3) * step
+        joints = Renderer(Viewpoint(size=(16, 16)).camera(), surface, bare, LIGHTS)._joins(shape, 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inside = naive_distance(points, surface, axes, origin, joints) < 0
+        assert inside.sum() * step**3 * 1000 / stature**2 == pytest.approx(wanted, rel=0.1)
