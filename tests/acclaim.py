@@ -14,7 +14,8 @@ def bones():
     for s, x in (("l", 1.0), ("r", -1.0)):
         arm, leg = (0, -30 * x, -90 * x), (0, 0, 20 * x)
         table += [
-            (f"{s}clavicle", "thorax", (x, 0.2, 0), 3.4, (0, 0, 0), "ry rz"), (f"{s}humerus", f"{s}clavicle", (x, 0, 0), 4.9, arm, "rx ry rz"),
+            (f"{s}clavicle", "thorax", (x, 0.2, 0), 3.4, (0, 0, 0), "ry rz"),
+            (f"{s}humerus", f"{s}clavicle", (x, 0, 0), 4.9, arm, "rx ry rz"),
             (f"{s}radius", f"{s}humerus", (x, 0, 0), 3.3, arm, "rx"), (f"{s}wrist", f"{s}radius", (x, 0, 0), 1.6, (0, 90, 90 * x), "ry"),
             (f"{s}hand", f"{s}wrist", (x, 0, 0), 0.7, (0, 90, 90 * x), "rx rz"),
             (f"{s}thumb", f"{s}wrist", (0.7 * x, 0, 0.7), 0.8, (-90, 45 * x, 0), "rx rz"),
