@@ -251,6 +251,20 @@ def test_paths_are_what_they_are_called():
         np.testing.assert_allclose(ahead, np.column_stack([np.sin(turn), -np.cos(turn)]), atol=2e-3)
 
 
+def test_who_turns_leans_inward_and_slows_down():
+    walk, found, _ = steady(True, 2.6, path="circle", size=1.5)
+    middle = np.array([1.5, 0.0])
+    feet = (at(found, "left_ankle") + at(found, "right_ankle")) / 2
+    inward = np.linalg.norm(feet[:, :2] - middle, axis=1) - np.linalg.norm(at(found, "neck")[:, :2] - middle, axis=1)
+    lean = np.degrees(np.arctan2(inward, at(found, "neck")[:, 2]))
+    assert 8 < np.median(lean) < 14
+    gone = np.linalg.norm(np.diff(at(found, "pelvis")[:, :2], axis=0), axis=1).sum() * 100 / len(lean)
+    assert gone < 0.95 * walk.speed
+    _, straight, _ = steady(True, 2.6)
+    upright = at(straight, "neck") - (at(straight, "left_ankle") + at(straight, "right_ankle")) / 2
+    assert abs(np.median(upright[:, 0])) < 0.03
+
+
 def test_walking_on_the_spot_stays_and_walking_goes_round_the_middle():
     _, still = go({"motion": "walk", "seconds": 10, "path": "spot"})
     assert np.ptp(at(still, "pelvis")[:, :2], axis=0).max() < 0.15

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.cycle import JOGGING, WALKING, Cycle, smooth, stride_of
+from shadowpuppet.synthetic.cycle import GRAVITY, JOGGING, WALKING, Cycle, smooth, stride_of
 from shadowpuppet.synthetic.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, turns
 from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.motions import STANDING, band_noise
@@ -21,6 +21,8 @@ TICK = 0.002
 """Seconds between the times at which speed and cadence are summed up."""
 WIDTH = {False: 0.055, True: 0.03}
 """Half the distance of the feet's tracks in leg lengths, walking and jogging."""
+LEAN = np.radians(13)
+"""Most that a person leans into a turn, rad; small leans are those at which weight and centrifugal force agree."""
 SPEED = {False: 1.35, True: 2.6}
 """Comfortable speeds of an adult, m/s; others at equal Froude number."""
 RISES, SETTLES = 0.3, 0.22
@@ -64,7 +66,9 @@ class Walk:
         self.prints = [self._prints(n, rng) for n in (0, 1)]
 
     def _clock(self, rng: np.random.Generator) -> None:
-        """Phase of the left leg, length gone, and how fully the person goes (0 to 1), at every tick."""
+        """Phase of the left leg, length gone, how fully the person goes (0 to 1), and how far they lean inward, at every tick."""
+        from scipy.ndimage import gaussian_filter1d
+
         self.ticks = np.arange(-1.0, self.seconds + 1.0 + TICK, TICK)
         period = self.cycle.stride / self.speed
         stops = self.seconds - 0.8 * period  # the feet come beside each other after it
@@ -77,6 +81,9 @@ class Walk:
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
         pace = self.speed * starts * smooth((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
         self.gone = np.interp(np.cumsum(pace) * TICK, due, self.path.samples)
+        quick = np.gradient(self.gone, TICK)
+        pull = quick**2 * np.interp(self.gone, self.path.samples, self.path.bend) / GRAVITY
+        self.lean = gaussian_filter1d(LEAN * np.tanh(pull / LEAN), 0.15 / TICK)
 
     def _prints(self, side: int, rng: np.random.Generator) -> Prints:
         phase = self.phase - 0.5 * side
@@ -95,20 +102,23 @@ class Walk:
 
     def at(self, t: Array) -> tuple[Array, Stance]:
         """Postures (T, `CHANNELS`) and stance at times `t` (T,), s, from the origin facing -Y."""
-        phase, gone, fully = (np.interp(t, self.ticks, values) for values in (self.phase, self.gone, self.fully))
+        phase, gone, fully, lean = (np.interp(t, self.ticks, values) for values in (self.phase, self.gone, self.fully, self.lean))
         feet = [self._foot(n, phase - 0.5 * n) for n in (0, 1)]
         heading = self.path.heading(gone)
         shift = np.column_stack([self.path.place(gone, 0 * gone), 0 * t]) if self.path.still else np.zeros(3)
         aside = (0.012 if self.jogging else 0.022) * self.cycle.leg * fully * np.cos(2 * np.pi * (phase - self.cycle.middle - 0.08))
         top = self.cycle.leg + self.body.length("ankle") + 0.02
         height = top + fully * (self.cycle.height(phase) - top)
-        pelvis = np.column_stack([self.path.place(gone, aside), height])
+        inward = np.sin(lean) * (height - self.cycle.sole.ankle)
+        pelvis = np.column_stack([self.path.place(gone, aside + inward), height * np.cos(lean)])
         ankles, frames, toes = (np.stack(part, 1) for part in zip(*feet))
         around = turns(0 * heading, 0 * heading, heading)
         ahead = frames @ np.array([0.0, -1.0, 0.0]) + (around @ np.array([0.0, -1.0, 0.0]))[:, None]
         ahead[..., 2] = 0
         postures = self._postures(t, phase, fully)
         postures[:, CHANNELS.index("turn")] = heading
+        postures[:, CHANNELS.index("pelvis_side")] += lean
+        postures[:, CHANNELS.index("head_tilt")] -= 0.6 * lean
         return postures, Stance(pelvis - shift, ankles - np.reshape(shift, (-1, 1, 3)), frames, toes, ahead)
 
     def _foot(self, side: int, phase: Array) -> tuple[Array, Array, Array]:
