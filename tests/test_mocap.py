@@ -109,7 +109,7 @@ def test_a_spec_plays_a_file(tmp_path):
 
 def test_what_cannot_be_played_is_said(tmp_path):
     path, _ = acclaim.write(tmp_path, 5)
-    with pytest.raises(SettingsError, match=r"motion.0: value error, file: needed by the motion mocap, and only by it"):
+    with pytest.raises(SettingsError, match=r"motion.0: .*file: needed by the motion mocap, and only by it"):
         spec_from({"motion": [{"motion": "mocap"}]})
     with pytest.raises(SettingsError, match=r"file: needed by the motion mocap"):
         spec_from({"motion": [{"motion": "walk", "file": "a.amc"}]})
