@@ -123,14 +123,17 @@ def read_mocap(path: str | Path, skeleton: str | Path | None = None) -> Capture:
 
 
 def _beside(path: Path) -> Path:
+    if not path.is_file():
+        raise FormatError(f"{path}: cannot be read (no such file)")
     there = sorted(p for p in path.parent.glob("*") if p.suffix.lower() == ".asf")
-    for stem in (path.stem, path.stem.split("_")[0]):
+    stems = list(dict.fromkeys([path.stem, path.stem.split("_")[0]]))
+    for stem in stems:
         for other in there:
             if other.stem == stem:
                 return other
     if len(there) == 1:
         return there[0]
-    raise FormatError(f"{path}: found {len(there)} .asf files beside it, expected {path.stem}.asf or {path.stem.split('_')[0]}.asf")
+    raise FormatError(f"{path}: found {len(there)} .asf files beside it, expected {' or '.join(f'{s}.asf' for s in stems)}")
 
 
 def _header(path: Path, lines: list[str], skeleton: Skeleton) -> tuple[int, bool]:
