@@ -58,7 +58,8 @@ def test_every_segment_is_a_rotation_and_at_rest_none_turns(capture):
     assert (np.linalg.det(figure.rotation) > 0).all()
     calm = retarget(Mannequin(), rest, rest)
     trunk = ("pelvis", "abdomen", "thorax", "neck", "head")
-    for segment in (*trunk, "left_hand", "right_hand", "right_forearm", "left_foot", "right_toes", "left_clavicle", "left_upper_arm", "right_upper_arm"):
+    limbs = ("left_hand", "right_hand", "right_forearm", "left_foot", "right_toes", "left_clavicle", "left_upper_arm", "right_upper_arm")
+    for segment in (*trunk, *limbs):
         np.testing.assert_allclose(calm.rotation[0, SEGMENTS.index(segment)], np.eye(3), atol=1e-6, err_msg=segment)
     thigh = calm.rotation[0, SEGMENTS.index("left_thigh")] @ [0, 0, 1]
     np.testing.assert_allclose(thigh, [-0.342, 0, 0.9397], atol=1e-3)  # the skeleton at rest stands with its legs apart

@@ -14,8 +14,9 @@ from shadowpuppet.synthetic import Gesture, Mannequin, Spec, demo_spec, proving_
 from shadowpuppet.synthetic.curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
 from shadowpuppet.synthetic.cycle import JOGGING, WALKING, Cycle, Sole, stride_of
 from shadowpuppet.synthetic.gait import Walk
-from shadowpuppet.synthetic.kinematics import CHANNELS, SEGMENTS, SIDES, figure, lesser
+from shadowpuppet.synthetic.kinematics import CHANNELS, SEGMENTS, SIDES, figure, lesser, pose
 from shadowpuppet.synthetic.mannequin import FRACTIONS, GROWTH, JOINTS
+from shadowpuppet.synthetic.motions import LEVEL, posture
 from shadowpuppet.synthetic.paths import Path
 from shadowpuppet.synthetic.performance import SOFT
 from shadowpuppet.synthetic.recording import perform
@@ -461,6 +462,22 @@ def test_impossible_people_are_told(kind, wishes, words):
         Mannequin.draw(np.random.default_rng(1), kind, **wishes)
 
 
+def test_a_fist_is_a_fist_and_an_open_hand_stays_as_it_was():
+    def towards(curl, side):
+        n, hand = (SEGMENTS.index(f"{side}_{part}") for part in ("fingers", "hand"))
+        found = pose(MAN, posture(**(LEVEL | {f"{side}_curl": curl})))
+        sign = 1.0 if side == "left" else -1.0
+        return found.rotation[0, hand].T @ found.rotation[0, n] @ [sign, 0, 0], found, n
+
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        np.testing.assert_allclose(towards(0.9, side)[0], [sign, 0, 0], atol=1e-9)
+        along, found, n = towards(1.5, side)
+        assert along[2] < -0.85  # to the palm, which looks down
+        assert along @ [sign, 0, 0] < -0.3
+        wrist = at(found, f"{side}_wrist")[0]
+        assert np.linalg.norm(found.origin[0, n] - wrist) == pytest.approx(0.46 * MAN.length("hand"))
+
+
 def test_walks_are_made_of_all_channels():
     postures, stance = Walk(MAN, 5.0, np.random.default_rng(1)).at(np.arange(0, 5, 0.1))
     assert postures.shape == (50, len(CHANNELS))
@@ -471,8 +488,6 @@ def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
     """Volume within the bare surface, by points on a grid, times the density of water."""
     from shadowpuppet.synthetic import Viewpoint
     from shadowpuppet.synthetic.clothes import Clothes
-    from shadowpuppet.synthetic.kinematics import pose
-    from shadowpuppet.synthetic.motions import LEVEL, posture
     from shadowpuppet.synthetic.parts import dressed
     from shadowpuppet.synthetic.renderer import Renderer
     from test_synthetic import LIGHTS, naive_distance

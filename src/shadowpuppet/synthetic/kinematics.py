@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.mannequin import JOINTS, Mannequin
+from shadowpuppet.synthetic.mannequin import HAND_POINT, JOINTS, KNUCKLES, Mannequin
 
 ARM = ("side", "front", "roll", "elbow", "supination", "wrist_flex", "wrist_side", "shrug", "protract", "curl")
 CHANNELS = (
@@ -44,12 +44,16 @@ SEGMENTS = (
     ),
     "left_toes",
     "right_toes",
+    "left_fingers",
+    "right_fingers",
 )
 SIDES = ("left", "right")
 TOE_OUT = 0.12
 """How far the feet of a standing person point outward, rad."""
 SPAN = 0.999
 """Share of its length that a leg may stretch to: knees are never quite straight."""
+FIST = (1.0, 1.5)
+"""Curls, rad, between which the fingers close from open to a fist; less is left to the fingers' own slight bend."""
 MIRROR = np.array([1.0, -1.0, -1.0])
 HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
@@ -191,7 +195,15 @@ def _arm(
         f"{side}_upper_arm": (upper, shoulder),
         f"{side}_forearm": (half, elbow),
         f"{side}_hand": (hand, wrist),
+        f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], arm["curl"]),
     }
+
+
+def fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
+    """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: of the hand, from the wrist, in its frame."""
+    close = np.clip((curl - FIST[0]) / (FIST[1] - FIST[0]), 0, 1)
+    bend = np.radians(115) * np.sign(base[0]) * close
+    return hand @ turns(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
 
 
 def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: dict, frame: dict) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.mannequin import KNUCKLES, Mannequin
 from shadowpuppet.synthetic.surface import Loft, Rows, frame_of, stations_of
 
 DOWN = np.diag([1.0, 1.0, -1.0])
@@ -90,13 +90,14 @@ def _hand(length: float, half: float, wrist: float) -> list[Loft]:
         for place, extent, spread in ((0.72, 0.42, 0.14), (0.24, 0.47, 0.04), (-0.25, 0.44, -0.05), (-0.70, 0.35, -0.16))
     ]
     digits.append(((0.14 * length, -0.50 * half, -0.006), (0.72, -0.62, -0.30), 0.40, 0.27 * half))
-    for root, axis, extent, r in digits:
+    for n, (root, axis, extent, r) in enumerate(digits):
+        finger, knuckle = n < 4, np.array([KNUCKLES * length, 0, 0])
         reach, unit = extent * length, np.array(axis) / np.linalg.norm(axis)
         rows = [(0, 1.05 * r, r), (0.5, 0.92 * r, 0.86 * r, 0, 0.02 * reach), (1, 0.72 * r, 0.63 * r, 0, 0.10 * reach)]
         parts.append(
             Loft(
-                "left_hand",
-                np.array(root),
+                "left_fingers" if finger else "left_hand",
+                np.array(root) - knuckle if finger else np.array(root),
                 frame_of(unit, np.array([0, 0, -1.0])),
                 stations_of(rows, reach),
                 (0.3 * r, 0.63 * r),

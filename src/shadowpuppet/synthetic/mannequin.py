@@ -70,6 +70,8 @@ hand and leg by Drillis & Contini (1966) as given by Winter (2009, fig. 4.1)."""
 HAND_POINT = 0.18
 """Where `*_hand` lies, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
 recordings (0.019 of stature beyond the wrist). The knuckles lie at 0.46."""
+KNUCKLES = 0.46
+"""Where the fingers bend, likewise."""
 
 BODY_MASS = (25.6, 27.8)
 """Mean body mass index (kg/m2) of the same women and men."""

@@ -15,7 +15,7 @@ import numpy as np
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion import JointTable
-from shadowpuppet.synthetic.kinematics import SIDES, Figure, assembled, turns
+from shadowpuppet.synthetic.kinematics import SIDES, Figure, assembled, fingers, turns
 from shadowpuppet.synthetic.mannequin import Mannequin
 
 if TYPE_CHECKING:
@@ -137,6 +137,7 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
         f"{side}_upper_arm": (upper_arm, shoulder),
         f"{side}_forearm": (forearm, elbow),
         f"{side}_hand": (hand, wrist),
+        f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], np.zeros(len(wrist))),
     }
 
 
