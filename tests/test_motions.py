@@ -328,6 +328,17 @@ def test_whole_body_motions_are_smooth_upright_at_their_ends_and_whole(name):
             assert np.abs(speed[end]).max() < 0.05
 
 
+@settings(max_examples=40, deadline=None)
+@given(name=st.sampled_from(WHOLE), seconds=st.floats(2, 12), seed=st.integers(0, 10_000))
+def test_any_length_will_do(name, seconds, seed):
+    body = Mannequin.draw(np.random.default_rng(seed))
+    _, found = go({"motion": name, "seconds": seconds}, seed=seed, body=body)
+    assert np.isfinite(found.joints).all()
+    assert np.isfinite(found.rotation).all()
+    assert np.linalg.norm(np.diff(at(found, "pelvis"), 2, axis=0) * 3600, axis=1).max() < 100.0
+    assert soles(body, found)[..., 2].min() > -0.004
+
+
 @pytest.mark.parametrize("name", WHOLE)
 def test_knees_bend_backward_only_and_joints_stay_within_reach(name):
     _, found = go(name, still=0.0)

@@ -79,7 +79,8 @@ class Walk:
         self.phase = 0.5 + np.cumsum(cadence * TICK) - np.sum(cadence[self.ticks < 0] * TICK)
         slow = 1 / (1 + 0.2 * self.path.bend**2 * (self.cycle.leg / 0.86) ** 2)
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
-        pace = self.speed * starts * smooth((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
+        short = min(1.0, stops / (3.0 * period))  # who has no time for more than a step or two does not get up to speed
+        pace = short * self.speed * starts * smooth((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
         self.gone = np.interp(np.cumsum(pace) * TICK, due, self.path.samples)
         quick = np.gradient(self.gone, TICK)
         pull = quick**2 * np.interp(self.gone, self.path.samples, self.path.bend) / GRAVITY

@@ -86,9 +86,9 @@ def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
     deep = rng.uniform(0.40, 0.46)
     low: Posture = {"drop": deep, "ahead": -0.42}
     half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
-    begin = 0.5 * min(seconds, 4.0) / 4.0
-    return Act(body, seconds, [(begin + 0.5, lean | half), (begin + 1.0, seat | low), (seconds - 1.5, seat | low),
-                               (seconds - 1.0, lean | half)])  # fmt: skip
+    pace = min(seconds / 4.0, 1.0)
+    return Act(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
+                               (seconds - 1.0 * pace, lean | half)])  # fmt: skip
 
 
 def march(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
