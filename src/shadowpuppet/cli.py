@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 from cyclopts import App, CycloptsError, Parameter
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.flags import OTHER, RUN, DemoFlags, Flags, LookFlags, options_from
+from shadowpuppet.flags import OTHER, RUN, DemoFlags, Flags, LookFlags, SpecFlags, options_from, spec_of
 
 MISTAKE, INTERRUPTED = 2, 130
 """Exit codes: what the user gave cannot be used; Ctrl-C."""
@@ -33,6 +33,16 @@ Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml
 All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
+ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
+SpecPath = Annotated[Path | None, Parameter(help="File that describes it, TOML, as --show-spec prints it, or the spec.toml of a made "
+                                                 "recording.")]
+Like = Annotated[str | None, Parameter(group=RUN, help="Begin with a named spec; --list names them.")]
+Seed = Annotated[int | None, Parameter(group=RUN, help="Seed of all chance: the same seed makes the same recording.")]
+
+
+def switch(help: str, name: str | None = None) -> Parameter:
+    """A flag that is there or not."""
+    return Parameter(name=name, group=RUN, negative=(), show_default=False, help=help)
 
 
 def output(help: str) -> Parameter:
@@ -131,6 +141,35 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
         found, look = fit_person(recording, file, options_from(flags, config))
         shown.doubt(look)
     show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
+
+
+@app.command
+def synthesize(spec: SpecPath = None, /, *,
+               folder: Annotated[Path | None, output("Folder of the recording. [default: the spec's name]")] = None,
+               like: Like = None, seed: Seed = None,
+               list_specs: Annotated[bool, switch("List the named specs, make nothing.", "--list")] = False,
+               show_spec: Annotated[bool, switch("Print the spec that all this amounts to, make nothing.")] = False,
+               force: Annotated[bool, switch("Write into a folder that has other files in it.")] = False,
+               quiet: Quiet = False, flags: ForSpec = None) -> None:  # fmt: skip
+    """Make a recording with known truth: films, exact masks, joints, calibration, from a spec file or a few flags."""
+    from shadowpuppet.synthetic import named_specs, spec_text
+    from shadowpuppet.terminal import show, terminal
+
+    if list_specs:
+        from shadowpuppet.tables import specs_table
+
+        return show(specs_table(named_specs()))
+    made = spec_of(spec, like, seed, flags)
+    if show_spec:
+        return print(spec_text(made), end="")
+    from shadowpuppet.making import make_recording
+    from shadowpuppet.tables import made_table
+
+    folder = folder or Path(made.name)
+    with terminal(quiet, folder) as shown:
+        recording = make_recording(made, folder, shown, force)
+    if not quiet:
+        show(made_table(made, recording))
 
 
 @app.command

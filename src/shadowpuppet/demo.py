@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import VideoError
+from shadowpuppet.making import Drawing
 from shadowpuppet.options import Options
 from shadowpuppet.pipeline import Listener, Summary, track_recording
 from shadowpuppet.synthetic import demo_spec, synthesize
@@ -23,7 +24,7 @@ def run_demo(folder: str | Path, options: Options, listener: Listener | None = N
     """
     folder, listener = Path(folder), listener or Listener()
     listener.begin("drawing")
-    tell = _Once(listener)
+    tell = Drawing(listener)
     recording = synthesize(demo_spec(), folder / "recording", np.random.default_rng(options.seed), tell)
     summary = track_recording(recording, folder / "run", options, listener)
     write_image(folder / "run" / "overlay.png", contact_sheet(folder / "run" / "overlay.mp4"))
@@ -39,16 +40,3 @@ def contact_sheet(film: str | Path, count: int = SHOWN) -> np.ndarray:
     if not images:
         raise VideoError(f"{film}: no frames in it")
     return np.concatenate(images, axis=1)
-
-
-class _Once:
-    """Tells a listener of pictures that are made."""
-
-    def __init__(self, listener: Listener) -> None:
-        self.listener, self.total = listener, 0
-
-    def __call__(self, done: int, total: int) -> None:
-        if total != self.total:
-            self.total = total
-            self.listener.begin("drawing", total)
-        self.listener.advance(done)

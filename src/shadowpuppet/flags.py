@@ -11,20 +11,33 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 from cyclopts import Group, Parameter
 from pydantic import BeforeValidator
 
+from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.options import PATHS, Options, default_of, make_options, read_options, settings_of
+from shadowpuppet.settings import validate
+from shadowpuppet.synthetic.collection import named_specs
+from shadowpuppet.synthetic.shorthand import Shorthand, expanded
+from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
+from shadowpuppet.synthetic.specfile import read_spec
 
-RUN, PERSON, PICTURES, OTHER = (Group(title, sort_key=n) for n, title in enumerate(("Run", "Person", "Pictures", "Other")))
+HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Other")
+RUN, PERSON, CAMERAS, SCENE, PICTURES, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "overlay"), RUN),
     **dict.fromkeys(("height", "distance", "person"), PERSON),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size"), PICTURES),
 }
+SPEC_GROUPS = {
+    **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
+    **dict.fromkeys(("cameras", "ring_radius", "distance", "camera_height", "fov", "fisheye"), CAMERAS),
+    **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
+    **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
+}
 HIDDEN = Parameter(show=False)
 """Flags of the tables: many, and shown by `shadowpuppet settings`."""
 
 
-def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True) -> type:
+def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True, groups: Mapping[str, Group] = GROUPS) -> type:
     """A dataclass with the settings of `kind`, all None as long as no flag is given; tables become dotted flags."""
     made = []
     for field, hint, told in settings_of(kind):
@@ -33,7 +46,7 @@ def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True) -> t
         if isinstance(hint, type) and is_dataclass(hint):
             made.append((field.name, Annotated[flags_of(hint, shown=False) | None, HIDDEN], None))
         else:
-            made.append((field.name, Annotated[_bare(hint) | None, _parameter(field, told, shown)], None))
+            made.append((field.name, Annotated[_bare(hint) | None, _parameter(field, told, shown, groups)], None))
     # cyclopts takes classes of the standard library, as which it would see this one, for single values.
     return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
 
@@ -67,14 +80,27 @@ def _bare(hint: Any) -> Any:
     return hint
 
 
-def _parameter(field: Any, told: str, shown: bool) -> Parameter:
+def _parameter(field: Any, told: str, shown: bool, groups: Mapping[str, Group]) -> Parameter:
     default = default_of(field)
     end = "" if default is None or isinstance(default, bool) else f" [default: {default}]"
-    return Parameter(help=told + end, show=shown, group=GROUPS.get(field.name), show_choices=False)
+    return Parameter(help=told + end, show=shown, group=groups.get(field.name), show_choices=False)
+
+
+def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -> Spec:
+    """A spec of a recording to be made: flags over a file or a named spec. Raises `SettingsError`."""
+    if path is not None and like is not None:
+        raise SettingsError(f"flags: found a file ({path}) and --like {like}, expected one of them")
+    named = named_specs()
+    if like is not None and like not in named:
+        raise SettingsError(f"flags: like: found {like!r}, which names no spec; there are: {choices(named)}")
+    spec = read_spec(path) if path is not None else named[like] if like is not None else Spec()
+    if seed is not None:
+        spec = spec_from(spec_values(spec) | {"seed": seed}, "flags")
+    return expanded(validate(Shorthand, given(flags), "flags"), spec)
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = DemoFlags = Any
+    Flags = LookFlags = DemoFlags = SpecFlags = Any
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
@@ -82,3 +108,5 @@ else:
     """Those that matter where nothing is tracked."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
     """Those that matter where the recording is known."""
+    SpecFlags = flags_of(Shorthand, groups=SPEC_GROUPS)
+    """What is often wanted of a made recording."""

@@ -12,9 +12,11 @@ from rich.table import Table
 from rich.text import Text
 
 from shadowpuppet.fitting import Found
+from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import FAR
 from shadowpuppet.sizes import CardboxSizes
+from shadowpuppet.synthetic.spec import Spec
 
 BARS = "▁▂▃▄▅▆▇█"
 
@@ -97,6 +99,37 @@ def fit_table(found: Found, saved: Path) -> RenderableType:
     overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
     return pairs([("overlap", f"{overlaps}; film {found.start:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"),
                   ("source", found.source), ("saved", str(saved))])
+
+
+def specs_table(specs: Mapping[str, Spec]) -> RenderableType:
+    """Named specs, a row each."""
+    rows = []
+    for name, spec in specs.items():
+        views = spec.views()
+        first = views[0]
+        place = f"{len(views)} cameras around" if len(views) > 1 else f"at {first.distance:g} m, {first.fov_deg:g} degrees"
+        rows.append((name, f"{spec.body.stature:.2f} m, {place}: {_motions(spec)}"))
+    return pairs(rows)
+
+
+def made_table(spec: Spec, made: Recording) -> RenderableType:
+    """What a made recording has in it, and what can be done with it."""
+    views, seconds = spec.views(), sum(gesture.seconds for gesture in spec.motion)
+    first, cameras = views[0], f"{len(views)} cameras" if len(views) > 1 else "1 camera"
+    extras = [thing.kind for thing in spec.scene.obstacles] + ["another person"] * len(spec.scene.bystanders)
+    rows = [("recording", str(made.path)),
+            ("person", f"{spec.body.stature:.2f} m: {_motions(spec)}" + (f"; in the scene: {', '.join(extras)}" if extras else "")),
+            ("films", f"{cameras}, {first.size[0]} x {first.size[1]} pixels, {spec.rate:g} frames/s, {seconds:g} s of motion"),
+            ("truth", "truth.csv, truth.trc, masks/" + (", people/" if spec.scene.bystanders else "")
+             + (", training.csv, training.trc" if made.training else ", references/")),
+            ("again", f"shadowpuppet synthesize {made.path}/spec.toml -o FOLDER"),
+            ("look", f"shadowpuppet info {made.path}" + (f" --camera {first.name}" if len(views) > 1 else "")),
+            ("track", f"shadowpuppet track {made.path} --overlay" + (f" --camera {first.name}" if len(views) > 1 else ""))]
+    return pairs(rows)
+
+
+def _motions(spec: Spec) -> str:
+    return ", ".join(f"{gesture.motion} {gesture.seconds:g}" for gesture in spec.motion)
 
 
 def sparkline(values: Sequence[float], width: int = 30) -> str:

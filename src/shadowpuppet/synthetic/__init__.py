@@ -5,19 +5,40 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shadowpuppet.synthetic.collection import demo_spec, proving_ground
+from shadowpuppet.synthetic.collection import demo_spec, named_specs, proving_ground
+from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, Viewpoint, spec_from
+from shadowpuppet.synthetic.spec import Bystander, Gesture, Scene, Spec, spec_from
+from shadowpuppet.synthetic.specfile import read_spec, spec_text
+from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy as np
 
-__all__ = ["Gesture", "Mannequin", "Scene", "Spec", "Viewpoint", "demo_spec", "proving_ground", "spec_from", "synthesize"]
+__all__ = [
+    "Bystander",
+    "Gesture",
+    "Mannequin",
+    "Obstacle",
+    "Ring",
+    "Scene",
+    "Spec",
+    "Viewpoint",
+    "demo_spec",
+    "named_specs",
+    "proving_ground",
+    "read_spec",
+    "spec_from",
+    "spec_text",
+    "synthesize",
+]
 
 
-def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator, tell: Callable[[int, int], None] | None = None) -> Path:
+def synthesize(
+    spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Callable[[int, int], None] | None = None
+) -> Path:
     """Write the recording that `spec` describes into `folder` (see `recording.synthesize`)."""
     from shadowpuppet.synthetic.recording import synthesize as write
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.spec import Gesture, Scene, Spec, Viewpoint
+from shadowpuppet.synthetic.shorthand import gestures_from
+from shadowpuppet.synthetic.spec import Scene, Spec
+from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 
 
 def demo_spec() -> Spec:
     """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
-    gestures = _gestures("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
+    gestures = gestures_from("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
     return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=7, room=2))
 
 
@@ -37,8 +39,8 @@ PROVING = (
 def proving_ground() -> tuple[Spec, ...]:
     """Recordings of one camera, bodies x motions x cameras x noise, each of about ten seconds, to choose settings by.
 
-    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`. Cameras stand at 0.9 of the stature when level,
-    so that the picture cuts the legs; higher or lower when pitched, so that the person stays in it.
+    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, for which its own seed is (0, n). Cameras stand
+    at 0.9 of the stature when level, so that the picture cuts the legs; higher or lower when pitched, so that the person stays in it.
     """
     return tuple(_proof(n, *row) for n, row in enumerate(PROVING))
 
@@ -52,14 +54,21 @@ def _proof(
     return Spec(
         name=name,
         body=body,
-        motion=_gestures(gestures),
+        motion=gestures_from(gestures),
         cameras=(view,),
         scene=Scene(clothing=n, room=n, noise=noise),
         turn_deg=turn,
+        seed=(0, n),
     )
 
 
-def _gestures(text: str) -> tuple[Gesture, ...]:
-    """Gestures from `name seconds, name seconds`."""
-    pairs = (item.split() for item in text.split(","))
-    return tuple(Gesture(motion=name, seconds=float(seconds)) for name, seconds in pairs)  # pyright: ignore[reportArgumentType]
+def named_specs() -> dict[str, Spec]:
+    """All of them by name: the demo's, several cameras around a person, and the proving ground's."""
+    ring = Spec(
+        name="ring",
+        motion=gestures_from("wave_hands 4, reach 5, random 6"),
+        ring=Ring(count=7, size=(640, 480)),
+        scene=Scene(clothing=4, room=3),
+        rate=30,
+    )
+    return {spec.name: spec for spec in (demo_spec(), ring, *proving_ground())}

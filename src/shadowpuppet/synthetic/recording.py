@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.camera import Camera
-from shadowpuppet.errors import RecordingError
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions
-from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.kinematics import Figure, pose
 from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.synthetic.parts import dressed
-from shadowpuppet.synthetic.renderer import Renderer
-from shadowpuppet.synthetic.scene import Room, exposed
-from shadowpuppet.synthetic.spec import Spec
+from shadowpuppet.synthetic.spec import Bystander, Gesture, Spec
+from shadowpuppet.synthetic.specfile import SPEC_FILE, seed_of, write_spec
+from shadowpuppet.synthetic.studio import Studio, body_of
+
+Tell = Callable[[int, int], None]
 
 REFERENCES = {
     "front_t_pose": motions.LEVEL,
@@ -28,41 +30,31 @@ REFERENCES = {
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
 
 
-def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator, tell: Callable[[int, int], None] | None = None) -> Path:
+def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Tell | None = None) -> Path:
     """Write the recording that `spec` describes into `folder`, made where missing, and return its path.
 
-    tell: called after each picture with how many are done and how many there will be.
-    The same spec and seed give the same pictures, masks and truth. Raises `RecordingError` where the folder cannot be written.
+    rng: where none is given, one of the spec's seed. tell: called after each picture with how many are done and how many there
+    will be. The same spec and seed give the same pictures, masks and truth, whatever the number of threads; `spec.toml` keeps
+    both. Interrupted by Ctrl-C, the pictures made so far are a recording, too. Raises `RecordingError` where the folder cannot
+    be written; warns where obstacles hide nothing.
     """
-    from shadowpuppet.io.calibration import write_calibration
-    from shadowpuppet.video import write_frames
-
-    folder = Path(folder)
-    cameras = [view.camera() for view in spec.cameras]
-    _folders(folder, references=len(cameras) == 1)
-    for_motion, for_noise = rng.spawn(2)
+    folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
+    cameras = [view.camera() for view in spec.views()]
+    _folders(folder, "video", "background", "masks", *["references"][: len(cameras) == 1], *["people"][: len(spec.scene.bystanders)])
+    seed = seed_of(rng)
+    for_motion, for_noise, for_training, for_others = rng.spawn(4)
+    write_spec(folder / SPEC_FILE, spec, seed)
     times, figure = perform(spec, for_motion)
-    write_calibration(folder / "calibration.toml", cameras)
-    _write_subject(folder / "recording.toml", spec)
-    write_truth(folder / "truth", times, figure.joints, spec.rate)
-    done = 0
-    for camera, noise in zip(cameras, for_noise.spawn(len(cameras))):
-        studio = Studio(spec, camera, noise)
-        with write_frames(folder / "background" / f"{camera.name}.mp4", spec.rate) as film:
-            for _ in range(max(1, round(spec.scene.empty_seconds * spec.rate))):
-                film.write(studio.empty())
-        with (
-            write_frames(folder / "video" / f"{camera.name}.mp4", spec.rate) as film,
-            write_frames(folder / "masks" / f"{camera.name}.mkv", spec.rate, lossless=True) as masks,
-        ):
-            for image, mask in studio.film(figure):
-                film.write(image)
-                masks.write(mask)
-                done += 1
-                if tell is not None:
-                    tell(done, len(times) * len(cameras))
+    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(spec.scene.bystanders, for_others.spawn(99))]
+    _write_given(folder, spec, cameras, times, figure, for_training)
+    hidden = 0
+    for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
+        studio = Studio(spec, camera, noise, others, _wall(figure, others))
+        hidden += _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         if len(cameras) == 1:
             _write_references(folder / "references", spec, studio)
+    if spec.scene.obstacles and not hidden:
+        warn(f"{folder}: obstacles: nothing of the person is hidden by them in any picture", ShadowPuppetWarning, stacklevel=2)
     return folder
 
 
@@ -74,44 +66,71 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
     return times, perform(spec.body, spec.motion, times, rng, spec.still, np.radians(spec.turn_deg))
 
 
-class Studio:
-    """One camera of a recording with the person, their clothes and the room: takes pictures."""
+def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
+    """A bystander in `count` pictures, where they stand."""
+    gesture = Gesture(motion=someone.motion, seconds=max(2.0, count / spec.rate))
+    _, figure = perform(replace(spec, body=body_of(someone), motion=(gesture,), turn_deg=someone.turn_deg), rng)
+    place = np.array([someone.left, -someone.ahead, 0])
+    parts = [part[:count] for part in figure]
+    return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
 
-    def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator) -> None:
-        """rng: of the noise; clothes and room have their own seeds in the spec."""
-        clothes = Clothes.draw(np.random.default_rng(spec.scene.clothing))
-        least = max((view.distance + 1 for view in spec.cameras if abs(view.azimuth_deg) > 60), default=0.0)
-        self.room = Room(camera, np.random.default_rng(spec.scene.room), spec.scene.shadow, least)
-        self.renderer = Renderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
-        self.noise, self.rng = spec.scene.noise, rng
 
-    def empty(self) -> np.ndarray:
-        """A picture without the person, (H, W, 3) BGR."""
-        return exposed(self.room.picture, self.noise, self.rng)[..., ::-1]
+def _wall(figure: Figure, others: list[Figure]) -> float:
+    """How far behind the person the wall must be, metres: 0 where they stay at their place, for which all walls are far enough."""
+    behind = [float(one.joints[..., 1].max()) for one in (figure, *others)]
+    return max(behind) + 0.4 if others or behind[0] > 1.15 else 0.0
 
-    def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255."""
-        return self._exposed(*self._lit(figure, index))
 
-    def film(self, figure: Figure, workers: int = 2) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """`take` of all postures, one after another; `workers` threads draw ahead, the noise is drawn in order."""
-        from concurrent.futures import ThreadPoolExecutor
+def _part(tell: Tell | None, before: int, total: int) -> Callable[[int], None]:
+    return lambda done: tell(before + done, total) if tell is not None else None
 
-        count = len(figure.joints)
-        with ThreadPoolExecutor(workers) as pool:
-            ahead = deque(pool.submit(self._lit, figure, index) for index in range(min(2 * workers, count)))
-            for index in range(count):
-                light, mask = ahead.popleft().result()
-                if index + 2 * workers < count:
-                    ahead.append(pool.submit(self._lit, figure, index + 2 * workers))
-                yield self._exposed(light, mask)
 
-    def _lit(self, figure: Figure, index: int) -> tuple[Array, np.ndarray]:
-        shot = self.renderer.draw(figure, index)
-        return shot.picture + (1 - shot.alpha[..., None]) * self.room.shaded(figure, index), shot.mask
+def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Callable[[int], None]) -> int:
+    """Write a camera's films, and tell after each picture how many there are; returns how many of the person's pixels are hidden.
 
-    def _exposed(self, light: Array, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return exposed(light, self.noise, self.rng)[..., ::-1], mask
+    After Ctrl-C the films end with the last picture that was made, and have their own names: they can be used.
+    """
+    from shadowpuppet.video import write_frames
+
+    name, crf, hidden = studio.room.camera.name, spec.scene.crf, 0
+    with write_frames(folder / "background" / f"{name}.mp4", spec.rate, crf=crf) as film:
+        count = max(1, round(spec.scene.empty_seconds * spec.rate))
+        for index in range(count):
+            film.write(studio.empty(index, count))
+    interrupted = False
+    with contextlib.ExitStack() as stack:
+        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf))
+        kinds = ["masks", *["people"][: len(spec.scene.bystanders)]]
+        exact = [stack.enter_context(write_frames(folder / kind / f"{name}.mkv", spec.rate, lossless=True)) for kind in kinds]
+        try:
+            for picture in studio.film(figure):
+                for masks, mask in zip(exact, (picture.mask, picture.people)):
+                    masks.write(mask)
+                film.write(picture.image)
+                hidden += picture.hidden
+                tell(film.count)
+        except KeyboardInterrupt:
+            if not film.count:
+                raise
+            interrupted = True
+    if interrupted:
+        raise KeyboardInterrupt
+    return hidden
+
+
+def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
+    """All that is no film: calibration, what is told of the subject, truth, and for several cameras motion to train with.
+
+    The training motion is a second performance of the same gestures by the same body, with another's chance.
+    """
+    from shadowpuppet.io.calibration import write_calibration
+
+    write_calibration(folder / "calibration.toml", cameras)
+    _write_subject(folder / "recording.toml", spec)
+    write_truth(folder / "truth", times, figure.joints, spec.rate)
+    if len(cameras) > 1:
+        again, rehearsal = perform(spec, rng)
+        write_truth(folder / "training", again, rehearsal.joints, spec.rate)
 
 
 def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
@@ -152,8 +171,9 @@ def _write_subject(path: Path, spec: Spec) -> None:
     lines = ["[subject]"]
     if "height" in spec.tells:
         lines.append(f"height = {spec.body.stature:.3f}     # metres, shoes on")
-    if "distance" in spec.tells and len(spec.cameras) == 1:
-        distance = spec.cameras[0].distance
+    views = spec.views()
+    if "distance" in spec.tells and len(views) == 1:
+        distance = views[0].distance
         lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
     _write(path, lines)
 
@@ -165,9 +185,9 @@ def _write(path: Path, lines: list[str]) -> None:
         raise RecordingError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
 
 
-def _folders(folder: Path, references: bool) -> None:
+def _folders(folder: Path, *names: str) -> None:
     try:
-        for name in ("video", "background", "masks", *(["references"] if references else [])):
+        for name in names:
             (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(

@@ -26,6 +26,8 @@ class Shot(NamedTuple):
     """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
     alpha: Array
     """Share of each pixel that the person covers, of shape (H, W)."""
+    depth: Array
+    """Distance along the rays of pixel centres, of shape (H, W), metres; `layers.FAR` where the person is missed."""
 
 
 class Renderer:
@@ -50,6 +52,12 @@ class Renderer:
         angle = np.arccos(np.clip((corners.reshape(4, -1, 3) * self.direction).sum(-1).min(0), -1, 1)) * 1.05
         self.sine, self.cosine = np.sin(angle), np.cos(angle)
 
+    def fine_rays(self) -> Array:
+        """Unit rays (2H, 2W, 3), world, four to a pixel: for what is drawn once."""
+        width, height = self.camera.size
+        grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
+        return _unit(self.camera.rays(grid) @ inverse(self.camera.T_camera_world)[:3, :3].T)
+
     def draw(self, figure: Figure, index: int) -> Shot:
         """The figure's posture `index`."""
         from shadowpuppet.synthetic import _tracing
@@ -68,7 +76,7 @@ class Renderer:
         _tracing.find_surface(*traced, depth, near)
         alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
         _tracing.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
-        return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha)
+        return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha, depth)
 
     def _joins(self, figure: Figure, index: int) -> Array:
         """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""

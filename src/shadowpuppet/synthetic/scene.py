@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import colorsys
+import copy
+import itertools
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.synthetic import walls
+from shadowpuppet.synthetic.furniture import Furniture
 from shadowpuppet.synthetic.kinematics import Figure
 from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.spec import Scene
 
 SHADOW_PARTS = (
     ("pelvis", "neck", 0.13),
@@ -36,8 +40,16 @@ COARSE = 4
 class Room:
     """A floor at z = 0, walls around, one of them behind the person, with their texture, and two lamps; all drawn from `rng`."""
 
-    def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float, least: float = 0.0) -> None:
-        """shadow: how dark the person's is, 0 to 1; least: the wall is at least so far behind the person, metres."""
+    def __init__(
+        self,
+        camera: Camera,
+        rng: np.random.Generator,
+        shadow: float,
+        least: float = 0.0,
+        background: walls.Background = "room",
+        furniture: Furniture | None = None,
+    ) -> None:
+        """shadow: how dark shadows are, 0 to 1; least: the wall is at least so far behind the person, metres."""
         self.camera, self.shadow = camera, shadow
         self.distance = max(rng.uniform(1.2, 3.5), least)
         side = rng.choice([-1, 1])
@@ -46,7 +58,8 @@ class Room:
         self.lights = np.zeros((3, 4))
         self.lights[0, :3], self.lights[1, :3] = key / np.linalg.norm(key), fill / np.linalg.norm(fill)
         self.lights[:, 3] = rng.uniform(0.45, 0.6), rng.uniform(0.12, 0.22), rng.uniform(0.45, 0.6)
-        self.picture = self._paint(rng)
+        self.wall_colour = walls.wall_colour(copy.deepcopy(rng))
+        self.picture = self._paint(rng, background, furniture)
         across = np.cross(self.lights[0, :3], [0.0, 0.0, 1.0])
         across /= np.linalg.norm(across)
         self._from_lamp = np.stack([across, np.cross(self.lights[0, :3], across), self.lights[0, :3]], 1)
@@ -66,42 +79,29 @@ class Room:
         along = np.where(met < 2, points[..., 1], points[..., 0]) + np.array([start for *_, start in ends])[met]
         return points, along
 
-    def _paint(self, rng: np.random.Generator) -> Array:
+    def _paint(self, rng: np.random.Generator, background: walls.Background, furniture: Furniture | None) -> Array:
         """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of four rays."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         points, along = self._points(grid)
-        wall = self._wall(along, points[..., 2], rng)
-        floor = self._floor(points[..., 0], points[..., 1], rng)
+        wall = walls.wall(background, along, points[..., 2], rng)
+        floor = walls.floor(background, points[..., 0], points[..., 1], rng)
         picture = np.where(points[..., 2:] < 1e-9, floor, wall)
         picture *= 0.78 + 0.22 * np.exp(-((points[..., :1] - 0.5) ** 2 + (points[..., 2:] - 1.8) ** 2) / 6)
+        if furniture:
+            import cv2
+
+            hidden = cv2.GaussianBlur(furniture.shades(points, self.lights[0, :3]).astype(float), (0, 0), 2.0)
+            picture *= 1 - self.shadow * hidden[..., None]
         return picture.reshape(height, 2, width, 2, 3).mean((1, 3))
 
-    def _wall(self, x: Array, z: Array, rng: np.random.Generator) -> Array:
-        colour = np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.05, 0.4), rng.uniform(0.45, 0.85)))
-        paint = colour * (1 + rng.uniform(0.04, 0.22) * cloud(x, z, rng))[..., None]
-        for _ in range(rng.integers(3, 9)):
-            cx, cz, w, h = rng.uniform(-2.2, 2.2), rng.uniform(0.4, 2.6), rng.uniform(0.1, 0.45), rng.uniform(0.1, 0.35)
-            inside = (np.abs(x - cx) < w) & (np.abs(z - cz) < h)
-            poster = np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.1, 0.7), rng.uniform(0.25, 0.9)))
-            pattern = 1 + 0.12 * np.sin(rng.uniform(10, 60) * x + rng.uniform(10, 60) * z)
-            paint[inside] = (poster * pattern[..., None])[inside]
-        paint[z < 0.09] = 0.75 * colour + 0.1
-        return paint
-
-    def _floor(self, x: Array, y: Array, rng: np.random.Generator) -> Array:
-        colour = np.array(colorsys.hsv_to_rgb(rng.uniform(0.02, 0.15), rng.uniform(0.1, 0.5), rng.uniform(0.3, 0.65)))
-        size = rng.uniform(0.12, 0.4)
-        checks = np.sign(np.sin(np.pi * x / size) * np.sin(np.pi * y / (size * rng.choice([1, 4]))))
-        return colour * (1 + rng.uniform(0.03, 0.10) * checks + 0.06 * cloud(2 * x, 2 * y, rng))[..., None]
-
-    def shaded(self, figure: Figure, index: int) -> Array:
-        """The room's picture with the figure's shadow, (H, W, 3)."""
+    def shaded(self, figure: Figure, index: int, *others: Figure) -> Array:
+        """The room's picture with the shadow of the figure and of `others`, (H, W, 3)."""
         import cv2
 
         if self.shadow == 0:
             return self.picture
-        light = 1 - self.shadow * self._shade(figure, index)
+        light = 1 - self.shadow * self._shade([figure.joints[index], *(other.joints[index] for other in others)])
         width, height = self.camera.size
         return (
             self.picture
@@ -110,15 +110,15 @@ class Room:
             ]
         )
 
-    def _shade(self, figure: Figure, index: int) -> Array:
-        """How far the key lamp is hidden, 0 to 1, on the coarse grid.
+    def _shade(self, people: list[Array]) -> Array:
+        """How far the key lamp is hidden, 0 to 1, on the coarse grid; people: joints (17, 3) of each.
 
         The lamp is distant: seen from it, floor and wall points and sticks are points and lines of a plane. The edge softens
         with the distance between stick and shadow.
         """
         clear = np.ones(self._seen.shape[:2])
-        for a, b, radius in SHADOW_PARTS:
-            start, end = (figure.joints[index, JOINTS.index(name)] @ self._from_lamp for name in (a, b))
+        for joints, (a, b, radius) in itertools.product(people, SHADOW_PARTS):
+            start, end = (joints[JOINTS.index(name)] @ self._from_lamp for name in (a, b))
             along = end - start
             t = np.clip(((self._seen - start)[..., :2] @ along[:2]) / max(along[:2] @ along[:2], 1e-9), 0, 1)
             off = self._seen - start - t[..., None] * along
@@ -128,29 +128,25 @@ class Room:
         return 1 - clear
 
 
-def cloud(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Array:
-    """Fractal value noise over the plane, about -1 to 1."""
-    total = np.zeros_like(x)
-    for octave in range(octaves):
-        lattice = rng.uniform(-1, 1, (64, 64))
-        u, v = x * 1.3 * 2**octave + 31.7, y * 1.3 * 2**octave + 17.3
-        i, j = np.floor(u).astype(int), np.floor(v).astype(int)
-        fu, fv = u - i, v - j
-        fu, fv = fu * fu * (3 - 2 * fu), fv * fv * (3 - 2 * fv)
-        corner = [lattice[(i + a) % 64, (j + b) % 64] for a in (0, 1) for b in (0, 1)]
-        total += (
-            (corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu
-        ) * 0.55**octave
-    return total
+def brightness(scene: Scene, seconds: float, length: float) -> float:
+    """How bright the lamps are, 1 as they are meant, `seconds` after the film's first picture; before it in the empty scene.
+
+    length: of the film, seconds, over which `scene.drift` builds up, slow at both ends.
+    """
+    share = np.clip(seconds / max(length, 1e-9), 0, 1)
+    drift = scene.drift * (0.5 - 0.5 * np.cos(np.pi * share))
+    return float((1 + drift) * (1 + scene.flicker * np.sin(2 * np.pi * scene.flicker_hz * seconds)))
 
 
-def exposed(picture: Array, noise: float, rng: np.random.Generator) -> np.ndarray:
+def exposed(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
     """What the sensor makes of light (H, W, 3), 0 to 1: slight blur of the lens, display gamma, noise; RGB uint8.
 
     noise: standard deviation in grey levels at middle grey; it grows with brightness as photon noise does.
     """
     import cv2
 
+    if brightness != 1:
+        picture = brightness * picture
     blurred = cv2.GaussianBlur(picture, (0, 0), 0.4)
     level = 255 * np.clip(blurred, 0, 1)
     if noise > 0:

@@ -6,21 +6,20 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import Field, PlainValidator, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from shadowpuppet.camera import Camera
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.geometry import rigid, rotation_about
+from shadowpuppet.synthetic.furniture import Furniture, Obstacle, Place
 from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.paths import PathName
+from shadowpuppet.synthetic.viewpoint import STRICT, Name, Ring, Viewpoint
+from shadowpuppet.synthetic.walls import Background
 
-STRICT = ConfigDict(extra="forbid")
 MotionName = Literal[
     "stand", "wave_hands", "bend_aside", "bow_forward", "twist", "reach", "forearms_up", "overhead", "random",
     "walk", "jog", "box", "lift", "squat", "sit", "march", "jump", "turn_around", "random_body", "mocap",
 ]  # fmt: skip
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -54,46 +53,31 @@ class Gesture:
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
-class Viewpoint:
-    """A camera that looks horizontally, or pitched, at the vertical axis through the person's place."""
+class Bystander:
+    """Somebody else in the picture, who is not to be tracked. They are not in the film of the empty scene."""
 
-    name: Name = "cam"
-    """Its name: that of its films."""
-    size: tuple[Annotated[int, Field(ge=16, le=4096)], Annotated[int, Field(ge=16, le=4096)]] = (320, 240)
-    """Width and height of its pictures, pixels."""
-    fov_deg: Annotated[float, Field(ge=10, le=120)] = 60.0
-    """Horizontal field of view, degrees, before distortion."""
-    height: Annotated[float, Field(ge=0.05, le=6)] = 1.6
-    """Height over the floor, metres."""
-    distance: Annotated[float, Field(ge=0.8, le=20)] = 2.0
-    """Horizontal distance from the person's place, metres."""
-    azimuth_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """Where around the person it stands, degrees: 0 before them, 90 on their left."""
-    pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
-    """How far it looks down, degrees."""
-    distortion: tuple[float, ...] = ()
-    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; none for a perfect lens."""
+    kind: Literal["woman", "man", "child", "random"] = "random"
+    """Who it is; body and clothes are drawn."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of body and clothes."""
+    motion: MotionName = "stand"
+    """What they do all the time."""
+    ahead: Place = -1.0
+    """How far before the person they stand, metres; negative behind."""
+    left: Place = 0.9
+    """How far to the person's left they stand, metres."""
+    turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    """How far they are turned to their left, degrees; 0 looks where the person looks."""
 
     def __post_init__(self) -> None:
-        """The numbers of distortion must be a model's."""
-        if len(self.distortion) not in (0, 4, 5, 8):
-            raise ValueError(f"distortion: found {len(self.distortion)} numbers, expected 0, 4, 5 or 8")
-
-    def camera(self) -> Camera:
-        """The calibrated camera in the world: Z up, floor at 0, the person at the origin facing -Y."""
-        focal = self.size[0] / (2 * np.tan(np.radians(self.fov_deg) / 2))
-        matrix = np.array([[focal, 0, (self.size[0] - 1) / 2], [0, focal, (self.size[1] - 1) / 2], [0, 0, 1]])
-        around = rotation_about([0, 0, 1], np.radians(self.azimuth_deg))
-        level = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
-        R = rotation_about([1, 0, 0], np.radians(self.pitch_deg)) @ level @ around.T
-        centre = around @ np.array([0, -self.distance, self.height])
-        distortion = np.array(self.distortion) if self.distortion else np.zeros(4)
-        return Camera(self.name, self.size, matrix, distortion, rigid(R, -R @ centre))
+        """Two people need room for two."""
+        if np.hypot(self.ahead, self.left) < 0.5:
+            raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; expected 0.5 m of distance")
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Scene:
-    """Clothes, room and picture quality."""
+    """Clothes, room, what and who else is there, and picture quality."""
 
     clothing: Annotated[int, Field(ge=0)] = 1
     """Seed of clothes, hair and skin."""
@@ -105,6 +89,29 @@ class Scene:
     """Sensor noise: standard deviation in grey levels at middle grey."""
     empty_seconds: Annotated[float, Field(ge=0.2, le=60)] = 4.0
     """Length of the film of the empty scene."""
+    background: Background = "room"
+    """What is behind: a room with some posters, a plain wall and floor, a wall cluttered with shelves, or textured bricks and planks."""
+    camouflage: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """How near the colour of shirt and trousers is to the wall's: 0 as drawn, 1 the same."""
+    flicker: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share by which the lamps' brightness wobbles, in the empty scene, too."""
+    flicker_hz: Annotated[float, Field(gt=0, le=120)] = 1.7
+    """How often it wobbles in a second: the beat of mains and pictures that a film shows."""
+    drift: Annotated[float, Field(ge=-0.8, le=1)] = 0.0
+    """By which share the light has grown, or with a minus faded, at the end of the film."""
+    crf: Annotated[int, Field(ge=0, le=51)] = 18
+    """Compression of the films, H.264's constant rate factor: 0 lossless, 18 hardly visible, 35 coarse, 51 the worst."""
+    obstacles: tuple[Obstacle, ...] = ()
+    """Things that stand in the scene and hide what is behind them."""
+    bystanders: tuple[Bystander, ...] = ()
+    """Other people."""
+
+
+def _seed(value: Any) -> int | tuple[int, ...]:
+    numbers = list(value) if isinstance(value, (list, tuple)) else [value]
+    if not numbers or not all(isinstance(n, int) and not isinstance(n, bool) and n >= 0 for n in numbers):
+        raise ValueError(f"found {value!r}, expected a whole number from 0, or a list of them")
+    return tuple(numbers) if isinstance(value, (list, tuple)) else numbers[0]
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -119,6 +126,8 @@ class Spec:
     """Gestures, one after another."""
     cameras: Annotated[tuple[Viewpoint, ...], Field(min_length=1)] = (Viewpoint(),)
     """One camera, or several."""
+    ring: Ring | None = None
+    """Cameras around the person, in place of `cameras`."""
     scene: Scene = Scene()
     """Clothes, room and noise."""
     rate: Annotated[float, Field(ge=1, le=240)] = 15.0
@@ -129,12 +138,25 @@ class Spec:
     """Factor on sway and tremor: 0 is a robot."""
     tells: Literal["height and distance", "height", "distance", "nothing"] = "height and distance"
     """What recording.toml says of the subject."""
+    seed: Annotated[int | tuple[int, ...], PlainValidator(_seed)] = 0
+    """Seed of the motion's chance and of the noise, where no generator is given: a whole number, or several."""
 
     def __post_init__(self) -> None:
-        """Camera names must differ."""
+        """Camera names must differ, and no camera may stand in a thing."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")
+        if self.ring is not None and self.cameras != (Viewpoint(),):
+            raise ValueError("ring: found cameras as well, expected one of them")
+        things = Furniture(self.scene.obstacles)
+        for view in self.views() if things else ():
+            kind = things.holds(view.camera().centre)
+            if kind is not None:
+                raise ValueError(f"scene.obstacles: found a {kind} where the camera {view.name!r} stands")
+
+    def views(self) -> tuple[Viewpoint, ...]:
+        """The cameras: those of `cameras`, or the ring's."""
+        return self.cameras if self.ring is None else self.ring.views(self.body.stature)
 
 
 def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
@@ -146,8 +168,34 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
         place = ".".join(str(key) for key in first["loc"]) or "values"
         if first["type"] == "unexpected_keyword_argument":
             raise SettingsError(f"{source}: {place}: no such setting; possible are {_siblings(first['loc'])}") from None
-        found = "" if first["type"] in ("missing", "value_error") else f", found {first['input']!r}"
+        if first["type"] == "value_error":
+            told = first["msg"].removeprefix("Value error, ")
+            where = f"{place}: " if first["loc"] else ""
+            raise SettingsError(f"{source}: {where}{told}") from None
+        found = "" if first["type"] == "missing" else f", found {first['input']!r}"
         raise SettingsError(f"{source}: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}{found}") from None
+
+
+def spec_values(spec: Spec) -> dict[str, Any]:
+    """Plain values that `spec_from` makes the same spec of, and that TOML can hold: every setting, also where it is the default."""
+    from shadowpuppet.io._plain import for_toml, plain
+
+    values = for_toml(plain(spec, "spec"))
+    if spec.ring is not None:
+        del values["cameras"]
+    return values
+
+
+TABLES: dict[str, Any] = {
+    "body": Mannequin,
+    "motion": Gesture,
+    "cameras": Viewpoint,
+    "ring": Ring,
+    "scene": Scene,
+    "obstacles": Obstacle,
+    "bystanders": Bystander,
+}
+"""The tables of a spec, by name."""
 
 
 def _siblings(place: tuple[int | str, ...]) -> str:
@@ -156,5 +204,5 @@ def _siblings(place: tuple[int | str, ...]) -> str:
 
     kind: Any = Spec
     for key in place[:-1]:
-        kind = {"body": Mannequin, "motion": Gesture, "cameras": Viewpoint, "scene": Scene}.get(str(key), kind)
+        kind = TABLES.get(str(key), kind)
     return ", ".join(sorted(f.name for f in fields(kind)))

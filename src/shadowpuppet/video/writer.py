@@ -18,17 +18,19 @@ from shadowpuppet.video.pictures import check_image
 if TYPE_CHECKING:
     from av import VideoFrame
 
+CRF = 18
+"""Constant rate factor of H.264: the loss is hardly visible."""
 BT601, STUDIO_RANGE = 6, 1
 """FFmpeg's AVCOL_SPC_SMPTE170M and AVCOL_RANGE_MPEG: how colours are turned to video, said so that players need not guess."""
 
 
-def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False) -> FrameWriter:
+def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False, crf: int = CRF) -> FrameWriter:
     """Write a film of `rate` frames/s: `with write_frames("film.mp4", 25) as film: film.write(image)`.
 
-    H.264 (.mp4, .mov, .mkv; odd sizes get their last row or column twice), or with `lossless` FFV1 (.mkv; grey or in colour as
-    the first picture is). The film grows under the name `<name>.part.<ending>` and gets its own when all went well; what an
-    interrupted one has can be played from there. Raises `VideoError` where it cannot be written (no such folder, disk full, no
-    frames).
+    H.264 (.mp4, .mov, .mkv; odd sizes get their last row or column twice) of constant rate factor `crf`, 0 to 51, or with `lossless`
+    FFV1 (.mkv; grey or in colour as the first picture is). The film grows under the name `<name>.part.<ending>` and gets its own when
+    all went well; what an interrupted one has can be played from there. Raises `VideoError` where it cannot be written (no such
+    folder, disk full, no frames).
     """
     path, endings = Path(path), [".mkv"] if lossless else [".mkv", ".mov", ".mp4"]
     if path.suffix not in endings:
@@ -36,14 +38,15 @@ def write_frames(path: str | Path, rate: float, *, size: Size | None = None, los
         raise VideoError(f"{path}: found the ending {path.suffix!r}, a {kind} is written to {' or '.join(endings)}")
     if not 0.01 <= rate <= 10_000:
         raise VideoError(f"{path}: rate: found {rate}, expected 0.01 to 10000 frames/s")
-    return FrameWriter(path, rate, size, lossless)
+    return FrameWriter(path, rate, size, lossless, crf)
 
 
 class FrameWriter:
     """A film being written: a context manager with `write`. Made by `write_frames`."""
 
-    def __init__(self, path: Path, rate: float, size: Size | None, lossless: bool) -> None:
+    def __init__(self, path: Path, rate: float, size: Size | None, lossless: bool, crf: int = CRF) -> None:
         """Nothing is written before the first picture."""
+        self.crf = crf
         self.path, self.partial = path, path.with_name(f"{path.stem}.part{path.suffix}")
         self.rate, self.size, self.lossless = Fraction(rate).limit_denominator(1001), size, lossless
         self.count = 0
@@ -106,7 +109,7 @@ class FrameWriter:
         if self.lossless:
             codec, settings = "ffv1", {"level": "3", "slicecrc": "1", "g": "1"}
         else:
-            codec, settings = "libx264", {"preset": "veryfast", "crf": "18", "bf": "0", "g": str(max(1, round(self.rate)))}
+            codec, settings = "libx264", {"preset": "veryfast", "crf": str(self.crf), "bf": "0", "g": str(max(1, round(self.rate)))}
         stream: Any = container.add_stream(codec, rate=self.rate, options=settings)
         stream.width, stream.height = size_of(image)
         stream.pix_fmt = "yuv420p" if not self.lossless else "gray" if image.ndim == 2 else "bgr0"

@@ -1,0 +1,56 @@
+"""What a camera sees of one thing alone, and several of them put together by depth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.geometry import Array
+
+FAR = 1e9
+"""Depth where nothing is, metres."""
+
+
+class Layer(NamedTuple):
+    """One thing as a camera sees it."""
+
+    picture: Array
+    """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
+    alpha: Array
+    """Share of each pixel that the thing covers, of shape (H, W)."""
+    depth: Array
+    """Distance from the camera along the ray of each pixel's centre, of shape (H, W), metres; `FAR` where it is missed."""
+
+    @property
+    def reach(self) -> Array:
+        """The depth, (H, W), also where a thing covers a part of the pixel but not its centre: that of the nearest neighbour."""
+        import cv2
+
+        around = cv2.erode(self.depth, np.ones((3, 3)))
+        return np.where((self.depth >= FAR) & (self.alpha > 0), around, self.depth)
+
+
+def composed(room: Array, layers: Sequence[Layer]) -> Array:
+    """Layers over the room's picture (H, W, 3), at each pixel the farthest first."""
+    depth = np.stack([layer.reach for layer in layers])
+    order = np.argsort(-depth, axis=0, kind="stable")
+    picture = room
+    for rank in order:
+        light = np.zeros_like(room)
+        clear = np.ones(room.shape[:2])
+        for n, layer in enumerate(layers):
+            here = rank == n
+            light[here] = layer.picture[here]
+            clear[here] -= layer.alpha[here]
+        picture = light + clear[..., None] * picture
+    return picture
+
+
+def in_front(layer: Layer, others: Sequence[Layer]) -> np.ndarray:
+    """Where (H, W) a layer is nearer than all others, at pixel centres."""
+    shown = layer.depth < FAR
+    for other in others:
+        shown &= layer.depth < other.depth
+    return shown

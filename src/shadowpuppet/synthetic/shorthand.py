@@ -1,0 +1,163 @@
+"""Specs from a few words: what is often wanted, each a flag of the command line."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, fields
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from shadowpuppet.errors import SettingsError
+from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.spec import Gesture, Spec, spec_from, spec_values
+from shadowpuppet.synthetic.viewpoint import STRICT
+from shadowpuppet.synthetic.walls import Background
+
+OBSTACLES: dict[str, dict[str, float]] = {
+    "table": {"ahead": 0.75},
+    "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
+    "pillar": {"ahead": 0.9, "left": 0.2},
+    "cabinet": {"ahead": 0.7, "left": 0.35},
+}
+"""Where `occluder` puts things."""
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class Shorthand:
+    """What is often wanted of a made recording; None leaves the spec as it is."""
+
+    motion: str | None = None
+    """Gestures in turn with their seconds, such as "wave_hands 4, reach 5"; those without share --seconds, or take 4 each."""
+    seconds: Annotated[float, Field(ge=2, le=3600)] | None = None
+    """Length of the motion; the film has 0.8 s of standing before and after it."""
+    body: Literal["woman", "man", "child", "random"] | None = None
+    """Who it is: woman, man, child or random; drawn by the seed from published proportions."""
+    height: float | None = None
+    """Height of the person, metres."""
+    cameras: Annotated[int, Field(ge=1, le=64)] | None = None
+    """How many; several stand in a ring around the person."""
+    ring_radius: float | None = None
+    """Distance of the ring's cameras from the person's place, metres."""
+    distance: float | None = None
+    """Distance of a single camera from the person's place, metres."""
+    camera_height: float | None = None
+    """Height of the cameras over the floor, metres."""
+    fov: float | None = None
+    """Horizontal field of view of the cameras, degrees."""
+    fisheye: bool | None = None
+    """Fisheye lenses."""
+    size: str | None = None
+    """Width and height of the pictures, such as 640x480."""
+    rate: float | None = None
+    """Pictures a second."""
+    background: Background | None = None
+    """What is behind: room, plain, cluttered or textured."""
+    room: int | None = None
+    """Seed of wall, floor and lamps."""
+    clothing: int | None = None
+    """Seed of clothes, hair and skin."""
+    camouflage: float | None = None
+    """How near the clothes' colour is to the wall's, 0 to 1."""
+    shadow: float | None = None
+    """How dark the person's shadow is on floor and wall, 0 to 1."""
+    noise: float | None = None
+    """Sensor noise: standard deviation in grey levels."""
+    flicker: float | None = None
+    """Share by which the lamps' brightness wobbles, such as 0.03."""
+    drift: float | None = None
+    """By which share the light has grown, or with a minus faded, at the end."""
+    crf: int | None = None
+    """Compression of the films, H.264's crf: 0 lossless to 51 the worst."""
+    occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
+    """What stands between the person and the first camera: table, chair, pillar or cabinet."""
+    second_person: Literal["behind", "aside"] | None = None
+    """Where somebody else stands: behind or aside."""
+
+
+PLAIN = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
+"""Words that are settings of the scene."""
+LENSES = {"fov": "fov_deg", "camera_height": "height", "fisheye": "fisheye"}
+"""Words that are settings of every camera."""
+
+
+def expanded(words: Shorthand, spec: Spec, source: str = "flags") -> Spec:
+    """A spec with what the words say in place of its own. Raises `SettingsError`: one sentence on what cannot be."""
+    said = {field.name: value for field in fields(Shorthand) if (value := getattr(words, field.name)) is not None}
+    values = spec_values(spec)
+    values["scene"] |= {name: said[name] for name in PLAIN if name in said}
+    values |= {name: said[name] for name in ("rate",) if name in said}
+    if {"motion", "seconds"} & set(said):
+        values["motion"] = _motion(said.get("motion"), said.get("seconds"), spec, source)
+    if "body" in said:
+        kind = None if said["body"] == "random" else said["body"]
+        values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind))
+    if "height" in said:
+        values["body"]["stature"] = said["height"]
+    _place_cameras(values, said, source)
+    if "occluder" in said:
+        values["scene"]["obstacles"] = [{"kind": said["occluder"], **OBSTACLES[said["occluder"]]}]
+    if "second_person" in said:
+        place = {"behind": {"ahead": -1.0, "left": 0.5}, "aside": {"ahead": 0.0, "left": 1.0}}[said["second_person"]]
+        values["scene"]["bystanders"] = [place]
+    return spec_from(values, source)
+
+
+def gestures_from(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:
+    """Gestures from `name seconds, name seconds`; those without seconds share what is left of `seconds`, or take 4 each."""
+    items = [item.split() for item in text.split(",")]
+    for item in items:
+        if not 1 <= len(item) <= 2 or (len(item) == 2 and not re.fullmatch(r"\d+(\.\d*)?", item[1])):
+            raise SettingsError(f"{source}: found {' '.join(item)!r}, expected gestures and their seconds: name 4, name 5")
+    fixed, open_ = sum(float(item[1]) for item in items if len(item) == 2), sum(len(item) == 1 for item in items)
+    if seconds is not None and not open_:
+        raise SettingsError(f"{source}: found seconds for every gesture and {seconds:g} for all, expected one of them")
+    each = 4.0 if seconds is None else (seconds - fixed) / open_ if open_ else 0.0
+    if open_ and each < 2:
+        raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least 2")
+    values = [{"motion": item[0], "seconds": float(item[1]) if len(item) == 2 else each} for item in items]
+    return spec_from({"motion": values}, source).motion
+
+
+def _motion(text: str | None, seconds: float | None, spec: Spec, source: str) -> list[dict[str, Any]]:
+    """Plain gestures: those of the text, or the spec's own at other lengths."""
+    if text is not None:
+        return [asdict(gesture) for gesture in gestures_from(text, seconds, f"{source}: motion")]
+    assert seconds is not None
+    scale = seconds / sum(gesture.seconds for gesture in spec.motion)
+    return [asdict(gesture) | {"seconds": gesture.seconds * scale} for gesture in spec.motion]
+
+
+def _place_cameras(values: dict[str, Any], said: dict[str, Any], source: str) -> None:
+    """Change the cameras of a spec's plain values: all of them, or from one to a ring and back."""
+    placed = values.get("cameras") or [spec_values(Spec())["cameras"][0]]
+    single, count = placed[0], len(placed)
+    lens = {key: single[key] for key in ("size", "fov_deg", "distortion", "fisheye", "height")}
+    if said.get("cameras", 1) > 1 and count == 1:
+        values["ring"] = values.get("ring", lens) | {"count": said["cameras"]}
+    elif said.get("cameras", count) not in (1, count):
+        raise SettingsError(f"{source}: cameras: found {said['cameras']}, but the spec places its {count} cameras itself")
+    elif said.get("cameras") == 1:
+        values.pop("ring", None)
+        values["cameras"] = [single]
+    for word, key in (("ring_radius", "radius"), ("distance", "distance")):
+        if word in said and ("ring" in values) != (word == "ring_radius"):
+            other = "several cameras (--cameras 7)" if word == "ring_radius" else "a camera that is in no ring (for one, --ring-radius)"
+            raise SettingsError(f"{source}: {word.replace('_', '-')}: found {said[word]:g}, which needs {other}")
+        if word in said and word == "ring_radius":
+            values["ring"][key] = said[word]
+    if "ring" in values:
+        values.pop("cameras", None)
+    for camera in [values["ring"]] if "ring" in values else values["cameras"]:
+        camera |= {key: said[word] for word, key in LENSES.items() if word in said}
+        camera |= {"distance": said["distance"]} if "distance" in said else {}
+        camera |= {"size": _size(said["size"], source)} if "size" in said else {}
+
+
+def _size(text: str, source: str) -> list[int]:
+    found = re.fullmatch(r"(\d{1,5})\s*[x×,]\s*(\d{1,5})", text.strip())
+    if found is None:
+        raise SettingsError(f"{source}: size: found {text!r}, expected width and height in pixels, such as 640x480")
+    return [int(found[1]), int(found[2])]

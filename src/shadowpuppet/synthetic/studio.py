@@ -1,0 +1,129 @@
+"""One camera of a recording, with everything that it sees: takes pictures."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.clothes import Clothes
+from shadowpuppet.synthetic.furniture import Furniture
+from shadowpuppet.synthetic.kinematics import Figure
+from shadowpuppet.synthetic.layers import Layer, composed, in_front
+from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.parts import dressed
+from shadowpuppet.synthetic.renderer import Renderer
+from shadowpuppet.synthetic.scene import Room, brightness, exposed
+from shadowpuppet.synthetic.spec import Bystander, Spec
+
+CLEAR = 0.4
+"""Metres that the wall keeps from the joints of whoever comes nearest."""
+
+
+class Picture(NamedTuple):
+    """A picture with what is exactly known of it."""
+
+    image: np.ndarray
+    """Of shape (H, W, 3), blue green red, uint8."""
+    mask: np.ndarray
+    """The visible part of the person who is tracked, of shape (H, W), uint8, 0 or 255."""
+    people: np.ndarray
+    """The visible parts of everybody, of shape (H, W), uint8, 0 or 255; the mask itself where nobody else is."""
+    hidden: int
+    """How many pixels of the person obstacles and other people hide."""
+
+
+class Studio:
+    """One camera with the person, their clothes and the room; others, and things, where the spec has them."""
+
+    def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator, others: Sequence[Figure] = (), least: float = 0.0) -> None:
+        """rng: of the noise; clothes and room have their own seeds in the spec.
+
+        others: figures of `spec.scene.bystanders`, at the same times as the person's; least: how far behind the person (m)
+        the wall must be.
+        """
+        scene = spec.scene
+        least = max([least, *(view.distance + 1 for view in spec.views() if abs(view.azimuth_deg) > 60)])
+        furniture = Furniture(scene.obstacles)
+        self.room = Room(camera, np.random.default_rng(scene.room), scene.shadow, least, scene.background, furniture)
+        clothes = Clothes.draw(np.random.default_rng(scene.clothing))
+        if scene.camouflage:
+            clothes = _camouflaged(clothes, self.room.wall_colour, scene.camouflage)
+        self.renderer = Renderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
+        self.spec, self.rng = spec, rng
+        self.others = [(figure, self._of(bystander, camera)) for figure, bystander in zip(others, scene.bystanders, strict=True)]
+        self.things = []
+        if furniture:
+            fine = self.renderer.fine_rays()
+            self.things = [furniture.layer(camera.centre, self.renderer.rays, fine, self.room.lights)]
+        self._length = 0.0
+
+    def _of(self, bystander: Bystander, camera: Camera) -> Renderer:
+        clothes = Clothes.draw(np.random.default_rng([bystander.seed, 1]))
+        return Renderer(camera, dressed(body_of(bystander), clothes), clothes, self.room.lights)
+
+    def empty(self, index: int = 0, count: int = 1) -> np.ndarray:
+        """Picture `index` of `count` without anybody, (H, W, 3) BGR, before the film begins."""
+        light = composed(self.room.picture, self.things) if self.things else self.room.picture
+        return self._exposed(light, (index - count) / self.spec.rate)
+
+    def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255."""
+        light, mask, *_ = self._lit(figure, index)
+        return self._exposed(light, 0.0), mask
+
+    def film(self, figure: Figure, workers: int = 2) -> Iterator[Picture]:
+        """Pictures of all postures, one after another; `workers` threads draw ahead, the noise is drawn in order."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        count = len(figure.joints)
+        self._length = (count - 1) / self.spec.rate
+        with ThreadPoolExecutor(workers) as pool:
+            ahead = deque(pool.submit(self._lit, figure, index, True) for index in range(min(2 * workers, count)))
+            for index in range(count):
+                light, mask, people, hidden = ahead.popleft().result()
+                if index + 2 * workers < count:
+                    ahead.append(pool.submit(self._lit, figure, index + 2 * workers, True))
+                yield Picture(self._exposed(light, index / self.spec.rate), mask, people, hidden)
+
+    def _lit(self, figure: Figure, index: int, company: bool = False) -> tuple[Array, np.ndarray, np.ndarray, int]:
+        """Light, mask, everybody's mask and how much is hidden; `company`: with the bystanders."""
+        shot = self.renderer.draw(figure, index)
+        others = self.others if company else []
+        room = self.room.shaded(figure, index, *(other for other, _ in others))
+        if not (others or self.things):
+            return shot.picture + (1 - shot.alpha[..., None]) * room, shot.mask, shot.mask, 0
+        person = Layer(shot.picture, shot.alpha, shot.depth)
+        drawn = [renderer.draw(other, index) for other, renderer in others]
+        company_layers = [Layer(other.picture, other.alpha, other.depth) for other in drawn]
+        rest = [*company_layers, *self.things]
+        seen = in_front(person, rest)
+        people = seen.copy()
+        for n, layer in enumerate(company_layers):
+            people |= in_front(layer, [person, *rest[:n], *rest[n + 1 :]])
+        return composed(room, [person, *rest]), _mask(seen), _mask(people), int(((shot.mask > 0) & ~seen).sum())
+
+    def _exposed(self, light: Array, seconds: float) -> np.ndarray:
+        scene = self.spec.scene
+        return exposed(light, scene.noise, self.rng, brightness(scene, seconds, self._length))[..., ::-1]
+
+
+def body_of(bystander: Bystander) -> Mannequin:
+    """The body that a bystander's seed draws."""
+    kind = None if bystander.kind == "random" else bystander.kind
+    return Mannequin.draw(np.random.default_rng([bystander.seed, 0]), kind)
+
+
+def _camouflaged(clothes: Clothes, wall: Array, share: float) -> Clothes:
+    """Clothes whose shirt and trousers are by `share` of the wall's colour."""
+    near = {name: tuple((1 - share) * np.array(clothes.colours[name]) + share * wall) for name in ("shirt", "trousers")}
+    return replace(clothes, colours=clothes.colours | near, stripes=(1 - share) * clothes.stripes)
+
+
+def _mask(seen: np.ndarray) -> np.ndarray:
+    return np.where(seen, 255, 0).astype(np.uint8)

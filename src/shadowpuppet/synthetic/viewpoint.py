@@ -1,0 +1,146 @@
+"""Where cameras stand and how they see: one by one, or a ring of them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import inverse, rigid, rotation_about, transform
+
+STRICT = ConfigDict(extra="forbid")
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+Side = Annotated[int, Field(ge=16, le=4096)]
+Angle = Annotated[float, Field(ge=-180, le=180)]
+FovDeg = Annotated[float, Field(ge=10, le=170)]
+Height = Annotated[float, Field(ge=0.05, le=6)]
+Distance = Annotated[float, Field(ge=0.8, le=20)]
+WIDEST = 120.0
+"""Widest horizontal field of view of a lens that is no fisheye, degrees."""
+SLACK = 8
+"""Pixels beyond the picture's border that the renderer's tiles may look at."""
+MIDDLE = 0.52
+"""Height of a person's middle, fraction of the stature."""
+JITTER = {"azimuth_deg": 7.0, "height": 0.25, "yaw_deg": 3.0, "pitch_deg": 3.0, "roll_deg": 4.0}
+"""How far a ring's cameras stray at most, with a jitter of 1; distance and focal length by `STRAY` of themselves."""
+STRAY = 0.07
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class Viewpoint:
+    """A camera that looks horizontally, or pitched, at the vertical axis through the person's place."""
+
+    name: Name = "cam"
+    """Its name: that of its films."""
+    size: tuple[Side, Side] = (320, 240)
+    """Width and height of its pictures, pixels."""
+    fov_deg: FovDeg = 60.0
+    """Horizontal field of view, degrees, before distortion; up to 120, a fisheye's to 170."""
+    height: Height = 1.6
+    """Height over the floor, metres."""
+    distance: Distance = 2.0
+    """Horizontal distance from the person's place, metres."""
+    azimuth_deg: Angle = 0.0
+    """Where around the person it stands, degrees: 0 before them, 90 on their left."""
+    pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
+    """How far it looks down, degrees."""
+    distortion: tuple[float, ...] = ()
+    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]], a fisheye's k1 k2 k3 k4; none for a perfect lens."""
+    yaw_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
+    """How far it looks past the person, to its right, degrees."""
+    roll_deg: Angle = 0.0
+    """How far it is turned about its own axis, clockwise as it looks, degrees."""
+    fisheye: bool = False
+    """Whether the lens is a fisheye (OpenCV's model, equidistant without distortion)."""
+
+    def __post_init__(self) -> None:
+        """The numbers of distortion must be a model's, and every pixel must see something."""
+        allowed = (0, 4) if self.fisheye else (0, 4, 5, 8)
+        if len(self.distortion) not in allowed:
+            expected = f"{', '.join(map(str, allowed[:-1]))} or {allowed[-1]}"
+            raise ValueError(f"distortion: found {len(self.distortion)} numbers, expected {expected}")
+        if not np.isfinite(self.distortion).all():
+            raise ValueError(f"distortion: found {list(self.distortion)}, expected finite numbers")
+        if self.fov_deg > WIDEST and not self.fisheye:
+            raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {WIDEST:g}, or fisheye = true")
+        corner = self.fov_deg / 2 * np.hypot(self.size[0] + 2 * SLACK, self.size[1] + 2 * SLACK) / self.size[0]
+        if self.fisheye and corner > 88:
+            most = np.floor(self.fov_deg * 88 / corner)
+            raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {most:g} for a fisheye of this shape: corners see farther")
+        if (any(self.distortion) or self.fisheye) and not _sees_everywhere(self.camera()):
+            raise ValueError(f"distortion: found {list(self.distortion)}, which bends the picture so far that its border shows nothing")
+
+    def camera(self) -> Camera:
+        """The calibrated camera in the world: Z up, floor at 0, the person at the origin facing -Y."""
+        half = np.radians(self.fov_deg) / 2
+        focal = self.size[0] / (2 * (half if self.fisheye else np.tan(half)))
+        matrix = np.array([[focal, 0, (self.size[0] - 1) / 2], [0, focal, (self.size[1] - 1) / 2], [0, 0, 1]])
+        around = rotation_about([0, 0, 1], np.radians(self.azimuth_deg))
+        level = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+        R = rotation_about([1, 0, 0], np.radians(self.pitch_deg)) @ level @ around.T
+        if self.yaw_deg or self.roll_deg:
+            aside = rotation_about([0, 1, 0], np.radians(-self.yaw_deg))
+            R = rotation_about([0, 0, 1], np.radians(-self.roll_deg)) @ aside @ R
+        centre = around @ np.array([0, -self.distance, self.height])
+        distortion = np.array(self.distortion) if self.distortion else np.zeros(4)
+        return Camera(self.name, self.size, matrix, distortion, rigid(R, -R @ centre), fisheye=self.fisheye)
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class Ring:
+    """Cameras evenly around the person, all looking at their middle, each a little off as real ones are."""
+
+    count: Annotated[int, Field(ge=2, le=64)] = 7
+    """How many; they are called cam1, cam2, ..."""
+    radius: Distance = 3.5
+    """Horizontal distance from the person's place, metres."""
+    height: Height = 1.6
+    """Height over the floor, metres."""
+    start_deg: Angle = 0.0
+    """Where around the person the first stands, degrees: 0 before them, 90 on their left; the others follow toward their left."""
+    jitter: Annotated[float, Field(ge=0, le=1)] = 0.3
+    """How irregular place, direction and focal length are: 0 a perfect ring; 1 up to 7 degrees, 25 cm, 7 % of the radius."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the irregularities."""
+    size: tuple[Side, Side] = (320, 240)
+    """Width and height of the pictures, pixels."""
+    fov_deg: FovDeg = 60.0
+    """Horizontal field of view, degrees, before distortion."""
+    distortion: tuple[float, ...] = ()
+    """As of a single camera."""
+    fisheye: bool = False
+    """As of a single camera."""
+
+    def __post_init__(self) -> None:
+        """Every camera must be possible, whatever the person's height."""
+        for stature in (0.9, 2.2):
+            self.views(stature)
+
+    def views(self, stature: float) -> tuple[Viewpoint, ...]:
+        """The cameras around a person of a `stature` (m), in turn."""
+        rng, views = np.random.default_rng(self.seed), []
+        for n in range(self.count):
+            off = {name: self.jitter * most * rng.uniform(-1, 1) for name, most in JITTER.items()}
+            distance = float(np.clip(self.radius * (1 + self.jitter * STRAY * rng.uniform(-1, 1)), 0.8, 20))
+            fov = float(np.clip(self.fov_deg * (1 + self.jitter * STRAY * rng.uniform(-1, 0)), 10, 170))
+            height = float(np.clip(self.height + off["height"], 0.05, 6))
+            down = np.degrees(np.arctan2(height - MIDDLE * stature, distance)) + off["pitch_deg"]
+            azimuth = (self.start_deg + 360 * n / self.count + off["azimuth_deg"] + 180) % 360 - 180
+            views.append(Viewpoint(name=f"cam{n + 1}", size=self.size, fov_deg=fov, height=height, distance=distance,
+                                   azimuth_deg=float(azimuth), pitch_deg=float(np.clip(down, -60, 60)), yaw_deg=off["yaw_deg"],
+                                   roll_deg=off["roll_deg"], distortion=self.distortion, fisheye=self.fisheye))  # fmt: skip
+        return tuple(views)
+
+
+def _sees_everywhere(camera: Camera) -> bool:
+    """Whether every pixel's ray leads back to the pixel: distortion beyond what its polynomial can do folds the picture."""
+    width, height = camera.size
+    pixels = np.stack(np.meshgrid(np.linspace(-SLACK, width + SLACK, 17), np.linspace(-SLACK, height + SLACK, 17)), -1)
+    rays = camera.rays(pixels)
+    if not np.isfinite(rays).all() or np.abs(rays).max() > 60:
+        return False
+    turned = transform(inverse(camera.T_camera_world), rays)
+    return bool(np.abs(camera.project(turned) - pixels).max() < 0.1)
