@@ -46,6 +46,8 @@ class Renderer:
         self.rays = _unit(camera.rays(np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)) @ R.T)
         self.across, down = -(-width // TILE), -(-height // TILE)
         corner = np.stack(np.meshgrid(np.arange(self.across + 1), np.arange(down + 1)), -1) * float(TILE) - 0.5
+        if camera.fisheye:  # beyond the border of its picture it may see nothing
+            corner = np.minimum(corner, np.array([width, height]) - 0.5)
         corners = _unit(camera.rays(corner) @ R.T)
         corners = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]])
         self.direction = _unit(corners.mean(0)).reshape(-1, 3)

@@ -172,6 +172,9 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
             told = first["msg"].removeprefix("Value error, ")
             where = f"{place}: " if first["loc"] else ""
             raise SettingsError(f"{source}: {where}{told}") from None
+        if first["type"] in ("dataclass_type", "tuple_type"):
+            wanted = "a table" if first["type"] == "dataclass_type" else "a list"
+            raise SettingsError(f"{source}: {place}: found {first['input']!r}, expected {wanted}")
         found = "" if first["type"] == "missing" else f", found {first['input']!r}"
         raise SettingsError(f"{source}: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}{found}") from None
 

@@ -21,7 +21,7 @@ Distance = Annotated[float, Field(ge=0.8, le=20)]
 WIDEST = 120.0
 """Widest horizontal field of view of a lens that is no fisheye, degrees."""
 SLACK = 8
-"""Pixels beyond the picture's border that the renderer's tiles may look at."""
+"""Pixels beyond the border of a picture, unless it is a fisheye's, that the renderer's tiles may look at."""
 MIDDLE = 0.52
 """Height of a person's middle, fraction of the stature."""
 JITTER = {"azimuth_deg": 7.0, "height": 0.25, "yaw_deg": 3.0, "pitch_deg": 3.0, "roll_deg": 4.0}
@@ -66,7 +66,7 @@ class Viewpoint:
             raise ValueError(f"distortion: found {list(self.distortion)}, expected finite numbers")
         if self.fov_deg > WIDEST and not self.fisheye:
             raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {WIDEST:g}, or fisheye = true")
-        corner = self.fov_deg / 2 * np.hypot(self.size[0] + 2 * SLACK, self.size[1] + 2 * SLACK) / self.size[0]
+        corner = self.fov_deg / 2 * np.hypot(*self.size) / self.size[0]
         if self.fisheye and corner > 88:
             most = np.floor(self.fov_deg * 88 / corner)
             raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {most:g} for a fisheye of this shape: corners see farther")
@@ -137,8 +137,8 @@ class Ring:
 
 def _sees_everywhere(camera: Camera) -> bool:
     """Whether every pixel's ray leads back to the pixel: distortion beyond what its polynomial can do folds the picture."""
-    width, height = camera.size
-    pixels = np.stack(np.meshgrid(np.linspace(-SLACK, width + SLACK, 17), np.linspace(-SLACK, height + SLACK, 17)), -1)
+    (width, height), slack = camera.size, 0.5 if camera.fisheye else SLACK
+    pixels = np.stack(np.meshgrid(np.linspace(-slack, width - 1 + slack, 17), np.linspace(-slack, height - 1 + slack, 17)), -1)
     rays = camera.rays(pixels)
     if not np.isfinite(rays).all() or np.abs(rays).max() > 60:
         return False
