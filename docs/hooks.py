@@ -3,6 +3,7 @@
 In a page, a line of its own is replaced:
 
     <!-- settings: TABLE -->   a table of `Options` ([tracker.torso]), a row a setting; without TABLE those that are in none
+    <!-- spec: TABLE -->       the same of a made recording's spec; without TABLE those that are in none
     <!-- help: COMMAND -->     what `shadowpuppet COMMAND --help` prints
     <!-- presets -->           what each preset changes
     <!-- example: FILE -->     the code of examples/FILE
@@ -16,16 +17,17 @@ import subprocess
 import sys
 import types
 from collections.abc import Iterator
-from dataclasses import is_dataclass
+from dataclasses import MISSING, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import tomli_w
 
-from shadowpuppet.options import Options, settings_of
+from shadowpuppet.options import Options, default_of, settings_of
 from shadowpuppet.settings import PRESETS
+from shadowpuppet.synthetic.spec import TABLES, Spec
 
-MARKER = re.compile(r"^<!-- (settings|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
+MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
 QUOTES = '"""'
 SIGNS = {"ge": "from", "gt": "over", "le": "to", "lt": "under"}
 WORDS = {bool: "true, false", int: "whole number", float: "number", str: "text"}
@@ -50,6 +52,19 @@ def settings_table(table: str = "") -> str:
         else:
             cells = (f"`{field.name}`", "" if default is None else f"`{_plain(default)}`", _possible(kind), told)
             rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows)
+
+
+def spec_table(table: str = "") -> str:
+    """A row for each setting of a spec, or of one of its tables."""
+    rows = ["| setting | default | possible | what it is |", "|---|---|---|---|"]
+    for field, kind, told in settings_of(TABLES[table] if table else Spec):
+        default = default_of(field)
+        if field.name in TABLES and field.name != table and "Literal" not in str(kind):
+            rows.append(f"| [`{field.name}`](#{field.name}) | | | {told} |")
+        else:
+            shown = "" if default is None or default is MISSING else f"`{_plain(default)}`"
+            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{field.name}`", shown, _possible(kind), told)) + " |")
     return "\n".join(rows)
 
 
@@ -78,7 +93,7 @@ def example(name: str) -> str:
     return f"```python\n{code.split(QUOTES)[2].strip()}\n```"
 
 
-MAKERS = {"settings": settings_table, "help": help_text, "presets": presets, "example": example}
+MAKERS = {"settings": settings_table, "spec": spec_table, "help": help_text, "presets": presets, "example": example}
 
 
 def _plain(value: Any) -> str:

@@ -1,19 +1,21 @@
-"""Make docs/assets/demo.png from the demo: python docs/make_pictures.py [DEMO_FOLDER]; without a folder, the demo runs first."""
+"""Make docs/assets/demo.png and scenes.png: python docs/make_pictures.py [DEMO_FOLDER]; without a folder, the demo runs first."""
 
 from __future__ import annotations
 
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from shadowpuppet.demo import run_demo
 from shadowpuppet.options import Options
+from shadowpuppet.synthetic import spec_from, synthesize
 from shadowpuppet.video import open_frames, write_image
 
-TARGET = Path(__file__).parent / "assets" / "demo.png"
+ASSETS = Path(__file__).parent / "assets"
 TIMES = (1.9, 7.3, 9.9, 11.6)
 """Seconds: waving, bending aside, bowing, reaching."""
 HEIGHT, GREYS = 560, 6
@@ -32,18 +34,52 @@ def shown(film: Path) -> np.ndarray:
     return np.asarray(small // GREYS * GREYS, np.uint8)
 
 
+SCENES: dict[str, dict[str, Any]] = {
+    "ring": {"ring": {"count": 4, "radius": 3.2, "jitter": 0.5, "start_deg": -25}, "scene": {"background": "cluttered", "room": 4}},
+    "fisheye": {"cameras": [{"fisheye": True, "fov_deg": 125, "distance": 1.2}], "scene": {"background": "textured", "clothing": 5}},
+    "pillar": {"scene": {"obstacles": [{"kind": "pillar", "ahead": 0.9, "left": 0.2}], "clothing": 7, "room": 2}},
+    "second": {"cameras": [{"distance": 2.6}], "scene": {"bystanders": [{"ahead": 0.5, "left": 0.33, "kind": "child"}], "room": 6}},
+    "camouflage": {"scene": {"camouflage": 0.9, "background": "plain", "room": 3, "shadow": 0.4}},
+}
+"""Specs of the second picture."""
+SHOWN, WIDTH = 7, 240
+"""The frame that is shown, and its width, pixels."""
+
+
+def scenes(folder: Path) -> np.ndarray:
+    """Films of `SCENES`, each with the exact silhouette's outline, four in a row."""
+    tiles = []
+    for name, values in SCENES.items():
+        gesture, calm = {"motion": "wave_hands", "seconds": 3}, {"noise": 0.0, "crf": 8}
+        spec = spec_from({"motion": [gesture], "rate": 4} | values | {"scene": values["scene"] | calm})
+        made = synthesize(spec, folder / name)
+        for film in sorted((made / "video").iterdir()):
+            image, mask = (list(open_frames(path))[SHOWN].image for path in (film, made / "masks" / f"{film.stem}.mkv"))
+            large = cv2.resize(image, (WIDTH, WIDTH * 3 // 4), interpolation=cv2.INTER_AREA)
+            outline = cv2.resize(mask.max(-1) if mask.ndim == 3 else mask, (WIDTH, WIDTH * 3 // 4), interpolation=cv2.INTER_LINEAR)
+            edges, _ = cv2.findContours((outline > 127).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+            tiles.append(cv2.drawContours(large, edges, -1, (60, 220, 60), 1))
+    sheet = np.concatenate([np.concatenate(tiles[n : n + 4], 1) for n in (0, 4)])
+    return np.asarray(sheet // GREYS * GREYS, np.uint8)
+
+
 def main() -> None:
-    """Write the picture, from a demo that was made or is made now."""
+    """Write the pictures, from a demo that was made or is made now."""
     with tempfile.TemporaryDirectory() as made:
         folder = Path(sys.argv[1] if len(sys.argv) > 1 else made)
         if len(sys.argv) < 2:
             run_demo(folder, Options(overlay=True))
-        TARGET.parent.mkdir(exist_ok=True)
-        write_image(TARGET, shown(folder / "run" / "overlay.mp4"))
-    size = TARGET.stat().st_size
-    print(f"{TARGET}: {size} bytes")
+        ASSETS.mkdir(exist_ok=True)
+        _write("demo.png", shown(folder / "run" / "overlay.mp4"))
+        _write("scenes.png", scenes(Path(made) / "scenes"))
+
+
+def _write(name: str, image: np.ndarray) -> None:
+    write_image(ASSETS / name, image)
+    size = (ASSETS / name).stat().st_size
+    print(f"{ASSETS / name}: {size} bytes")
     if size > LARGEST:
-        sys.exit(f"{TARGET}: found {size} bytes, expected at most {LARGEST}")
+        sys.exit(f"{ASSETS / name}: found {size} bytes, expected at most {LARGEST}")
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ class Shorthand:
     drift: float | None = None
     """By which share the light has grown, or with a minus faded, at the end."""
     crf: int | None = None
-    """Compression of the films, H.264's crf: 0 lossless to 51 the worst."""
+    """Compression of the films, H.264's crf: 0 the best, 18 as usual, 51 the worst."""
     occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
     """What stands between the person and the first camera: table, chair, pillar or cabinet."""
     second_person: Literal["behind", "aside"] | None = None

@@ -100,7 +100,7 @@ class Scene:
     drift: Annotated[float, Field(ge=-0.8, le=1)] = 0.0
     """By which share the light has grown, or with a minus faded, at the end of the film."""
     crf: Annotated[int, Field(ge=0, le=51)] = 18
-    """Compression of the films, H.264's constant rate factor: 0 lossless, 18 hardly visible, 35 coarse, 51 the worst."""
+    """Compression of the films, H.264's constant rate factor: 0 keeps all but half of the colour's detail, 18 is hardly visible, 35 coarse, 51 the worst."""
     obstacles: tuple[Obstacle, ...] = ()
     """Things that stand in the scene and hide what is behind them."""
     bystanders: tuple[Bystander, ...] = ()
