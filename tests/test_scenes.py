@@ -17,7 +17,7 @@ from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring
 from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
 from shadowpuppet.synthetic.kinematics import SEGMENTS, Figure, pose
-from shadowpuppet.synthetic.layers import FAR, Layer, composed, in_front
+from shadowpuppet.synthetic.layers import FAR, Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.renderer import Renderer
@@ -409,6 +409,22 @@ def test_layers_go_over_one_another_by_depth_whatever_their_order(values):
     nearest = min(range(len(values)), key=lambda n: values[n][2])
     for n, one in enumerate(layers):
         assert in_front(one, layers[:n] + layers[n + 1 :]).all() == (n == nearest)
+
+
+@given(seed=st.integers(0, 999), people=st.integers(1, 2), things=st.integers(0, 2))
+@settings(max_examples=30, deadline=None)
+def test_people_are_sorted_in_where_they_are_as_everywhere(seed, people, things):
+    rng = np.random.default_rng(seed)
+    layers = []
+    for _ in range(people + things):
+        inside = np.zeros((9, 11), bool)
+        top, left = rng.integers(0, 9), rng.integers(0, 11)
+        inside[top : top + rng.integers(0, 5), left : left + rng.integers(0, 5)] = True
+        alpha = np.where(inside, rng.choice([0.3, 1.0], inside.shape), 0.0)
+        depth = np.where(alpha > 0.5, rng.uniform(1, 3, alpha.shape), FAR)
+        layers.append(Layer(rng.uniform(size=(9, 11, 3)) * alpha[..., None], alpha, depth))
+    room = rng.uniform(size=(9, 11, 3))
+    np.testing.assert_allclose(pictured(room, layers[:people], layers[people:]), composed(room, layers), atol=1e-12)
 
 
 def test_a_half_covered_pixel_counts_at_its_neighbours_depth():

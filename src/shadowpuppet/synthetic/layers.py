@@ -31,9 +31,31 @@ class Layer(NamedTuple):
         around = cv2.erode(self.depth, np.ones((3, 3)))
         return np.where((self.depth >= FAR) & (self.alpha > 0), around, self.depth)
 
+    def part(self, box: tuple[slice, slice]) -> Layer:
+        """What is in rows and columns of the picture."""
+        return Layer(self.picture[box], self.alpha[box], self.depth[box])
+
+    def over(self, below: Array) -> Array:
+        """This layer over a picture (H, W, 3)."""
+        return self.picture + (1 - self.alpha)[..., None] * below
+
+
+def pictured(room: Array, people: Sequence[Layer], things: Sequence[Layer]) -> Array:
+    """People among things over the room's picture (H, W, 3): `composed`, but people are sorted in only where they are."""
+    picture = composed(room, things)
+    covered = np.any([layer.alpha > 0 for layer in people], axis=0)
+    rows, columns = (np.flatnonzero(covered.any(axis)) for axis in (1, 0))
+    if len(rows):
+        box = slice(max(rows[0] - 1, 0), rows[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
+        picture = picture.copy()
+        picture[box] = composed(room[box], [layer.part(box) for layer in (*people, *things)])
+    return picture
+
 
 def composed(room: Array, layers: Sequence[Layer]) -> Array:
     """Layers over the room's picture (H, W, 3), at each pixel the farthest first."""
+    if len(layers) < 2:
+        return layers[0].over(room) if layers else room
     depth = np.stack([layer.reach for layer in layers])
     order = np.argsort(-depth, axis=0, kind="stable")
     picture = room

@@ -100,7 +100,8 @@ class Scene:
     drift: Annotated[float, Field(ge=-0.8, le=1)] = 0.0
     """By which share the light has grown, or with a minus faded, at the end of the film."""
     crf: Annotated[int, Field(ge=0, le=51)] = 18
-    """Compression of the films, H.264's constant rate factor: 0 keeps all but half of the colour's detail, 18 is hardly visible, 35 coarse, 51 the worst."""
+    """Compression of the films, H.264's constant rate factor: 0 keeps all but half of the colour's detail, 18 is hardly visible, 35
+    coarse, 51 the worst."""
     obstacles: tuple[Obstacle, ...] = ()
     """Things that stand in the scene and hide what is behind them."""
     bystanders: tuple[Bystander, ...] = ()
@@ -174,7 +175,7 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
             raise SettingsError(f"{source}: {where}{told}") from None
         if first["type"] in ("dataclass_type", "tuple_type"):
             wanted = "a table" if first["type"] == "dataclass_type" else "a list"
-            raise SettingsError(f"{source}: {place}: found {first['input']!r}, expected {wanted}")
+            raise SettingsError(f"{source}: {place}: found {first['input']!r}, expected {wanted}") from None
         found = "" if first["type"] == "missing" else f", found {first['input']!r}"
         raise SettingsError(f"{source}: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}{found}") from None
 

@@ -14,7 +14,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.furniture import Furniture
 from shadowpuppet.synthetic.kinematics import Figure
-from shadowpuppet.synthetic.layers import Layer, composed, in_front
+from shadowpuppet.synthetic.layers import Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.parts import dressed
 from shadowpuppet.synthetic.renderer import Renderer
@@ -69,8 +69,7 @@ class Studio:
 
     def empty(self, index: int = 0, count: int = 1) -> np.ndarray:
         """Picture `index` of `count` without anybody, (H, W, 3) BGR, before the film begins."""
-        light = composed(self.room.picture, self.things) if self.things else self.room.picture
-        return self._exposed(light, (index - count) / self.spec.rate)
+        return self._exposed(composed(self.room.picture, self.things), (index - count) / self.spec.rate)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
         """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255."""
@@ -106,7 +105,7 @@ class Studio:
         people = seen.copy()
         for n, layer in enumerate(company_layers):
             people |= in_front(layer, [person, *rest[:n], *rest[n + 1 :]])
-        return composed(room, [person, *rest]), _mask(seen), _mask(people), int(((shot.mask > 0) & ~seen).sum())
+        return pictured(room, [person, *company_layers], self.things), _mask(seen), _mask(people), int(((shot.mask > 0) & ~seen).sum())
 
     def _exposed(self, light: Array, seconds: float) -> np.ndarray:
         scene = self.spec.scene
