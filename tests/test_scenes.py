@@ -95,8 +95,8 @@ def test_a_perfect_ring_is_evenly_spread_and_looks_at_the_middle(count, radius, 
     centres = np.array([camera.centre for camera in cameras])
     np.testing.assert_allclose(np.hypot(*centres[:, :2].T), radius)
     np.testing.assert_allclose(centres[:, 2], height)
-    along = np.unwrap(np.arctan2(centres[:, 1], centres[:, 0]))
-    np.testing.assert_allclose(np.diff(along), 2 * np.pi / count, atol=1e-9)
+    along = np.arctan2(centres[:, 1], centres[:, 0])
+    np.testing.assert_allclose(np.mod(np.diff(along), 2 * np.pi), 2 * np.pi / count, atol=1e-9)
     middle = np.array([0, 0, MIDDLE * stature])
     if abs(np.degrees(np.arctan2(height - middle[2], radius))) < 60:
         for camera in cameras:
