@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.io.joints import read_joints
 from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, motions, synthesize
 from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
@@ -62,7 +63,7 @@ def grown(mask: np.ndarray, pixels: int = 1) -> np.ndarray:
 # What was
 
 
-def test_old_specs_give_what_they_gave():
+def test_old_specs_give_what_they_gave(tmp_path):
     """Settings are chosen on such recordings: what was added since must not change them."""
     spec = Spec(motion=(Gesture(motion="wave_hands", seconds=2), Gesture(motion="random", seconds=3)), cameras=(Viewpoint(size=(80, 60)),),
                 rate=2, turn_deg=5, scene=Scene(clothing=3, room=4, shadow=0.3))  # fmt: skip
@@ -72,6 +73,10 @@ def test_old_specs_give_what_they_gave():
     np.testing.assert_allclose(figure.joints[[4, 9], JOINTS.index("left_hand")], HANDS, atol=2e-6)
     area = [int((picture.mask > 0).sum()) for picture in film]
     np.testing.assert_allclose(area, AREAS, atol=2)  # the arithmetic of processors may differ by a grazing ray
+    folder = synthesize(spec, tmp_path, np.random.default_rng(11))
+    np.testing.assert_allclose(read_joints(folder / "truth.csv").select(["left_hand"]).positions[[4, 9], 0], HANDS, atol=2e-5)
+    masks = [int((frame.image > 0).sum()) for frame in open_frames(folder / "masks" / "cam.mkv", grey=True)]
+    np.testing.assert_allclose(masks, AREAS, atol=2)
     means = [picture.image.mean((0, 1)) for picture in film[::4]]
     np.testing.assert_allclose(means, MEANS, atol=0.05)
     spread = [picture.image.std() for picture in film[::4]]
