@@ -60,7 +60,7 @@ def spec_table(table: str = "") -> str:
     rows = ["| setting | default | possible | what it is |", "|---|---|---|---|"]
     for field, kind, told in settings_of(TABLES[table] if table else Spec):
         default = default_of(field)
-        if field.name in TABLES and field.name != table and "Literal" not in str(kind):
+        if field.name in TABLES and field.name != table:
             rows.append(f"| [`{field.name}`](#{field.name}) | | | {told} |")
         else:
             shown = "" if default is None or default is MISSING else f"`{_plain(default)}`"

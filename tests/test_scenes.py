@@ -299,7 +299,7 @@ def test_somebody_in_front_hides_the_person():
 
 
 def test_a_bystander_keeps_to_their_place_and_casts_a_shadow(tmp_path):
-    spec = with_scene(bystanders=(Bystander(ahead=0.2, left=0.9, motion="random"),), shadow=0.6)
+    spec = with_scene(bystanders=(Bystander(ahead=0.2, left=0.9, motion=Gesture(motion="random")),), shadow=0.6)
     figures = []
     from shadowpuppet.synthetic import recording
 

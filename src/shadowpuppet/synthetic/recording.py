@@ -16,7 +16,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions
 from shadowpuppet.synthetic.kinematics import Figure, pose
 from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.synthetic.spec import Bystander, Gesture, Spec
+from shadowpuppet.synthetic.spec import Bystander, Spec
 from shadowpuppet.synthetic.specfile import SPEC_FILE, seed_of, write_spec
 from shadowpuppet.synthetic.studio import Studio, body_of
 
@@ -68,8 +68,9 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
     """A bystander in `count` pictures, where they stand."""
-    gesture = Gesture(motion=someone.motion, seconds=max(2.0, count / spec.rate))
-    _, figure = perform(replace(spec, body=body_of(someone), motion=(gesture,), turn_deg=someone.turn_deg), rng)
+    again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
+    gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
+    _, figure = perform(replace(spec, body=body_of(someone), motion=gestures, turn_deg=someone.turn_deg), rng)
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[:count] for part in figure]
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])

@@ -60,8 +60,8 @@ class Bystander:
     """Who it is; body and clothes are drawn."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of body and clothes."""
-    motion: MotionName = "stand"
-    """What they do all the time."""
+    motion: Gesture = Gesture(motion="stand")
+    """What they do, as long as the film is."""
     ahead: Place = -1.0
     """How far before the person they stand, metres; negative behind."""
     left: Place = 0.9
