@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -76,10 +77,11 @@ class Studio:
         light, mask, *_ = self._lit(figure, index)
         return self._exposed(light, 0.0), mask
 
-    def film(self, figure: Figure, workers: int = 2) -> Iterator[Picture]:
-        """Pictures of all postures, one after another; `workers` threads draw ahead, the noise is drawn in order."""
+    def film(self, figure: Figure, workers: int | None = None) -> Iterator[Picture]:
+        """Pictures of all postures, one after another; `workers` threads draw ahead (2 to 8 by the processor), noise is drawn in order."""
         from concurrent.futures import ThreadPoolExecutor
 
+        workers = workers or min(max(os.cpu_count() or 2, 2), 8)
         count = len(figure.joints)
         self._length = (count - 1) / self.spec.rate
         with ThreadPoolExecutor(workers) as pool:
