@@ -268,6 +268,13 @@ def test_made_recordings_can_be_looked_at_and_tracked(shell):
     assert "joint errors, mm" in out
 
 
+@pytest.mark.filterwarnings("ignore:.*nothing of the person is hidden")
+def test_references_are_whole_or_not_there(tmp_path):
+    for ahead, count in ((0.8, 0), (-0.8, 3)):
+        made = make_recording(replace(SMALL, scene=replace(SMALL.scene, obstacles=(Obstacle(kind="pillar", ahead=ahead),))), tmp_path)
+        assert len(made.references) == count
+
+
 def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
     code, out, err = shell("-o", "ring", "--cameras", 3, "--ring-radius", 3, "--seed", 4, "--motion", "random", *TINY)
     assert (code, err) == (0, "")
@@ -355,6 +362,7 @@ def test_only_made_recordings_are_made_anew_unasked(shell, tmp_path):
 
 def test_making_anew_leaves_nothing_of_the_old_and_all_that_is_the_users(tmp_path):
     spec = replace(SMALL, rate=1)
+    make_recording(spec, tmp_path)
     ring = replace(spec, cameras=(Viewpoint(),), ring=Ring(count=3, size=(48, 32)), scene=Scene(empty_seconds=1, bystanders=(Bystander(),)))
     make_recording(ring, tmp_path)
     (tmp_path / "notes.txt").write_text("mine")

@@ -121,7 +121,7 @@ def made_table(spec: Spec, made: Recording) -> RenderableType:
             ("person", f"{spec.body.stature:.2f} m: {_motions(spec)}" + (f"; in the scene: {', '.join(extras)}" if extras else "")),
             ("films", f"{cameras}, {first.size[0]} x {first.size[1]} pixels, {spec.rate:g} frames/s, {seconds:g} s of motion"),
             ("truth", "truth.csv, truth.trc, masks/" + (", people/" if spec.scene.bystanders else "")
-             + (", training.csv, training.trc" if made.training else ", references/")),
+             + (", training.csv, training.trc" if made.training else "") + (", references/" if made.references else "")),
             ("again", f"shadowpuppet synthesize {made.path}/spec.toml -o FOLDER"),
             ("look", f"shadowpuppet info {made.path}" + (f" --camera {first.name}" if len(views) > 1 else "")),
             ("track", f"shadowpuppet track {made.path} --overlay" + (f" --camera {first.name}" if len(views) > 1 else ""))]

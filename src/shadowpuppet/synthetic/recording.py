@@ -40,7 +40,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
-    _folders(folder, "video", "background", "masks", *["references"][: len(cameras) == 1], *["people"][: len(spec.scene.bystanders)])
+    _folders(folder, "video", "background", "masks", *["people"][: len(spec.scene.bystanders)])
     seed = seed_of(rng)
     for_motion, for_noise, for_training, for_others = rng.spawn(4)
     write_spec(folder / SPEC_FILE, spec, seed)
@@ -157,10 +157,14 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
 
 
 def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
+    """Reference pictures with masks and joints; none where a thing hides part of them: sizes are fitted to whole silhouettes."""
     from shadowpuppet.video import write_image
 
-    for name, named in REFERENCES.items():
-        figure = pose(spec.body, motions.posture(**named))
+    figures = {name: pose(spec.body, motions.posture(**named)) for name, named in REFERENCES.items()}
+    if any(studio.hides(figure) for figure in figures.values()):
+        return
+    _folders(folder)
+    for name, figure in figures.items():
         image, mask = studio.take(figure, 0)
         write_image(folder / f"{name}.png", image)
         write_image(folder / f"{name}_mask.png", mask)
@@ -188,7 +192,7 @@ def _write(path: Path, lines: list[str]) -> None:
 
 def _folders(folder: Path, *names: str) -> None:
     try:
-        for name in names:
+        for name in names or ("",):
             (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(

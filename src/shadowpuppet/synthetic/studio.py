@@ -73,9 +73,13 @@ class Studio:
         return self._exposed(composed(self.room.picture, self.things), (index - count) / self.spec.rate)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255."""
+        """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255; nobody else is there."""
         light, mask, *_ = self._lit(figure, index)
         return self._exposed(light, 0.0), mask
+
+    def hides(self, figure: Figure) -> bool:
+        """Whether things hide anything of the figure in its first posture."""
+        return bool(self.things) and self._lit(figure, 0)[3] > 0
 
     def film(self, figure: Figure, workers: int | None = None) -> Iterator[Picture]:
         """Pictures of all postures, one after another; `workers` threads draw ahead (2 to 8 by the processor), noise is drawn in order."""
