@@ -100,7 +100,7 @@ def expanded(words: Shorthand, spec: Spec, source: str = "flags") -> Spec:
     if "occluder" in said:
         values["scene"]["obstacles"] = [{"kind": said["occluder"], **OBSTACLES[said["occluder"]]}]
     if "second_person" in said:
-        place = {"behind": {"ahead": -1.0, "left": 0.5}, "aside": {"ahead": 0.0, "left": 1.0}}[said["second_person"]]
+        place = {"behind": {"ahead": -1.0, "left": -0.6}, "aside": {"ahead": 0.0, "left": 1.0}}[said["second_person"]]
         values["scene"]["bystanders"] = [place]
     return spec_from(values, source)
 
