@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import acclaim
 from shadowpuppet import cli
 from shadowpuppet.errors import RecordingError, SettingsError
 from shadowpuppet.io.joints import read_joints
@@ -393,3 +394,34 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError, match="file"):
         make_recording(SMALL, tmp_path / "file" / "below")
+
+
+def test_somebody_passes_behind(shell, tmp_path):
+    assert shell("-o", "two", "--second-person", "passing", "--distance", 3, "--quiet", *TINY)[0] == 0
+    people, masks = (np.array(frames(tmp_path / "two" / kind / "cam.mkv")).max(-1) for kind in ("people", "masks"))
+    middle = [np.flatnonzero(one.any(0)).mean() for one in people & ~masks if one.any()]
+    assert np.ptp(middle) > 8
+
+
+# Motion capture
+
+
+def test_motion_capture_is_found_from_the_spec_and_kept_with_its_place(shell, tmp_path):
+    (tmp_path / "mocap").mkdir()
+    acclaim.write(tmp_path / "mocap", 400, size=5.0)
+    (tmp_path / "mocap" / "mine.toml").write_text('rate = 4\nmotion = [{ motion = "mocap", file = "01_01.amc", seconds = 2 }]\n')
+    assert read_spec(tmp_path / "mocap" / "mine.toml").motion[0].file == str(tmp_path / "mocap" / "01_01.amc")
+    assert shell("mocap/mine.toml", "-o", "one", "--cameras", 2, "--size", "64x48", "--quiet")[0] == 0
+    assert shell("one/spec.toml", "-o", "two", "--quiet")[0] == 0
+    assert shell("-o", "three", "--motion", "mocap/01_01.amc", "--cameras", 2, *TINY, "--quiet")[0] == 0
+    truths = [(tmp_path / name / "truth.csv").read_bytes() for name in ("one", "two", "three")]
+    assert truths[0] == truths[1] == truths[2]
+    assert read_recording(tmp_path / "one").training is None  # it would be the truth
+
+
+def test_a_file_that_cannot_be_used_removes_nothing(shell, tmp_path):
+    assert shell("-o", "made", "--quiet", *TINY)[0] == 0
+    code, _, err = shell("-o", "made", "--motion", "gone.amc", *TINY)
+    assert code == 2
+    assert "gone.amc: " in err
+    assert len(frames(tmp_path / "made" / "video" / "cam.mp4")) == 15

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from shadowpuppet.errors import RecordingError, SettingsError
 from shadowpuppet.io.recording import POSTURES, Recording, read_recording
 from shadowpuppet.pipeline import Listener
 from shadowpuppet.synthetic import Spec, synthesize
+from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.specfile import HEAD, SPEC_FILE, read_spec
 
 
@@ -15,9 +19,13 @@ def make_recording(spec: Spec, folder: str | Path, listener: Listener | None = N
     """Make the recording of `spec`, with its seed, in `folder`, and read it back.
 
     A folder that holds a made recording is made anew; another one that is not empty only with `force`, and then only files of
-    the same names are replaced. Raises `RecordingError` otherwise, or where something cannot be written.
+    the same names are replaced. Raises `RecordingError` otherwise, or where something cannot be written, and a `ShadowPuppetError`
+    where a file of motion cannot be used.
     """
     folder, listener = Path(folder), listener or Listener()
+    for gesture in (*spec.motion, *(other.motion for other in spec.scene.bystanders)):
+        if gesture.file is not None:  # one that cannot be used is told before anything is removed
+            perform(replace(spec, motion=(gesture,)), np.random.default_rng(0))
     clear(folder, force)
     listener.begin("drawing")
     synthesize(spec, folder, tell=Drawing(listener))

@@ -129,7 +129,7 @@ def made_table(spec: Spec, made: Recording) -> RenderableType:
 
 
 def _motions(spec: Spec) -> str:
-    return ", ".join(f"{gesture.motion} {gesture.seconds:g}" for gesture in spec.motion)
+    return ", ".join(f"{Path(gesture.file).name if gesture.file else gesture.motion} {gesture.seconds:g}" for gesture in spec.motion)
 
 
 def sparkline(values: Sequence[float], width: int = 30) -> str:

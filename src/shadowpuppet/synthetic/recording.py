@@ -72,14 +72,15 @@ def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Genera
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
     _, figure = perform(replace(spec, body=body_of(someone), motion=gestures, turn_deg=someone.turn_deg), rng)
     place = np.array([someone.left, -someone.ahead, 0])
-    parts = [part[:count] for part in figure]
+    parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
 
 
 def _wall(figure: Figure, others: list[Figure]) -> float:
     """How far behind the person the wall must be, metres: 0 where they stay at their place, for which all walls are far enough."""
-    behind = [float(one.joints[..., 1].max()) for one in (figure, *others)]
-    return max(behind) + 0.4 if others or behind[0] > 1.15 else 0.0
+    people = [one.joints[..., :2] for one in (figure, *others)]
+    behind, aside = max(float(one[..., 1].max()) for one in people), max(float(np.abs(one).max()) for one in people)
+    return max(behind if others or behind > 1.15 else -0.4, aside if aside > 5.6 else -0.4) + 0.4
 
 
 def _part(tell: Tell | None, before: int, total: int) -> Callable[[int], None]:
@@ -129,7 +130,7 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
     write_truth(folder / "truth", times, figure.joints, spec.rate)
-    if len(cameras) > 1:
+    if len(cameras) > 1 and not any(gesture.file for gesture in spec.motion):  # a file plays the same every time
         again, rehearsal = perform(spec, rng)
         write_truth(folder / "training", again, rehearsal.joints, spec.rate)
 

@@ -23,6 +23,12 @@ OBSTACLES: dict[str, dict[str, float]] = {
     "cabinet": {"ahead": 0.7, "left": 0.35},
 }
 """Where `occluder` puts things."""
+COMPANY: dict[str, dict[str, Any]] = {
+    "behind": {"ahead": -1.0, "left": -0.6},
+    "aside": {"ahead": 0.0, "left": 1.0},
+    "passing": {"ahead": -1.3, "left": 0.0, "turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 3.0}},
+}
+"""What `second_person` means."""
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -30,7 +36,8 @@ class Shorthand:
     """What is often wanted of a made recording; None leaves the spec as it is."""
 
     motion: str | None = None
-    """Gestures in turn with their seconds, such as "wave_hands 4, reach 5"; those without share --seconds, or take 4 each."""
+    """Gestures in turn with their seconds, such as "wave_hands 4, reach 5"; those without share --seconds, or take 4 each. Or a file of
+    motion capture (.amc)."""
     seconds: Annotated[float, Field(ge=2, le=3600)] | None = None
     """Length of the motion; the film has 0.8 s of standing before and after it."""
     body: Literal["woman", "man", "child", "random"] | None = None
@@ -73,8 +80,8 @@ class Shorthand:
     """Compression of the films, H.264's crf: 0 the best, 18 as usual, 51 the worst."""
     occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
     """What stands between the person and the first camera: table, chair, pillar or cabinet."""
-    second_person: Literal["behind", "aside"] | None = None
-    """Where somebody else stands: behind or aside."""
+    second_person: Literal["behind", "aside", "passing"] | None = None
+    """Somebody else: standing behind or aside, or passing to and fro behind."""
 
 
 PLAIN = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
@@ -91,17 +98,17 @@ def expanded(words: Shorthand, spec: Spec, source: str = "flags") -> Spec:
     values |= {name: said[name] for name in ("rate",) if name in said}
     if {"motion", "seconds"} & set(said):
         values["motion"] = _motion(said.get("motion"), said.get("seconds"), spec, source)
-    if "body" in said:
-        kind = None if said["body"] == "random" else said["body"]
-        values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind))
     if "height" in said:
         values["body"]["stature"] = said["height"]
+        spec_from(values, source)  # an impossible height is told with what is possible
+    if "body" in said:
+        kind = None if said["body"] == "random" else said["body"]
+        values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))
     _place_cameras(values, said, source)
     if "occluder" in said:
         values["scene"]["obstacles"] = [{"kind": said["occluder"], **OBSTACLES[said["occluder"]]}]
     if "second_person" in said:
-        place = {"behind": {"ahead": -1.0, "left": -0.6}, "aside": {"ahead": 0.0, "left": 1.0}}[said["second_person"]]
-        values["scene"]["bystanders"] = [place]
+        values["scene"]["bystanders"] = [COMPANY[said["second_person"]]]
     return spec_from(values, source)
 
 
@@ -117,8 +124,13 @@ def gestures_from(text: str, seconds: float | None = None, source: str = "motion
     each = 4.0 if seconds is None else (seconds - fixed) / open_ if open_ else 0.0
     if open_ and each < 2:
         raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least 2")
-    values = [{"motion": item[0], "seconds": float(item[1]) if len(item) == 2 else each} for item in items]
+    values = [_named(item[0]) | {"seconds": float(item[1]) if len(item) == 2 else each} for item in items]
     return spec_from({"motion": values}, source).motion
+
+
+def _named(motion: str) -> dict[str, Any]:
+    """A gesture by its name, or motion capture by its file's."""
+    return {"motion": "mocap", "file": motion} if motion.lower().endswith(".amc") else {"motion": motion}
 
 
 def _motion(text: str | None, seconds: float | None, spec: Spec, source: str) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +19,33 @@ UNSEEDED = "# The generator that was given had no seed that could be kept: the s
 
 
 def read_spec(path: str | Path) -> Spec:
-    """The spec in a TOML file. Raises `SettingsError`: one sentence with file and field."""
+    """The spec in a TOML file; files that it names are relative to it. Raises `SettingsError`: one sentence with file and field."""
     from shadowpuppet.io.calibration import read_toml
 
-    return spec_from(read_toml(path, SettingsError), str(path))
+    values = read_toml(path, SettingsError)
+    for gesture in _gestures(values):
+        if isinstance(gesture.get("file"), str):
+            gesture["file"] = str(Path(path).parent / gesture["file"])
+    return spec_from(values, str(path))
+
+
+def _gestures(values: dict[str, Any]) -> list[dict[str, Any]]:
+    """The tables of gestures in a spec's plain values, the bystanders', too; what is of another type is left to be told later."""
+    scene = values.get("scene")
+    others = scene.get("bystanders") if isinstance(scene, dict) else None
+    listed = [values.get("motion"), [one.get("motion") for one in others if isinstance(one, dict)] if isinstance(others, list) else None]
+    return [gesture for some in listed if isinstance(some, list) for gesture in some if isinstance(gesture, dict)]
 
 
 def spec_text(spec: Spec) -> str:
     """A spec as TOML that `read_spec` reads back: every setting."""
+    return _text(spec_values(spec))
+
+
+def _text(values: dict[str, Any]) -> str:
     import tomli_w
 
-    text = tomli_w.dumps(spec_values(spec))
+    text = tomli_w.dumps(values)
     return re.sub(r"\[\n((?: {4}[^\s{}\[\]]+,\n)+)\]", lambda found: f"[{', '.join(found[1].replace(',', '').split())}]", text)
 
 
@@ -37,7 +54,11 @@ def write_spec(path: Path, spec: Spec, seed: int | tuple[int, ...] | None) -> No
     from shadowpuppet.io._files import write_whole
 
     known = spec if seed is None else replace(spec, seed=seed)
-    write_whole(path, HEAD + ("" if seed is not None else UNSEEDED) + spec_text(known))
+    values = spec_values(known)
+    for gesture in _gestures(values):
+        if "file" in gesture:
+            gesture["file"] = str(Path(gesture["file"]).resolve())
+    write_whole(path, HEAD + ("" if seed is not None else UNSEEDED) + _text(values))
 
 
 def seed_of(rng: np.random.Generator) -> int | tuple[int, ...] | None:
