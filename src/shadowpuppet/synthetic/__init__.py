@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shadowpuppet.synthetic.collection import demo_spec, named_specs, proving_ground
+from shadowpuppet.synthetic.collection import around, demo_spec, named_specs, proving_ground
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Bystander, Gesture, Scene, Spec, spec_from
@@ -26,6 +26,7 @@ __all__ = [
     "Scene",
     "Spec",
     "Viewpoint",
+    "around",
     "demo_spec",
     "named_specs",
     "proving_ground",

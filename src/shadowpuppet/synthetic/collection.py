@@ -62,13 +62,26 @@ def _proof(
     )
 
 
+AROUND = (
+    # name, kind and seed of the body, gestures, distance of the seven cameras (m)
+    ("ring_upper", "woman", 4, "wave_hands 4, reach 5, random 6", 3.5),
+    ("ring_walking", "man", 21, "walk 7", 4.8),
+    ("ring_jogging", "woman", 22, "jog 6.5", 4.8),
+    ("ring_boxing", "man", 23, "box 6.5", 4.2),
+)
+
+
+def around() -> tuple[Spec, ...]:
+    """Recordings of seven cameras around a person, 640 x 480 at 60 pictures a second, of the length of those of HumanEva."""
+    specs = []
+    for n, (name, kind, seed, gestures, radius) in enumerate(AROUND):
+        body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
+        ring = Ring(count=7, radius=radius, jitter=0.5, seed=n, size=(640, 480), distortion=(-0.09, 0.05, 0.0, 0.0))
+        scene = Scene(clothing=30 + n, room=30 + n)
+        specs.append(Spec(name=name, body=body, motion=gestures_from(gestures), ring=ring, scene=scene, rate=60, seed=(1, n)))
+    return tuple(specs)
+
+
 def named_specs() -> dict[str, Spec]:
-    """All of them by name: the demo's, several cameras around a person, and the proving ground's."""
-    ring = Spec(
-        name="ring",
-        motion=gestures_from("wave_hands 4, reach 5, random 6"),
-        ring=Ring(count=7, size=(640, 480)),
-        scene=Scene(clothing=4, room=3),
-        rate=30,
-    )
-    return {spec.name: spec for spec in (demo_spec(), ring, *proving_ground())}
+    """All of them by name: the demo's, the proving ground's, and those of several cameras."""
+    return {spec.name: spec for spec in (demo_spec(), *proving_ground(), *around())}
