@@ -439,6 +439,12 @@ def test_a_half_covered_pixel_counts_at_its_neighbours_depth():
     np.testing.assert_array_equal(reach[0], [2, 2, 2, FAR, FAR])
 
 
+def test_a_camera_that_sees_nobody_is_told(tmp_path):
+    aside = replace(VIEW, fov_deg=30.0, yaw_deg=60.0)
+    with pytest.warns(ShadowPuppetWarning, match="camera 'cam': sees nothing of the person in any picture"):
+        synthesize(replace(SMALL, rate=1, cameras=(aside,)), tmp_path, np.random.default_rng(0))
+
+
 def test_obstacles_that_hide_nothing_are_told(tmp_path):
     spec = with_scene(replace(SMALL, rate=1), obstacles=(Obstacle(kind="table", ahead=-2.0, left=2.0),))
     with pytest.warns(ShadowPuppetWarning, match="obstacles: nothing of the person is hidden"):

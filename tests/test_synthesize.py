@@ -152,6 +152,7 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
     ("[[scene.obstacles]]\nkind = 'chair'\nwhere = 1", r"scene\.obstacles\.0\.where: no such setting; possible are ahead, colour"),
     ("[[scene.obstacles]]\nkind = 'chair'\nahead = 0.1", r"scene\.obstacles\.0: ahead, left: found 0.1, 0, where the person stands"),
     ("[[scene.obstacles]]\nkind = 'pillar'\nahead = 2.0", r"scene\.obstacles: found a pillar where the camera 'cam' stands"),
+    ("[[scene.bystanders]]\nahead = 1.8\nleft = 0.1", r"scene\.bystanders: found somebody where the camera 'cam' stands"),
     ("[[scene.bystanders]]\nahead = 0.2\nleft = 0.1", r"scene\.bystanders\.0: ahead, left: found 0.2, 0.1, where the person stands"),
     ("[[scene.bystanders]]\nmotion = 'stand'", r"scene\.bystanders\.0\.motion: found 'stand', expected a table"),
     ("[[scene.bystanders]]\nmotion = { motion = 'fly' }", r"scene\.bystanders\.0\.motion\.motion: .*found 'fly'"),

@@ -36,7 +36,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     rng: where none is given, one of the spec's seed. tell: called after each picture with how many are done and how many there
     will be. The same spec and seed give the same pictures, masks and truth, whatever the number of threads; `spec.toml` keeps
     both. Interrupted by Ctrl-C, the pictures made so far are a recording, too. Raises `RecordingError` where the folder cannot
-    be written; warns where obstacles hide nothing.
+    be written; warns where obstacles hide nothing, and where a camera never sees the person.
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
@@ -45,12 +45,15 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     for_motion, for_noise, for_training, for_others = rng.spawn(4)
     write_spec(folder / SPEC_FILE, spec, seed)
     times, figure = perform(spec, for_motion)
-    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(spec.scene.bystanders, for_others.spawn(99))]
+    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(spec.scene.bystanders, for_others.spawn(len(spec.scene.bystanders)))]
     _write_given(folder, spec, cameras, times, figure, for_training)
     hidden = 0
     for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
         studio = Studio(spec, camera, noise, others, _wall(figure, others))
-        hidden += _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
+        hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
+        hidden += hides
+        if not seen:
+            warn(f"{folder}: camera {camera.name!r}: sees nothing of the person in any picture", ShadowPuppetWarning, stacklevel=2)
         if len(cameras) == 1:
             _write_references(folder / "references", spec, studio)
     if spec.scene.obstacles and not hidden:
@@ -87,14 +90,14 @@ def _part(tell: Tell | None, before: int, total: int) -> Callable[[int], None]:
     return lambda done: tell(before + done, total) if tell is not None else None
 
 
-def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Callable[[int], None]) -> int:
-    """Write a camera's films, and tell after each picture how many there are; returns how many of the person's pixels are hidden.
+def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Callable[[int], None]) -> tuple[int, int]:
+    """Write a camera's films, and tell after each picture how many there are; returns how many pixels of the person are hidden and seen.
 
     After Ctrl-C the films end with the last picture that was made, and have their own names: they can be used.
     """
     from shadowpuppet.video import write_frames
 
-    name, crf, hidden = studio.room.camera.name, spec.scene.crf, 0
+    name, crf, hidden, seen = studio.room.camera.name, spec.scene.crf, 0, 0
     with write_frames(folder / "background" / f"{name}.mp4", spec.rate, crf=crf) as film:
         count = max(1, round(spec.scene.empty_seconds * spec.rate))
         for index in range(count):
@@ -109,7 +112,7 @@ def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Calla
                 for masks, mask in zip(exact, (picture.mask, picture.people)):
                     masks.write(mask)
                 film.write(picture.image)
-                hidden += picture.hidden
+                hidden, seen = hidden + picture.hidden, seen + int((picture.mask > 0).sum())
                 tell(film.count)
         except KeyboardInterrupt:
             if not film.count:
@@ -117,7 +120,7 @@ def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Calla
             interrupted = True
     if interrupted:
         raise KeyboardInterrupt
-    return hidden
+    return hidden, seen
 
 
 def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:

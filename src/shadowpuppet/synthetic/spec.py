@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -143,7 +144,7 @@ class Spec:
     """Seed of the motion's chance and of the noise, where no generator is given: a whole number, or several."""
 
     def __post_init__(self) -> None:
-        """Camera names must differ, and no camera may stand in a thing."""
+        """Camera names must differ, and no camera may stand in a thing or in somebody."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")
@@ -154,6 +155,9 @@ class Spec:
             kind = things.holds(view.camera().centre)
             if kind is not None:
                 raise ValueError(f"scene.obstacles: found a {kind} where the camera {view.name!r} stands")
+        for view, other in itertools.product(self.views() if self.scene.bystanders else (), self.scene.bystanders):
+            if np.hypot(*(view.camera().centre[:2] - (other.left, -other.ahead))) < 0.4:
+                raise ValueError(f"scene.bystanders: found somebody where the camera {view.name!r} stands")
 
     def views(self) -> tuple[Viewpoint, ...]:
         """The cameras: those of `cameras`, or the ring's."""
