@@ -45,7 +45,8 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     for_motion, for_noise, for_training, for_others = rng.spawn(4)
     write_spec(folder / SPEC_FILE, spec, seed)
     times, figure = perform(spec, for_motion)
-    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(spec.scene.bystanders, for_others.spawn(len(spec.scene.bystanders)))]
+    company = spec.scene.bystanders
+    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
     _write_given(folder, spec, cameras, times, figure, for_training)
     hidden = 0
     for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
