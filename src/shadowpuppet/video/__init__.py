@@ -12,7 +12,7 @@ import numpy as np
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.film import open_film
 from shadowpuppet.video.frames import Frame, FrameSource, Image, Size
-from shadowpuppet.video.live import open_camera
+from shadowpuppet.video.live import camera_number, open_camera
 from shadowpuppet.video.pictures import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames
 
@@ -45,14 +45,6 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
     else:
         frames = open_film(path, grey, rate)
     return frames if size in (None, frames.size) else _scaled(frames, size)
-
-
-def camera_number(source: str | Path | int) -> int | None:
-    """The number of a live camera, given as it is or as `camera:N`; None for anything else."""
-    if isinstance(source, int):
-        return source
-    number = str(source).removeprefix("camera:")
-    return int(number) if number != str(source) and number.isdecimal() else None
 
 
 def _scaled(frames: FrameSource, size: Size) -> FrameSource:

@@ -41,7 +41,7 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
             first = None
         if first is None:
             raise VideoError(f"{path}: no frame of it can be decoded ({stream.codec_context.name})")
-        size = size_of(_converter(grey)(first))
+        size = size_of(converter(grey)(first))
         timed = first.pts is not None or first.dts is not None
         told = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
         duration, mean_rate = _declared_duration(container, stream), float(told or math.nan)
@@ -57,8 +57,16 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
     return film
 
 
+def tells_times(path: Path) -> bool:
+    """Whether a film's first frames have times. Raises `VideoError`."""
+    with _opened(path) as (container, stream), contextlib.suppress(_Break):
+        frames = _decoded(container, stream)
+        return all(frame.pts is not None or frame.dts is not None for frame, _ in zip(frames, range(3)))
+    return True  # a damaged one, which is said elsewhere
+
+
 def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None) -> Iterator[Frame]:
-    clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), _converter(grey), 0, 0.0, ""
+    clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
     with _opened(path) as (container, stream):
         try:
             for frame in _decoded(container, stream):
@@ -204,7 +212,7 @@ class _Clock:
 # Pixels
 
 
-def _converter(grey: bool) -> Callable[[VideoFrame], Image]:
+def converter(grey: bool) -> Callable[[VideoFrame], Image]:
     """A function from decoded frames to upright (H, W, 3) or (H, W) arrays."""
     import cv2
     from av.video.reformatter import VideoReformatter

@@ -7,6 +7,7 @@ import math
 import time
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,21 +19,30 @@ if TYPE_CHECKING:
     from cv2 import VideoCapture
 
 
+def camera_number(source: str | Path | int) -> int | None:
+    """The number of a live camera, given as it is or as `camera:N`; None for anything else."""
+    if isinstance(source, int):
+        return source
+    number = str(source).removeprefix("camera:")
+    return int(number) if number != str(source) and number.isdecimal() else None
+
+
 def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
     """A camera's frames as they come, timed by a monotonic clock; `rate` is asked of the camera. Raises `VideoError`."""
     import cv2
 
-    capture, first = _opened(number, rate)
+    capture, first = open_device(number, rate)
     told = capture.get(cv2.CAP_PROP_FPS)
     ready, size = [capture], size_of(first)  # opening takes a second: the first reader takes over what learnt the size
 
     def read() -> Iterator[Frame]:
-        return _frames(ready.pop() if ready else _opened(number, rate)[0], number, grey, size)
+        return _frames(ready.pop() if ready else open_device(number, rate)[0], number, grey, size)
 
     return FrameSource(f"camera:{number}", size, told if told > 0 else math.nan, None, math.nan, read)
 
 
-def _opened(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
+def open_device(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
+    """A camera, opened, and its first picture. Raises `VideoError`."""
     import cv2
 
     with _quiet():
@@ -61,21 +71,27 @@ def _quiet() -> Iterator[None]:
         log.setLogLevel(level)
 
 
+def pictures(capture: VideoCapture) -> Iterator[tuple[float, Image]]:
+    """What an opened camera shows, as long as it does, with the monotonic clock's seconds; the camera is released at the end."""
+    try:
+        while capture.grab():
+            now = time.monotonic()  # before decoding, which takes its time
+            good, image = capture.retrieve()
+            if not good:
+                break
+            yield now, np.asarray(image, np.uint8)
+    finally:
+        capture.release()
+
+
 def _frames(capture: VideoCapture, number: int, grey: bool, size: tuple[int, int]) -> Iterator[Frame]:
     import cv2
 
     start, n = math.nan, 0
-    try:
-        while capture.grab():
-            now = time.monotonic()  # before decoding, which takes its time
-            start = now if n == 0 else start
-            good, image = capture.retrieve()
-            if not good:
-                break
-            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if grey and image.ndim == 3 else image, np.uint8)
-            check_size(f"camera {number}", n, now - start, image, size)
-            yield Frame(now - start, image)
-            n += 1
-    finally:
-        capture.release()
+    for now, image in pictures(capture):
+        start = now if n == 0 else start
+        image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if grey and image.ndim == 3 else image, np.uint8)
+        check_size(f"camera {number}", n, now - start, image, size)
+        yield Frame(now - start, image)
+        n += 1
     warnings.warn(f"camera {number}: gave no more pictures after {n}", ShadowPuppetWarning, stacklevel=2)

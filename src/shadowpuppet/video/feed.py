@@ -1,0 +1,125 @@
+"""Pictures as they come: from a camera, a network stream, or a film played at its own rate as if it were live."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.video import IMAGE_SUFFIXES, FrameSource, Image, Size, camera_number, open_frames
+from shadowpuppet.video.film import tells_times
+from shadowpuppet.video.frames import size_of
+from shadowpuppet.video.live import open_device, pictures
+from shadowpuppet.video.stream import SCHEMES, open_stream, without_secrets
+
+ADDRESS = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
+"""How a network address begins."""
+LATE = 1.0
+"""Seconds that a film may be behind its own clock before the clock is put back."""
+
+
+class Snapshot(NamedTuple):
+    """A picture that was just taken."""
+
+    captured: float
+    """When, in seconds of a clock that never goes back."""
+    image: Image
+    shown: float | None = None
+    """A film's own time, seconds."""
+
+
+@dataclass(frozen=True)
+class Feed:
+    """Where pictures come from; every `read` opens it anew."""
+
+    name: str
+    size: Size
+    """Width and height of its first picture, pixels."""
+    rate: float
+    """Frames/s that it tells of itself; not a number where it does not."""
+    live: bool
+    """Whether more is to be expected where it ends; a film is over then."""
+    read: Callable[[], Iterator[Snapshot]] = field(repr=False)
+    """Pictures as they come. Ends where no more come; raises `VideoError` where it cannot be opened or breaks off."""
+
+
+def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0) -> Feed:
+    """Open a camera (its number, or `camera:N`), a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures.
+
+    A film is played at its own times, `speed` times as fast; `rate` (frames/s) replaces them, and is asked of a camera.
+    Raises `VideoError` where nothing can be read, or a film does not tell its times and no rate is given.
+    """
+    number = int(source) if str(source).isdecimal() else camera_number(source)
+    scheme = ADDRESS.match(str(source))
+    if number is not None:
+        return _camera(number, rate)
+    if scheme is not None and scheme[1].lower() not in SCHEMES:
+        raise VideoError(f"{source}: found an address of the kind {scheme[1]!r}, expected one of {', '.join(SCHEMES)}, the number of "
+                         "a camera, or a film")
+    if scheme is not None:
+        return _stream(str(source))
+    return film_feed(_timed(Path(str(source)), rate), speed)
+
+
+def _camera(number: int, rate: float | None) -> Feed:
+    import cv2
+
+    device, first = open_device(number, rate)
+    told, ready = device.get(cv2.CAP_PROP_FPS), [device]  # opening takes a second: the first reader takes over
+
+    def read() -> Iterator[Snapshot]:
+        for now, image in pictures(ready.pop() if ready else open_device(number, rate)[0]):
+            yield Snapshot(now, image)
+
+    return Feed(f"camera {number}", size_of(first), told if told > 0 else math.nan, True, read)
+
+
+def _stream(address: str) -> Feed:
+    size, rate = open_stream(address)[1:]
+
+    def read() -> Iterator[Snapshot]:
+        for now, image in open_stream(address)[0]:
+            yield Snapshot(now, image)
+
+    return Feed(without_secrets(address), size, rate, True, read)
+
+
+def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] = time.monotonic,
+              wait: Callable[[float], None] = time.sleep) -> Feed:
+    """A film played as if it were live: each frame comes when it is due, and is stamped with that moment."""
+
+    def read() -> Iterator[Snapshot]:
+        start, told = math.nan, False
+        for time_, image in film:
+            start = clock() - time_ / speed if math.isnan(start) else start
+            due = start + time_ / speed
+            while (ahead := due - clock()) > 0:
+                wait(ahead)
+            if -ahead > LATE:  # as a camera, which would be slower too
+                start, due = start - ahead, due - ahead
+                if not told:
+                    warnings.warn(f"{film.name}: cannot be decoded as fast as it is to be played; it is played slower", ShadowPuppetWarning,
+                                  stacklevel=2)
+                told = True
+            yield Snapshot(due, image, time_)
+
+    return Feed(film.name, film.size, film.rate * speed, False, read)
+
+
+def _timed(path: Path, rate: float | None) -> FrameSource:
+    """A film that has times. Raises `VideoError` where it has none and no rate is given."""
+    if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file():
+        raise VideoError(f"{path}: found a single picture, expected a film, a folder of pictures, the number of a camera, or a network "
+                         "address")
+    film = open_frames(path, rate=rate)
+    timed = any((path / f"timestamps.{end}").exists() for end in ("txt", "csv")) if path.is_dir() else tells_times(path)
+    if rate is None and not timed:
+        raise VideoError(f"{path}: its frames have no times, so that it cannot be played at its own rate; say how many frames a second "
+                         "were filmed (--rate)")
+    return film
