@@ -11,7 +11,19 @@ from typing import Annotated, Any, NoReturn
 from cyclopts import App, CycloptsError, Parameter
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.flags import OTHER, RUN, DemoFlags, Flags, LookFlags, SpecFlags, options_from, spec_of
+from shadowpuppet.flags import (
+    OTHER,
+    RUN,
+    DemoFlags,
+    Flags,
+    LiveFlags,
+    LookFlags,
+    SessionFlags,
+    SpecFlags,
+    given,
+    options_from,
+    spec_of,
+)
 
 MISTAKE, INTERRUPTED = 2, 130
 """Exit codes: what the user gave cannot be used; Ctrl-C."""
@@ -32,6 +44,8 @@ AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show
 Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
 All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
+ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
+ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
 SpecPath = Annotated[Path | None, Parameter(help="File that describes it, TOML, as --show-spec prints it, or the spec.toml of a made "
@@ -67,6 +81,32 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
         summary = track_recording(recording, folder, options, shown)
     if not quiet:
         _show_run(folder, summary.metrics)
+
+
+@app.command
+def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
+         quiet: Quiet = False, flags: ForSession = None, settings: ForLive = None) -> None:
+    """Track a person before a camera as it happens, shown in a window or on a page for a browser; Ctrl-C ends it.
+
+    Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
+    No picture is kept unless --record is given.
+    """
+    from time import strftime
+
+    from shadowpuppet.display.choice import open_display
+    from shadowpuppet.live.run import run_live
+    from shadowpuppet.live.settings import LiveSettings
+    from shadowpuppet.settings import validate
+    from shadowpuppet.terminal import terminal
+
+    options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
+    folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
+    with terminal(quiet, folder) as shown:
+        metrics = run_live(folder, options, chosen, shown, open_display(chosen.show, chosen.listen, chosen.port, chosen.record))
+    if metrics is None:
+        print("nobody was tracked: nothing was written", file=sys.stderr)
+    elif not quiet:
+        _show_live(folder, metrics)
 
 
 @app.command
@@ -197,6 +237,14 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
     show(measures_table(metrics), *errors, pairs([("speed", f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"),
                                                  ("made", "\n".join(str(folder / name) for name in names))]))
+
+
+def _show_live(folder: Path, metrics: Mapping[str, Any]) -> None:
+    from shadowpuppet.tables import live_rows, measures_table, pairs
+    from shadowpuppet.terminal import show
+
+    names = [name for name in ("joints.csv", "angles.csv", "recording") if (folder / name).exists()]
+    show(measures_table(metrics), pairs([*live_rows(metrics["live"]), ("made", "\n".join(str(folder / name) for name in names))]))
 
 
 def main(tokens: Sequence[str] | None = None) -> NoReturn:

@@ -88,8 +88,8 @@ def open_footage(path: str | Path, options: Options) -> Footage:
                              f"masks/{view.camera.name}/; leave --masks out to make them")
     subject = recording.subject
     subject = replace(subject, height=options.height or subject.height, distance=options.distance or subject.distance)
-    camera = view.camera.resized(_fitting(view.camera.size, options.max_size))
-    return Footage(replace(recording, subject=subject), view, camera, _window(options.region, view.camera, camera))
+    camera = view.camera.resized(worked_size(view.camera.size, options.max_size))
+    return Footage(replace(recording, subject=subject), view, camera, region_of(options.region, view.camera, camera))
 
 
 def _chosen(recording: Recording, name: str | None) -> View:
@@ -101,12 +101,17 @@ def _chosen(recording: Recording, name: str | None) -> View:
     return views[name] if name is not None else recording.views[0]
 
 
-def _fitting(size: tuple[int, int], longest: int) -> tuple[int, int]:
+def worked_size(size: tuple[int, int], longest: int) -> tuple[int, int]:
+    """The size that pictures of a size are scaled to, so that their longer side has at most so many pixels."""
     scale = min(1.0, longest / max(size))
     return max(1, round(size[0] * scale)), max(1, round(size[1] * scale))
 
 
-def _window(region: tuple[int, int, int, int] | None, full: Camera, camera: Camera) -> tuple[slice, slice] | None:
+def region_of(region: tuple[int, int, int, int] | None, full: Camera, camera: Camera) -> tuple[slice, slice] | None:
+    """Rows and columns of a region of interest x0,y0,x1,y1 of the `full` camera's pictures in those of the scaled one.
+
+    Raises `SettingsError` where it is none.
+    """
     if region is None:
         return None
     x0, y0, x1, y1 = region

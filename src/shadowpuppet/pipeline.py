@@ -14,7 +14,7 @@ from warnings import warn
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT, sizes_from_height
-from shadowpuppet.body import BODIES
+from shadowpuppet.body import BODIES, Body
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.fitting import Found
 from shadowpuppet.io._files import write_whole
@@ -105,8 +105,7 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     the same options, film and machine give the same joints.
     """
     options, listener = options or Options(), listener or Listener()
-    with_names = BODIES[options.tracker.body](sizes_from_height(AVERAGE_HEIGHT))
-    joints = [name for name in with_names.landmark_names if not name.endswith("_fist")]
+    with_names, joints = named_body(options.tracker.body)
     info = {"recording": Path(recording).resolve(), "method": "Liu 2011, one camera", "settings": plain_options(options)}
     with RunWriter(folder, options.tracker.body, with_names.skeleton.dof_names, joints, info) as run:
         for_look, for_track = _generators(options)
@@ -132,6 +131,12 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
     found = check(prepared)
     write_person(file, found.person)
     return found, prepared.look
+
+
+def named_body(name: str) -> tuple[Body, list[str]]:
+    """A body of average sizes, for its names, and the names of the joints that a run keeps."""
+    body = BODIES[name](sizes_from_height(AVERAGE_HEIGHT))
+    return body, [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
 
 
 def json_text(value: Any) -> str:
@@ -165,9 +170,9 @@ def _follow(run: RunWriter, prepared: Prepared, options: Options, listener: List
                 with watch.time("segment"):
                     mask = prepared.silhouettes(shot)
                 with watch.time("track"):
-                    state = _next(tracker, rng, state, mask)
+                    state = next_state(tracker, rng, state, mask)
                 with watch.time("write"):
-                    run.write(_frame(shot.time, state, picture, columns))
+                    run.write(motion_frame(shot.time, state, picture, columns))
                     if overlay is not None:
                         _draw(overlay, shot.time, shot.image, mask, state, picture, options.tracker.ignore_legs)
                 frames += 1
@@ -176,14 +181,15 @@ def _follow(run: RunWriter, prepared: Prepared, options: Options, listener: List
         run.metrics |= _timings(watch, frames, time.perf_counter() - began)
 
 
-def _next(tracker: MonocularTracker, rng: np.random.Generator, state: State | None, mask: np.ndarray) -> State | None:
+def next_state(tracker: MonocularTracker, rng: np.random.Generator, state: State | None, mask: np.ndarray) -> State | None:
     """The state after a mask; none before the first that is not empty."""
     if state is None:
         return tracker.start(rng, mask) if mask.any() else None
     return tracker.step(rng, state, mask)
 
 
-def _frame(seconds: float, state: State | None, picture: Picture, columns: list[int]) -> MotionFrame:
+def motion_frame(seconds: float, state: State | None, picture: Picture, columns: list[int]) -> MotionFrame:
+    """A state as a run keeps it; `columns`: the landmarks that are its joints."""
     if state is None:
         return MotionFrame(seconds, "absent")
     points = picture.points_world(state.pose[None])[0][columns]

@@ -75,6 +75,15 @@ def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     return pairs(rows)
 
 
+def live_rows(live: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """How a live session kept up."""
+    late, frames = live["latency_ms"], live["latency_frames"]
+    rows = [("latency", f"{late['median']:.0f} ms from capture to pose ({frames['median']:.2f} of a frame's time); 5 % of frames over "
+                        f"{late['p95']:.0f} ms ({frames['p95']:.2f})"),
+            ("speed", f"{live['frames_per_s']:.1f} frames/s of {1000 / live['interval_ms']:.1f}; {live['dropped']} dropped")]
+    return rows + ([("breaks", f"{live['breaks']} times no pictures came")] if live["breaks"] else [])
+
+
 def sizes_table(sizes: CardboxSizes) -> RenderableType:
     """The 18 sizes a1..a18."""
     table = _table("sizes, mm", ("", "size", "mm", "", "size", "mm"), right=(2, 5))

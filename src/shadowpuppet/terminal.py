@@ -7,18 +7,23 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import Any, TextIO
 
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.live.run import LiveListener
 from shadowpuppet.look import Look
-from shadowpuppet.pipeline import Listener
 from shadowpuppet.tables import look_table
 
 
-class Terminal(Listener):
+REPEATED = 10.0
+"""Seconds after which what was said is said again."""
+
+
+class Terminal(LiveListener):
     """Shows the look on standard output; progress and warnings on standard error, a line each."""
 
     def __init__(self, quiet: bool = False) -> None:
@@ -30,6 +35,7 @@ class Terminal(Listener):
                                   disable=quiet or not self._console.is_terminal)
         self._task: TaskID | None = None
         self._said: set[str] = set()
+        self._noted: dict[str, float] = {}
 
     def begin(self, what: str, total: int | None = None) -> None:
         """Show what begins."""
@@ -65,6 +71,19 @@ class Terminal(Listener):
         if line not in self._said:
             self._said.add(line)
             self._console.print(line, markup=False, soft_wrap=True)
+
+    def note(self, message: str) -> None:
+        """Show what is to be known now; as a line where it was not said just before."""
+        now, text = monotonic(), message.rpartition(": ")[0] or message
+        if not self.quiet:
+            self.begin(message)
+            if text not in self._noted or now - self._noted[text] > REPEATED:
+                self._console.print(message, markup=False, soft_wrap=True)
+            self._noted[text] = now
+
+    def trouble(self, message: str) -> None:
+        """Say that no pictures come."""
+        self._console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
 
     def stop(self) -> None:
         """Take the bar away."""

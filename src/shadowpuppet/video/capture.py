@@ -40,8 +40,13 @@ class Newest(Generic[Item]):
             item, self._item = self._item, None
             return item
 
+    @property
+    def waiting(self) -> bool:
+        """Whether something is there."""
+        return self._item is not None
+
     def wake(self) -> None:
-        """End whoever's waiting."""
+        """End the waiting of whoever waits."""
         with self._changed:
             self._changed.notify_all()
 
@@ -112,5 +117,5 @@ class Capture:
                 if self._stop.is_set() or self._again.is_set():
                     break
                 self.problem, came = "", True
-                self.newest.put(shot)
+                self.newest.put(shot._replace(number=self.newest.put_count))
         return came

@@ -32,6 +32,8 @@ class Snapshot(NamedTuple):
     image: Image
     shown: float | None = None
     """A film's own time, seconds."""
+    number: int = 0
+    """How many pictures came before it."""
 
 
 @dataclass(frozen=True)

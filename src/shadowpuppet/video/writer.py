@@ -49,7 +49,7 @@ class FrameWriter:
         self.crf = crf
         self.path, self.partial = path, path.with_name(f"{path.stem}.part{path.suffix}")
         self.rate, self.size, self.lossless = Fraction(rate).limit_denominator(1001), size, lossless
-        self.count = 0
+        self.count, self._stamp, self._base = 0, -1, 1 / self.rate
         self._shape: tuple[int, ...] = ()
         self._container: Any = None
         self._stream: Any = None
@@ -71,14 +71,18 @@ class FrameWriter:
             self._close()
             os.replace(self.partial, self.path)
 
-    def write(self, image: Image) -> None:
-        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, of the first one's shape; it is scaled to `size`."""
+    def write(self, image: Image, time: float | None = None) -> None:
+        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, of the first one's shape; it is scaled to `size`.
+
+        `time`: when it is shown, seconds, to the millisecond, for a film whose pictures do not come at its rate; for all or none.
+        """
         check_image(self.path, image)
         image = self._fitted(image)
         with self._told():
             if self._container is None:
+                self._base = 1 / self.rate if time is None else Fraction(1, 1000)
                 self._open(image)
-            self._encode(self._frame(image))
+            self._encode(self._frame(image, time))
         self.count += 1
 
     def _fitted(self, image: Image) -> Image:
@@ -93,11 +97,12 @@ class FrameWriter:
             image = np.pad(image, [(0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)][: image.ndim], "edge")
         return np.ascontiguousarray(image)
 
-    def _frame(self, image: Image) -> VideoFrame:
+    def _frame(self, image: Image, time: float | None) -> VideoFrame:
         import av
 
         frame = av.VideoFrame.from_ndarray(image, format="gray" if image.ndim == 2 else "bgr24")
-        frame.pts, frame.time_base = self.count, 1 / self.rate
+        self._stamp = self.count if time is None else max(round(time / self._base), self._stamp + 1)
+        frame.pts, frame.time_base = self._stamp, self._base
         return frame
 
     def _open(self, image: Image) -> None:
@@ -113,7 +118,7 @@ class FrameWriter:
         stream: Any = container.add_stream(codec, rate=self.rate, options=settings)
         stream.width, stream.height = size_of(image)
         stream.pix_fmt = "yuv420p" if not self.lossless else "gray" if image.ndim == 2 else "bgr0"
-        stream.codec_context.time_base = 1 / self.rate
+        stream.codec_context.time_base = self._base
         if not self.lossless:
             stream.codec_context.colorspace, stream.codec_context.color_range = BT601, STUDIO_RANGE
         self._stream = stream

@@ -1,0 +1,75 @@
+"""The picture of a live session: the camera's, with the silhouette's outline, the body's and the skeleton."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shadowpuppet.display.view import View
+from shadowpuppet.overlay import SILHOUETTE_ONLY, draw_skeleton
+
+if TYPE_CHECKING:
+    from shadowpuppet.video import Image, Size
+
+LEAST, MOST = 640, 960
+"""Pixels of the longer side of what is shown: lines on smaller pictures are coarse."""
+MODEL = (0, 159, 230)
+"""The body's colour, blue green red."""
+DIM, CLEAR = 0.45, 0.28
+"""Brightness of a picture that is not tracked, and how much of the body's colour lies over the person."""
+
+
+def drawn(view: View) -> Image | None:
+    """The view's picture (H, W, 3), blue green red, with all that is known drawn upon it; None where there is no picture."""
+    import cv2
+
+    if view.image is None:
+        return None
+    size = _shown_size((view.image.shape[1], view.image.shape[0]))
+    out = view.image if view.image.ndim == 3 else cv2.cvtColor(view.image, cv2.COLOR_GRAY2BGR)
+    out = np.array(cv2.resize(out, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+    if view.trouble or view.phase in ("learning", "measuring"):
+        out = np.asarray(cv2.convertScaleAbs(out, alpha=DIM), np.uint8)
+    if view.picture is not None and view.pose is not None:
+        _draw_body(out, view)
+    if view.mask is not None:
+        _draw_outline(out, view.mask, size)
+    return out
+
+
+def jpeg(image: Image, quality: int = 85) -> bytes:
+    """A picture as JPEG."""
+    import cv2
+
+    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+
+
+def _shown_size(size: Size) -> Size:
+    longest = max(size)
+    scale = min(max(longest, LEAST), MOST) / longest
+    return round(size[0] * scale), round(size[1] * scale)
+
+
+def _draw_body(out: Image, view: View) -> None:
+    assert view.picture is not None
+    assert view.pose is not None
+    picture = _scaled(view.picture, (out.shape[1], out.shape[0]))
+    body = picture.mask(view.pose)
+    out[body] = (out[body] * (1 - CLEAR) + np.array(MODEL) * CLEAR).astype(np.uint8)
+    draw_skeleton(out, picture, view.pose)
+
+
+@lru_cache(maxsize=2)
+def _scaled(picture: Picture, size: Size) -> Picture:
+    return replace(picture, camera=picture.camera.resized(size))
+
+
+def _draw_outline(out: Image, mask: np.ndarray, size: Size) -> None:
+    import cv2
+
+    large = cv2.GaussianBlur(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_LINEAR), (0, 0), 1.5)
+    lines = cv2.findContours((large > 127).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+    cv2.drawContours(out, lines, -1, SILHOUETTE_ONLY, 2, cv2.LINE_AA)

@@ -1,0 +1,189 @@
+"""A live run: a camera in, a run folder out, and something to look at meanwhile. Prints nothing: it tells a `Listener`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shadowpuppet.display.view import Display
+from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.person import Person, write_person
+from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.live.keeping import Keeper
+from shadowpuppet.live.session import Outcome, Session
+from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.sources import empty_scene, known_person, lens
+from shadowpuppet.live.stopping import Stop
+from shadowpuppet.live.timing import Timing
+from shadowpuppet.live.vigil import Vigil
+from shadowpuppet.live.warming import warm_up
+from shadowpuppet.metrics import evaluate
+from shadowpuppet.options import Options, plain_options
+from shadowpuppet.pipeline import Listener, named_body
+from shadowpuppet.settings import validate
+from shadowpuppet.video.capture import Capture
+from shadowpuppet.video.feed import Feed, open_feed
+from shadowpuppet.video.stream import without_secrets
+
+IDLE = 0.05
+"""Seconds that a new picture is waited for before the display is served."""
+
+
+class LiveListener(Listener):
+    """Is told how a session goes, and does nothing: derive from it."""
+
+    def note(self, message: str) -> None:
+        """Something that the person before the camera, or at the terminal, is to know now."""
+
+    def trouble(self, message: str) -> None:
+        """No pictures come, or none that can be used."""
+
+
+class _Nobody(Exception):
+    """Nobody was tracked: there is nothing to keep."""
+
+
+def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
+             listener: LiveListener | None = None, display: Display | None = None,
+             clock: Callable[[], float] = time.monotonic) -> dict[str, Any] | None:
+    """Track a camera until Ctrl-C, the display's wish or a film's end, into a run folder; what is in metrics.json, or None.
+
+    The folder gets what `io.run` describes, person.toml, calibration.toml and, with `LiveSettings.record`, recording/. None,
+    and no folder, where nobody was tracked. Raises a `ShadowPuppetError` where something cannot be used.
+    """
+    options, settings = options or Options(), settings or LiveSettings()
+    listener, display = listener or LiveListener(), display or Display()
+    body, joints = named_body(options.tracker.body)
+    told = validate(LiveSettings, _plain(settings) | {"camera": without_secrets(settings.camera)})
+    info = {"camera": told.camera, "method": "Liu 2011, one camera, live", "started": datetime.now().astimezone().isoformat("T", "seconds"),
+            "settings": plain_options(options), "live": told}
+    folder = Path(folder)
+    try:
+        with RunWriter(folder, options.tracker.body, body.skeleton.dof_names, joints, info) as run:
+            session = _Live(run, options, settings, listener, display, clock)
+            session.run()
+    except _Nobody:
+        return None
+    motion = read_run(folder).motion
+    metrics = read_run(folder).metrics | evaluate(motion, camera=session.session.camera)
+    write_metrics(folder, metrics)
+    return metrics
+
+
+class _Live:
+    """What belongs together while it runs."""
+
+    def __init__(self, run: RunWriter, options: Options, settings: LiveSettings, listener: LiveListener, display: Display,
+                 clock: Callable[[], float]) -> None:
+        self.run_, self.options, self.listener, self.display, self.clock = run, options, listener, display, clock
+        person = known_person(options)
+        self.feed: Feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
+        full = lens(options, self.feed.size)
+        self.session = Session(full, options, settings, np.random.default_rng(options.seed), clock,
+                               Vigil(self.feed.name, self.feed.size, self.feed.live), Timing(self.feed.rate), person,
+                               empty_scene(options, full))
+        self.keeper = Keeper(run.folder / "recording", self.session.camera, self.feed.rate) if settings.record else None
+        self.capture, self.stop = Capture(self.feed), Stop()
+        self.frames, self.breaks, self.broke, self.said = 0, 0, np.nan, ""
+
+    def run(self) -> None:
+        """From the first picture to the last. Raises `_Nobody` where nobody was tracked."""
+        try:
+            with ExitStack() as stack:
+                stack.enter_context(self.stop)
+                stack.enter_context(self.display)
+                if self.keeper is not None:
+                    stack.enter_context(self.keeper)
+                self._open(stack)
+                self._follow()
+        except KeyboardInterrupt:
+            if self.frames:
+                raise
+        finally:
+            self.run_.metrics |= self._measures()
+        if not self.frames:
+            raise _Nobody
+
+    def _open(self, stack: ExitStack) -> None:
+        """Get ready, and let the pictures come; those of a film do not come before."""
+        self.listener.begin("getting ready")
+        self.stop.hasty = True
+        if self.feed.live:
+            stack.enter_context(self.capture)
+        warm_up(self.session.camera, self.options)
+        if not self.feed.live:
+            stack.enter_context(self.capture)
+        self.stop.hasty = False
+        self.listener.begin(self.session.phase)
+        if self.display.where:
+            self.listener.note(f"to be seen {self.display.where}")
+
+    def _follow(self) -> None:
+        while not (self.stop.wished or (self.capture.ended and not self.capture.newest.waiting)):
+            self.stop.hasty = self.session.phase == "measuring"
+            shot = self.capture.newest.take(IDLE)
+            outcome = self.session.step(shot) if shot is not None else self.session.idle(self.capture.problem)
+            self.stop.hasty = False
+            self._keep(outcome)
+            self._tell(outcome)
+            self.display.show(outcome.view)
+            if (wish := self.display.wish()) == "stop":
+                break
+            self.session.ask(wish)
+        if self.capture.error is not None:
+            raise self.capture.error
+
+    def _keep(self, outcome: Outcome) -> None:
+        if self.session.vigil.asks_again(self.clock()):
+            self.capture.again()
+        if outcome.frame is None:
+            return
+        if self.session.newly_measured():
+            self._write_beside()
+        self.run_.write(outcome.frame)
+        self.frames += 1
+        self.listener.advance(self.frames)
+        if self.keeper is not None and outcome.view.image is not None:
+            self.keeper.write(outcome.frame.time, outcome.view.image, self.session.scene, self.session.measured.guess.height)
+
+    def _write_beside(self) -> None:
+        """Whom and what this run was made of; anew where the person was measured anew."""
+        guess = self.session.measured.guess
+        source = str(self.options.person) if self.options.person else "proportions, refined on who stood still"
+        write_person(self.run_.folder / "person.toml", Person(guess.sizes, round(guess.height, 4), source))
+        write_calibration(self.run_.folder / "calibration.toml", [self.session.full])
+
+    def _tell(self, outcome: Outcome) -> None:
+        """Say what changed, once."""
+        view, now = outcome.view, self.clock()
+        if view.trouble and np.isnan(self.broke):
+            self.broke, self.breaks = now, self.breaks + 1
+            self.listener.trouble(view.trouble)
+        elif not view.trouble and view.image is not None and not np.isnan(self.broke):
+            self.listener.note(f"pictures come again, after {now - self.broke:.1f} s")
+            self.broke = np.nan
+        if not view.trouble and (said := _said(view.phase, view.message, view.countdown)) != self.said:
+            self.said = said
+            if said:
+                self.listener.note(said)
+
+    def _measures(self) -> dict[str, Any]:
+        live = {"pictures": self.capture.newest.put_count, "dropped": self.session.timing.dropped, "breaks": self.breaks}
+        return {"live": live | self.session.timing.summary()}
+
+
+def _said(phase: str, message: str, countdown: float | None) -> str:
+    counted = f"{message}: {np.ceil(countdown):.0f}" if countdown is not None and countdown > 0 else message
+    return counted if message else phase
+
+
+def _plain(settings: LiveSettings) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return asdict(settings)

@@ -1,0 +1,227 @@
+"""A live session: learns the empty scene, waits for a person, measures and tracks them. Knows no threads, files or sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.display.view import Angle, View
+from shadowpuppet.footage import Mask, Shot, Silhouettes, region_of, worked_size
+from shadowpuppet.initialization import Fit, find_person
+from shadowpuppet.io.person import Person
+from shadowpuppet.live.learning import Learner
+from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.timing import Timing
+from shadowpuppet.live.vigil import Vigil
+from shadowpuppet.live.waiting import Waiter, unfit
+from shadowpuppet.motion import BLANK, MotionFrame
+from shadowpuppet.options import Options
+from shadowpuppet.pipeline import motion_frame, named_body, next_state
+from shadowpuppet.silhouette import learn_background
+from shadowpuppet.tracking import LOST, MonocularTracker, State
+from shadowpuppet.video import Image
+from shadowpuppet.video.feed import Snapshot
+
+GONE = 2.0
+"""Seconds for which a person is lost, after which a new measurement is advised."""
+
+
+class Outcome(NamedTuple):
+    """What came of a picture, or of none."""
+
+    view: View
+    frame: MotionFrame | None = None
+    """The person's, where somebody is tracked."""
+
+
+@dataclass(eq=False)
+class Session:
+    """The session's state; `step` is called with every picture, `idle` where none came. The generator is the only chance."""
+
+    full: Camera
+    """The camera as it gives its pictures."""
+    options: Options
+    settings: LiveSettings
+    rng: np.random.Generator
+    clock: Callable[[], float]
+    """Seconds that never go back: those that pictures are stamped with."""
+    vigil: Vigil
+    timing: Timing
+    person: Person | None = None
+    """Whose sizes are known."""
+    scene: list[Image] = field(default_factory=list)
+    """Pictures of the empty scene, of the worked size; where there are none they are learnt."""
+    phase: str = "learning"
+    fit: Fit | None = None
+    """Sizes and place, once they are found."""
+    trouble: str = ""
+    """Why no pictures come; empty where they do."""
+
+    def __post_init__(self) -> None:
+        """Make what follows from the settings. Raises `SettingsError` for a region that is none."""
+        self.camera = self.full.resized(worked_size(self.full.size, self.options.max_size))
+        self._region = region_of(self.options.region, self.full, self.camera)
+        self._began, self._lost_since, self._new = np.nan, np.nan, False
+        self._learner = Learner(self.settings.countdown, self.settings.learn)
+        self._waiter, self._still = Waiter(self.settings.still), list[tuple[Image, Mask]]()
+        self._recent: list[Image] = []
+        self._tracker: MonocularTracker | None = None
+        self._state: State | None = None
+        self._silhouettes: Silhouettes | None = None
+        if self.scene:
+            self._learnt(self.scene)
+
+    # What comes
+
+    def step(self, shot: Snapshot) -> Outcome:
+        """A picture; in the phase `measuring` this takes seconds. Raises `SilhouetteError` where the scene cannot be learnt."""
+        self._began = shot.captured if np.isnan(self._began) else self._began
+        trouble = self.vigil.see(shot.captured, shot.image)
+        if trouble:
+            return self._pause(trouble)
+        self.trouble = ""
+        self.timing.came(shot.captured, shot.number)
+        image = self._scaled(shot.image)
+        return {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}[self.phase](shot, image)
+
+    def idle(self, problem: str = "") -> Outcome:
+        """No picture came for a moment; `problem`: why, where that is known."""
+        trouble = self.vigil.silence(self.clock(), problem, self.timing.interval)
+        return self._pause(trouble) if trouble else Outcome(self._view())
+
+    def ask(self, wish: str) -> None:
+        """`learn` the background anew, or `measure` the person anew; nothing where it is not the time for it."""
+        if wish == "learn" and self.phase in ("waiting", "tracking"):
+            self._learner, self.phase = Learner(self.settings.countdown, self.settings.learn), "learning"
+        elif wish == "measure" and self.phase == "tracking":
+            self._waiter, self.phase, self._recent = Waiter(self.settings.still), "waiting", []
+
+    @property
+    def measured(self) -> Fit:
+        """Sizes and place of the person, who was found."""
+        assert self.fit is not None
+        return self.fit
+
+    def newly_measured(self) -> bool:
+        """Whether the person was measured since this was last asked."""
+        new, self._new = self._new, False
+        return new
+
+    # Phases
+
+    def _learn(self, shot: Snapshot, image: Image) -> Outcome:
+        scene = self._learner.see(shot.captured, image)
+        if scene is not None:
+            self._learnt(scene)
+        return Outcome(self._view(image))
+
+    def _wait(self, shot: Snapshot, image: Image) -> Outcome:
+        mask = self._mask(shot, image)
+        self._recent = [*self._recent[-7:], image]
+        masks = self._waiter.see(shot.captured, mask)
+        if masks is not None:
+            self.phase, self._masks = "measuring", masks
+        return Outcome(self._view(image, mask))
+
+    def _measure(self, shot: Snapshot, image: Image) -> Outcome:
+        """Sizes and place of who stood still; of whom they are known, the place alone."""
+        sizes = self.fit.guess.sizes if self.fit else self.person.sizes if self.person else None
+        known = self.fit.guess.height if self.fit else self.options.height or (self.person.height if self.person else None)
+        fit = find_person(self.rng, self.camera, self._masks, height=known, distance=None if self.fit else self.options.distance, sizes=sizes,
+                          body=self.options.tracker.body, settings=self.options.initialization)
+        if np.median(list(fit.overlaps.values())) < LOST:
+            self._waiter, self.phase = Waiter(self.settings.still), "waiting"
+            self._waiter.message = "no person's shape: stand whole in the picture, facing the camera"
+            return Outcome(self._view(image))
+        self._learnt(self.scene, self._recent)
+        self.fit, self.phase, self._state = fit, "tracking", None
+        self._tracker = MonocularTracker(fit.guess.picture(self.camera, self.options.tracker.body), self.options.tracker)
+        self._new = True
+        self.timing.pause()
+        return Outcome(self._view(image))
+
+    def _track(self, shot: Snapshot, image: Image) -> Outcome:
+        assert self._tracker is not None
+        mask = self._mask(shot, image)
+        state = self._state = next_state(self._tracker, self.rng, self._state, mask)
+        now = self.clock()
+        self.timing.done(shot.captured, now, shot.number)
+        status = state.status if state else "absent"
+        if status != "lost":
+            self._lost_since = np.nan
+        elif np.isnan(self._lost_since):
+            self._lost_since = shot.captured
+        frame = motion_frame(self._seconds(shot), state, self._tracker.picture, self._columns)
+        return Outcome(self._view(image, mask, state, now - shot.captured), frame)
+
+    # Parts
+
+    def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
+        """The background; with pictures of the person also how blurred outlines are."""
+        seen = Silhouettes("live", None, self._region, scene[0] if self._region else None)
+        segmenter = learn_background(scene, self.options.silhouette, film=[seen.visible(image) for image in film] if film else None)
+        self.scene, self._silhouettes = scene, Silhouettes("live", segmenter, self._region, seen.blank)
+        self.phase, self._state = ("tracking" if self.fit else "waiting"), None
+
+    def _pause(self, trouble: str) -> Outcome:
+        """Nothing comes that can be used: the person is kept, what waits for time to pass begins anew."""
+        self.trouble = trouble
+        self._learner.wait()
+        self._waiter.wait()
+        self.timing.pause()
+        return Outcome(self._view())
+
+    def _seconds(self, shot: Snapshot) -> float:
+        """A picture's time in the run: a film's own, else since the first picture."""
+        return shot.captured - self._began if shot.shown is None else shot.shown
+
+    def _scaled(self, image: Image) -> Image:
+        import cv2
+
+        if image.shape[1::-1] == self.camera.size:
+            return image
+        return np.asarray(cv2.resize(image, self.camera.size, interpolation=cv2.INTER_AREA), np.uint8)
+
+    def _mask(self, shot: Snapshot, image: Image) -> Mask:
+        assert self._silhouettes is not None
+        return self._silhouettes(Shot(shot.captured, image, None))
+
+    @cached_property
+    def _columns(self) -> list[int]:
+        body, joints = named_body(self.options.tracker.body)
+        return [body.landmark_names.index(name) for name in joints]
+
+    # What is shown
+
+    def _view(self, image: Image | None = None, mask: Mask | None = None, state: State | None = None, latency: float = np.nan) -> View:
+        tracking = self.phase == "tracking"
+        status = (state.status if state else "absent") if tracking and mask is not None else ""
+        pose = state.pose if state is not None and state.status not in BLANK else None
+        picture = self._tracker.picture if self._tracker else None
+        return View(
+            phase=self.phase, message=self._message(mask), countdown=self._learner.left if self.phase == "learning" else None,
+            trouble=self.trouble, status=status, overlap=state.overlap if state and pose is not None else np.nan,
+            angles=_angles(picture, pose) if tracking else (), latency=latency, rate=self.timing.rate, interval=self.timing.interval,
+            dropped=self.timing.dropped, image=image, mask=mask, picture=picture, pose=pose,
+        )  # fmt: skip
+
+    def _message(self, mask: Mask | None) -> str:
+        if self.phase == "tracking":
+            hint = unfit(mask) if mask is not None else ""
+            gone = not np.isnan(self._lost_since) and self.clock() - self._lost_since > GONE
+            return hint if hint.startswith("nearly all") else "the body does not fit any more: measure anew" if gone else ""
+        return {"learning": self._learner.message, "waiting": self._waiter.message, "measuring": "measuring: one moment"}[self.phase]
+
+
+def _angles(picture, pose: np.ndarray | None) -> tuple[Angle, ...]:
+    """All rotations, degrees."""
+    if picture is None:
+        return ()
+    values = np.full(len(picture.body.skeleton.dofs), np.nan) if pose is None else pose
+    return tuple(Angle(dof.name.replace("_", " "), float(np.degrees(value)), round(float(np.degrees(dof.low))), round(float(np.degrees(dof.high))))
+                 for dof, value in zip(picture.body.skeleton.dofs, values) if dof.kind == "rotation")

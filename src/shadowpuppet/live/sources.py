@@ -1,0 +1,61 @@
+"""What a session begins with: the camera's pictures and lens, the person, the empty scene."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.footage import worked_size
+from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.person import Person, read_person
+from shadowpuppet.live.learning import KEPT
+from shadowpuppet.options import Options
+from shadowpuppet.silhouette.background import spread
+from shadowpuppet.video import Image, Size, open_frames
+
+USUAL_FOV = 65.0
+"""Horizontal field of view (degrees) of a webcam, assumed where nothing is said."""
+
+
+def lens(options: Options, size: Size) -> Camera:
+    """The camera for pictures of a size. Raises `CalibrationError` where the calibration is not for them."""
+    if options.calibration is None:
+        if options.fov is None:
+            _warn(f"no field of view is given: {USUAL_FOV:g} degrees are assumed, and depths are as wrong as that; give --fov or "
+                  "--calibration")
+        return Camera.from_fov(size, float(np.radians(options.fov or USUAL_FOV)))
+    if options.fov is not None:
+        raise CalibrationError(f"{options.calibration}: found a field of view and a calibration, expected one of them")
+    cameras = read_calibration(options.calibration)
+    if len(cameras) > 1:
+        raise CalibrationError(f"{options.calibration}: found the cameras {choices(c.name for c in cameras)}, expected one alone")
+    if cameras[0].size != size:
+        (width, height), (w, h) = size, cameras[0].size
+        raise CalibrationError(f"{options.calibration}: size: found {w} x {h} pixels, expected {width} x {height} as the camera gives them")
+    return cameras[0]
+
+
+def known_person(options: Options) -> Person | None:
+    """Whose sizes are known. Raises `FormatError`."""
+    person = read_person(options.person) if options.person is not None else None
+    if options.height is None and (person is None or person.height is None) and options.distance is None:
+        _warn("neither height nor distance is known: the average height is assumed, and all lengths are as wrong as that; give --height")
+    return person
+
+
+def empty_scene(options: Options, full: Camera) -> list[Image]:
+    """Pictures of the empty scene from a file, of the worked size; none where no file is given. Raises `RecordingError`."""
+    if options.background is None:
+        return []
+    size = open_frames(options.background).size
+    if size != full.size:
+        raise RecordingError(f"{options.background}: found the empty scene of {size[0]} x {size[1]} pixels, expected {full.size[0]} x "
+                             f"{full.size[1]} as the camera's: it must come from the same camera at the same setting")
+    return spread((frame.image for frame in open_frames(options.background, size=worked_size(size, options.max_size))), KEPT)
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, ShadowPuppetWarning, stacklevel=3)

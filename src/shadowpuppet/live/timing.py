@@ -1,0 +1,63 @@
+"""How late poses are, and how many come in a second."""
+
+from __future__ import annotations
+
+from array import array
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+RECENT = 15
+"""Pictures over which the rate that is shown is taken."""
+
+
+class Timing:
+    """Latencies and rates of a session: what is shown, and what is kept."""
+
+    def __init__(self, told: float) -> None:
+        """`told`: frames/s as the camera tells them; not a number where it does not."""
+        self._usual = 1 / told
+        self.latencies, self._done = array("d"), deque[float](maxlen=RECENT + 1)
+        self.dropped = 0
+        """Pictures that came while another was tracked."""
+        self._first: tuple[float, int] | None = None
+        self._last, self._tracked, self._worked = (0.0, 0), -1, 0.0
+
+    def came(self, captured: float, number: int) -> None:
+        """The camera's n-th picture, and when it was captured (s)."""
+        self._first, self._last = self._first or (captured, number), (captured, number)
+
+    def pause(self) -> None:
+        """No pictures came for a while, which is not the pace of anything."""
+        self._usual, self._first, self._tracked = self.interval, None, -1
+        self._done.clear()
+
+    def done(self, captured: float, now: float, number: int) -> None:
+        """A pose is there, now (s), for the n-th picture, which was captured at a time (s)."""
+        self.dropped += number - self._tracked - 1 if self._tracked >= 0 else 0
+        self._tracked = number
+        self.latencies.append(now - captured)
+        self._worked += now - (self._done[-1] if self._done else captured)
+        self._done.append(now)
+
+    @property
+    def interval(self) -> float:
+        """Seconds from picture to picture, as they come; as the camera tells it, before two came."""
+        (last, number), (first, before) = self._last, self._first or self._last
+        return (last - first) / (number - before) if number > before and last > first else self._usual
+
+    @property
+    def rate(self) -> float:
+        """Poses a second, of late; not a number before two."""
+        return (len(self._done) - 1) / (self._done[-1] - self._done[0]) if len(self._done) > 1 else np.nan
+
+    def summary(self) -> dict[str, Any]:
+        """As metrics.json has it: milliseconds, and frames of the camera."""
+        if not self.latencies:
+            return {}
+        late, interval = np.array(self.latencies), self.interval
+        of = {"median": np.median(late), "p95": np.percentile(late, 95), "max": late.max()}
+        return {"latency_ms": {key: round(1000 * float(value), 2) for key, value in of.items()},
+                "latency_frames": {key: round(float(value) / interval, 3) for key, value in of.items()},
+                "interval_ms": round(1000 * interval, 2), "frames_per_s": round(len(late) / max(self._worked, 1e-9), 2)}
