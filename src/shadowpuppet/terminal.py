@@ -18,7 +18,6 @@ from shadowpuppet.live.run import LiveListener
 from shadowpuppet.look import Look
 from shadowpuppet.tables import look_table
 
-
 REPEATED = 10.0
 """Seconds after which what was said is said again."""
 

@@ -12,13 +12,14 @@ from shadowpuppet.display.view import View
 from shadowpuppet.overlay import SILHOUETTE_ONLY, draw_skeleton
 
 if TYPE_CHECKING:
+    from shadowpuppet.rasterize import Picture
     from shadowpuppet.video import Image, Size
 
 LEAST, MOST = 640, 960
 """Pixels of the longer side of what is shown: lines on smaller pictures are coarse."""
 MODEL = (0, 159, 230)
 """The body's colour, blue green red."""
-DIM, CLEAR = 0.45, 0.28
+DIM, TINT = 0.45, 0.15
 """Brightness of a picture that is not tracked, and how much of the body's colour lies over the person."""
 
 
@@ -58,7 +59,7 @@ def _draw_body(out: Image, view: View) -> None:
     assert view.pose is not None
     picture = _scaled(view.picture, (out.shape[1], out.shape[0]))
     body = picture.mask(view.pose)
-    out[body] = (out[body] * (1 - CLEAR) + np.array(MODEL) * CLEAR).astype(np.uint8)
+    out[body] = (out[body] * (1 - TINT) + np.array(MODEL) * TINT).astype(np.uint8)
     draw_skeleton(out, picture, view.pose)
 
 

@@ -43,7 +43,7 @@ function showAngles(angles) {
     const ends = [place(0), place(value ?? 0)].sort((a, b) => a - b);
     bar.fill.style.left = ends[0] + "%";
     bar.fill.style.width = ends[1] - ends[0] + "%";
-    bar.value.textContent = value === null ? "–" : Math.round(value) + "°";
+    bar.value.textContent = value === null ? "–" : (Math.round(value) || 0) + "°";
   }
 }
 
@@ -70,7 +70,7 @@ function showLatencies(view) {
   latencies.forEach(([time, late], n) => n && time - latencies[n - 1][0] < 1 ? pen.lineTo(x(time), y(late)) : pen.moveTo(x(time), y(late)));
   pen.stroke();
   const [last] = latencies.slice(-1);
-  byId("frames").textContent = last && view.interval ? (last[1] / view.interval).toFixed(2) + " of a frame's time (dashed)" : "";
+  byId("frames").textContent = last && view.interval ? (last[1] / view.interval).toFixed(2) + " frames (dashed: one)" : "";
 }
 
 function show(view) {

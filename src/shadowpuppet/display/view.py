@@ -54,8 +54,6 @@ class View:
     """Seconds from picture to picture, as the camera gives them."""
     dropped: int = 0
     """Pictures that came while another was worked on."""
-    seconds: float = 0.0
-    """Since the person was found."""
     image: Image | None = None
     """The picture (H, W, 3), blue green red, or (H, W) grey; not to be written to."""
     mask: NDArray[np.bool_] | None = None
@@ -73,8 +71,8 @@ class View:
     def figures(self) -> dict[str, Any]:
         """All but the pictures, as JSON has it: milliseconds and degrees, null for what is not known."""
         return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": _number(self.countdown, 1),
-                "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1), "interval": _number(1000 * self.interval, 1),
-                "rate": _number(self.rate, 1), "dropped": self.dropped, "seconds": _number(self.seconds, 1),
+                "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1),
+                "interval": _number(1000 * self.interval, 1), "rate": _number(self.rate, 1), "dropped": self.dropped,
                 "angles": [[a.name, _number(a.value, 1), a.low, a.high] for a in self.angles]}
 
 

@@ -110,7 +110,7 @@ class _Server6(_Server):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: _Server
+    server: _Server  # pyright: ignore[reportIncompatibleVariableOverride]
     server_version, sys_version = "shadowpuppet", ""
     timeout = 30
 
@@ -129,6 +129,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(self.server.display.picture(*self.server.display.next(0, 0.0)), "image/jpeg")
         elif path == "/picture.mjpeg":
             self._begin(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+            self.wfile.write(f"--{BOUNDARY}\r\n".encode())
             self._follow(self._picture)
         elif path == "/events":
             self._begin("text/event-stream")
@@ -170,25 +171,27 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def _follow(self, part: Any) -> None:
-        """Send parts as views come, until somebody has enough."""
+        """Send parts as views come, and again where none comes, until somebody has enough."""
         display, number = self.server.display, 0
         while not display.closed:
             began = time.monotonic()
             new, view = display.next(number)
-            if data := part(new, view, new > number):
+            if data := part(new, view):
                 self.wfile.write(data)
             number = new
             time.sleep(max(1 / MOST_A_SECOND - (time.monotonic() - began), 0))
         if part == self._figures:
             self.wfile.write(b'data: {"over": true}\n\n')
 
-    def _picture(self, number: int, view: View, new: bool) -> bytes:
-        data = self.server.display.picture(number, view) if new else b""
-        return b"--%s\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n%s\r\n" % (BOUNDARY.encode(), len(data), data) if data else b""
+    def _picture(self, number: int, view: View) -> bytes:
+        """A part, and the boundary after it: browsers show a picture once they see where it ends."""
+        data = self.server.display.picture(number, view)
+        head = f"Content-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+        return head.encode() + data + f"\r\n--{BOUNDARY}\r\n".encode() if data else b""
 
-    def _figures(self, number: int, view: View, new: bool) -> bytes:
+    def _figures(self, number: int, view: View) -> bytes:
         figures = view.figures() | {"footer": self.server.display.footer}
-        return f"data: {json.dumps(figures, allow_nan=False)}\n\n".encode()  # again where nothing is new: a sign of life
+        return f"data: {json.dumps(figures, allow_nan=False)}\n\n".encode()
 
 
 def known_host(header: str, loopback: bool) -> bool:
@@ -202,23 +205,28 @@ def known_host(header: str, loopback: bool) -> bool:
         return False
     if name == "localhost":
         return True
-    try:
-        address = ipaddress.ip_address(name)
-    except ValueError:
+    address = _address(name)
+    if address is None:
         return not loopback and name == socket.gethostname().lower()
     return address.is_loopback or not loopback
 
 
 def is_loopback(listen: str) -> bool:
     """Whether an address is reached from this machine alone."""
+    address = _address(listen)
+    return listen == "localhost" or (address is not None and address.is_loopback)
+
+
+def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """An address, where a text is one."""
     try:
-        return listen == "localhost" or ipaddress.ip_address(listen).is_loopback
+        return ipaddress.ip_address(text)
     except ValueError:
-        return False
+        return None
 
 
 def _listening(listen: str, port: int | None, display: WebDisplay) -> _Server:
-    kind = _Server6 if ":" in listen else _Server
+    kind, why = _Server6 if ":" in listen else _Server, ""
     for tried in (PORT, 0) if port is None else (port,):
         try:
             server = kind((listen, tried), _Handler)
@@ -232,14 +240,7 @@ def _listening(listen: str, port: int | None, display: WebDisplay) -> _Server:
 
 
 def _shown_host(listen: str) -> str:
-    if ipaddress_or_none(listen) is not None and ipaddress.ip_address(listen).is_unspecified:
+    address = _address(listen)
+    if address is not None and address.is_unspecified:
         return socket.gethostname()
     return f"[{listen}]" if ":" in listen else listen
-
-
-def ipaddress_or_none(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """An address, where a text is one."""
-    try:
-        return ipaddress.ip_address(text)
-    except ValueError:
-        return None

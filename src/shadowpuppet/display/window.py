@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -18,6 +19,8 @@ CALM = "#6f9fd8"
 BARS = {"left": "#3fb68b", "right": "#d08cb8", "torso": "#e8d44d"}
 SIDE, MARGIN, FONT = 380, 20, "Helvetica"
 """Width of the column beside the picture, and the space around, pixels."""
+LEAST_HEIGHT = 550
+"""Of the window, pixels, so that all angles fit."""
 LATENCIES = 300
 """Pictures in the sparkline."""
 KEYS = {"q": "stop", "<Escape>": "stop", "b": "learn", "m": "measure"}
@@ -56,7 +59,7 @@ class WindowDisplay(Display):
         self.root.protocol("WM_DELETE_WINDOW", lambda: self._ask("stop"))
         for key, wish in KEYS.items():
             self.root.bind(key, lambda _, wish=wish: self._ask(wish))
-        self.canvas = tkinter.Canvas(self.root, width=640 + SIDE + 3 * MARGIN, height=600, background=GROUND, highlightthickness=0)
+        self.canvas = tkinter.Canvas(self.root, width=640 + SIDE + 3 * MARGIN, height=LEAST_HEIGHT, background=GROUND, highlightthickness=0)
         self.canvas.pack()
         self._photo: Any = None
         return self
@@ -65,10 +68,8 @@ class WindowDisplay(Display):
         """Close it."""
         import tkinter
 
-        try:
+        with contextlib.suppress(tkinter.TclError):  # which says that it is closed already
             self.root.destroy()
-        except tkinter.TclError:
-            pass  # it is closed already
 
     def wish(self) -> str:
         """The last key that was pressed; closing the window is a wish to stop."""
@@ -95,7 +96,7 @@ class WindowDisplay(Display):
         height, width = image.shape[:2]
         data = b"P6 %d %d 255 " % (width, height) + image[..., ::-1].tobytes()
         if self._photo is None:
-            self.canvas.configure(width=width + SIDE + 3 * MARGIN, height=max(height + 2 * MARGIN, 620))
+            self.canvas.configure(width=width + SIDE + 3 * MARGIN, height=max(height + 2 * MARGIN + 16, LEAST_HEIGHT))
         self._photo = tkinter.PhotoImage(master=self.root, data=data, format="PPM")
         self.canvas.delete("picture")
         self.canvas.create_image(MARGIN, MARGIN, image=self._photo, anchor="nw", tags="picture")
@@ -108,8 +109,8 @@ class WindowDisplay(Display):
         colour = CHIPS.get(view.chip, CALM)
         self.canvas.create_oval(left + SIDE - 100, 27, left + SIDE - 91, 36, fill=colour, outline="", tags="drawn")
         self._text(left + SIDE - 84, 32, view.chip, colour, bold=True)
-        figures = (("latency", view.latency * 1000, "{:.0f} ms"), ("speed", view.rate, "{:.1f} frames/s"), ("overlap", view.overlap, "{:.2f}"),
-                   ("dropped", view.dropped, "{:d}"))
+        figures = (("latency", view.latency * 1000, "{:.0f} ms"), ("speed", view.rate, "{:.1f} frames/s"),
+                   ("overlap", view.overlap, "{:.2f}"), ("dropped", view.dropped, "{:d}"))
         for n, (name, value, form) in enumerate(figures):
             x, y = left + (SIDE // 2) * (n % 2), 66 + 52 * (n // 2)
             self._text(x, y, name, FAINT, 9)
@@ -119,7 +120,8 @@ class WindowDisplay(Display):
             self._bar(angle, left, 248 + 22 * n + 8 * sum(angle.name.startswith(side) for side in ("left", "right"))
                       + 8 * angle.name.startswith("right"))
         self._message(view)
-        self._text(left, max(self.canvas.winfo_reqheight() - 26, 560), self.footer, FAINT, 8)
+        self._text(left, self.canvas.winfo_reqheight() - 26, self.footer, FAINT, 8)
+        self._text(MARGIN, self.canvas.winfo_reqheight() - 16, "q  stop      b  learn the background anew      m  measure anew", FAINT, 9)
 
     def _message(self, view: View) -> None:
         said = view.trouble or view.message
@@ -147,14 +149,19 @@ class WindowDisplay(Display):
 
     def _bar(self, angle: Angle, left: int, y: int) -> None:
         start, end = left + 178, left + SIDE - 48
-        place = lambda value: start + (end - start) * (np.clip(value, angle.low, angle.high) - angle.low) / (angle.high - angle.low)  # noqa: E731
+
+        def place(value: float) -> float:
+            return start + (end - start) * (np.clip(value, angle.low, angle.high) - angle.low) / (angle.high - angle.low)
+
         self._text(left, y, angle.name, size=10)
         self.canvas.create_rectangle(start, y - 3, end, y + 4, fill=LINE, outline="", tags="drawn")
         if np.isfinite(angle.value):
-            self.canvas.create_rectangle(place(0), y - 3, place(angle.value), y + 4, fill=BARS[angle.name.split()[0]], outline="", tags="drawn")
+            colour = BARS[angle.name.split()[0]]
+            self.canvas.create_rectangle(place(0), y - 3, place(angle.value), y + 4, fill=colour, outline="", tags="drawn")
         self.canvas.create_line(place(0), y - 6, place(0), y + 7, fill=FAINT, tags="drawn")
-        shown = f"{angle.value:.0f}°" if np.isfinite(angle.value) else "–"
+        shown = f"{round(angle.value)}°" if np.isfinite(angle.value) else "–"
         self.canvas.create_text(left + SIDE, y, text=shown, fill=TEXT, font=(FONT, 10), anchor="e", tags="drawn")
 
     def _text(self, x: float, y: float, text: str, colour: str = TEXT, size: int = 11, bold: bool = False) -> None:
-        self.canvas.create_text(x, y, text=text, fill=colour, font=(FONT, size, "bold" if bold else "normal"), anchor="w", tags="drawn")
+        self.canvas.create_text(x, y, text=text, fill=colour, font=(FONT, size, "bold" if bold else "normal"), anchor="w", width=SIDE,
+                                tags="drawn")

@@ -15,6 +15,7 @@ from shadowpuppet.display.view import Display
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.live.background import in_background
 from shadowpuppet.live.keeping import Keeper
 from shadowpuppet.live.session import Outcome, Session
 from shadowpuppet.live.settings import LiveSettings
@@ -86,7 +87,7 @@ class _Live:
         self.feed: Feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
         full = lens(options, self.feed.size)
         self.session = Session(full, options, settings, np.random.default_rng(options.seed), clock,
-                               Vigil(self.feed.name, self.feed.size, self.feed.live), Timing(self.feed.rate), person,
+                               Vigil(self.feed.name, self.feed.size, self.feed.live), Timing(self.feed.rate), in_background, person,
                                empty_scene(options, full))
         self.keeper = Keeper(run.folder / "recording", self.session.camera, self.feed.rate) if settings.record else None
         self.capture, self.stop = Capture(self.feed), Stop()
@@ -126,10 +127,8 @@ class _Live:
 
     def _follow(self) -> None:
         while not (self.stop.wished or (self.capture.ended and not self.capture.newest.waiting)):
-            self.stop.hasty = self.session.phase == "measuring"
             shot = self.capture.newest.take(IDLE)
             outcome = self.session.step(shot) if shot is not None else self.session.idle(self.capture.problem)
-            self.stop.hasty = False
             self._keep(outcome)
             self._tell(outcome)
             self.display.show(outcome.view)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,8 @@ class Session:
     """Seconds that never go back: those that pictures are stamped with."""
     vigil: Vigil
     timing: Timing
+    work: Callable[[Callable[[], Fit]], Callable[[], Fit | None]] = lambda task: partial(lambda fit: fit, task())
+    """Does what takes seconds; the answer is asked for its result until that is not None. As it is here, done at once."""
     person: Person | None = None
     """Whose sizes are known."""
     scene: list[Image] = field(default_factory=list)
@@ -79,7 +82,7 @@ class Session:
     # What comes
 
     def step(self, shot: Snapshot) -> Outcome:
-        """A picture; in the phase `measuring` this takes seconds. Raises `SilhouetteError` where the scene cannot be learnt."""
+        """A picture. Raises `SilhouetteError` where the scene cannot be learnt."""
         self._began = shot.captured if np.isnan(self._began) else self._began
         trouble = self.vigil.see(shot.captured, shot.image)
         if trouble:
@@ -87,7 +90,8 @@ class Session:
         self.trouble = ""
         self.timing.came(shot.captured, shot.number)
         image = self._scaled(shot.image)
-        return {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}[self.phase](shot, image)
+        phases = {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}
+        return phases[self.phase](shot, image)
 
     def idle(self, problem: str = "") -> Outcome:
         """No picture came for a moment; `problem`: why, where that is known."""
@@ -125,15 +129,22 @@ class Session:
         self._recent = [*self._recent[-7:], image]
         masks = self._waiter.see(shot.captured, mask)
         if masks is not None:
-            self.phase, self._masks = "measuring", masks
+            self.phase, self._measured = "measuring", self.work(self._fitting(masks))
         return Outcome(self._view(image, mask))
 
+    def _fitting(self, masks: list[Mask]) -> Callable[[], Fit]:
+        """Finds sizes and place of who stood still; of whom they are known, the place alone."""
+        known = self.fit.guess if self.fit else self.person
+        sizes, height = (known.sizes, known.height) if known else (None, None)
+        height = height if self.fit else self.options.height or height
+        distance = None if self.fit else self.options.distance
+        return partial(find_person, self.rng.spawn(1)[0], self.camera, masks, height=height, distance=distance, sizes=sizes,
+                       body=self.options.tracker.body, settings=self.options.initialization)
+
     def _measure(self, shot: Snapshot, image: Image) -> Outcome:
-        """Sizes and place of who stood still; of whom they are known, the place alone."""
-        sizes = self.fit.guess.sizes if self.fit else self.person.sizes if self.person else None
-        known = self.fit.guess.height if self.fit else self.options.height or (self.person.height if self.person else None)
-        fit = find_person(self.rng, self.camera, self._masks, height=known, distance=None if self.fit else self.options.distance, sizes=sizes,
-                          body=self.options.tracker.body, settings=self.options.initialization)
+        """Waits for the fit."""
+        if (fit := self._measured()) is None:
+            return Outcome(self._view(image, self._mask(shot, image)))
         if np.median(list(fit.overlaps.values())) < LOST:
             self._waiter, self.phase = Waiter(self.settings.still), "waiting"
             self._waiter.message = "no person's shape: stand whole in the picture, facing the camera"
@@ -223,5 +234,6 @@ def _angles(picture, pose: np.ndarray | None) -> tuple[Angle, ...]:
     if picture is None:
         return ()
     values = np.full(len(picture.body.skeleton.dofs), np.nan) if pose is None else pose
-    return tuple(Angle(dof.name.replace("_", " "), float(np.degrees(value)), round(float(np.degrees(dof.low))), round(float(np.degrees(dof.high))))
-                 for dof, value in zip(picture.body.skeleton.dofs, values) if dof.kind == "rotation")
+    rotations = [(dof, value) for dof, value in zip(picture.body.skeleton.dofs, values.tolist()) if dof.kind == "rotation"]
+    return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)), round(math.degrees(dof.high)))
+                 for dof, value in rotations)

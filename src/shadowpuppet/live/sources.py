@@ -32,10 +32,11 @@ def lens(options: Options, size: Size) -> Camera:
     cameras = read_calibration(options.calibration)
     if len(cameras) > 1:
         raise CalibrationError(f"{options.calibration}: found the cameras {choices(c.name for c in cameras)}, expected one alone")
-    if cameras[0].size != size:
-        (width, height), (w, h) = size, cameras[0].size
+    camera = next(iter(cameras))
+    if camera.size != size:
+        (width, height), (w, h) = size, camera.size
         raise CalibrationError(f"{options.calibration}: size: found {w} x {h} pixels, expected {width} x {height} as the camera gives them")
-    return cameras[0]
+    return camera
 
 
 def known_person(options: Options) -> Person | None:

@@ -53,7 +53,7 @@ class Waiter:
     def _moves(self, now: float, mask: Mask) -> bool:
         """Whether the silhouette differs from that of a quarter of a second ago, or from the last where there is none."""
         earlier = [seen for time, seen in self._seen if time <= now - APART] or [seen for _, seen in self._seen]
-        return not earlier or np.count_nonzero(mask ^ earlier[-1]) > STILL * np.count_nonzero(mask)
+        return not earlier or bool(np.count_nonzero(mask ^ earlier[-1]) > STILL * np.count_nonzero(mask))
 
 
 def unfit(mask: Mask) -> str:

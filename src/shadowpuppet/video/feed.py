@@ -83,10 +83,11 @@ def _camera(number: int, rate: float | None) -> Feed:
 
 
 def _stream(address: str) -> Feed:
-    size, rate = open_stream(address)[1:]
+    shown, size, rate = open_stream(address)
+    ready = [shown]  # many senders serve one reader, once
 
     def read() -> Iterator[Snapshot]:
-        for now, image in open_stream(address)[0]:
+        for now, image in ready.pop() if ready else open_stream(address)[0]:
             yield Snapshot(now, image)
 
     return Feed(without_secrets(address), size, rate, True, read)
