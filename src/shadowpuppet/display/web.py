@@ -21,7 +21,8 @@ PORT = 8600
 """Tried first where none is asked for."""
 MOST_A_SECOND = 20.0
 """Pictures and figures that a browser gets in a second; more cost the tracker time and show nothing new."""
-PAGE = {"/": ("page.html", "text/html"), "/page.css": ("page.css", "text/css"), "/page.js": ("page.js", "text/javascript")}
+PAGE = {"/": ("page.html", "text/html"), "/page.css": ("page.css", "text/css"), "/page.js": ("page.js", "text/javascript"),
+        "/icon.svg": ("icon.svg", "image/svg+xml")}
 BOUNDARY = "shadowpuppet"
 HEADERS = {
     "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",

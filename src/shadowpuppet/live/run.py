@@ -178,8 +178,10 @@ class _Live:
 
 
 def _said(phase: str, message: str, countdown: float | None) -> str:
-    counted = f"{message}: {np.ceil(countdown):.0f}" if countdown is not None and countdown > 0 else message
-    return counted if message else phase
+    """What a view is to say, with the seconds of a countdown; nothing at its very end."""
+    if countdown is None:
+        return message or phase
+    return f"{message}: {np.ceil(countdown):.0f}" if countdown > 0 else ""
 
 
 def _plain(settings: LiveSettings) -> dict[str, Any]:
