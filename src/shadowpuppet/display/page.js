@@ -6,8 +6,6 @@ const GROUPS = [["torso", "torso"], ["left", "left arm"], ["right", "right arm"]
 const bars = new Map();
 let latencies = [], over = false;
 
-byId("picture").src = "picture.mjpeg";
-
 function text(id, value) {
   const shown = value ?? "–";
   if (byId(id).textContent !== String(shown)) byId(id).textContent = shown;
