@@ -184,6 +184,16 @@ def test_known_sizes_are_kept(pictures):
     assert stage.session.measured.guess.height == 1.72
 
 
+@pytest.mark.parametrize("silhouette", [{"method": "averaging"}, {"clean": False}])
+def test_in_plain_silhouettes_people_are_tracked_but_not_measured(pictures, silhouette):
+    stage = Stage(options=make_options(QUICK | {"height": HEIGHT, "distance": 2.0, "silhouette": silhouette})).to_tracking(pictures)
+    plain = stage.give(pictures[1][22]).view.mask
+    clean = Stage().to_tracking(pictures).give(pictures[1][22]).view.mask
+    assert (plain & clean).sum() > 0.6 * clean.sum()
+    assert (plain != clean).any()
+    assert stage.session.measured.guess.sizes == Stage().to_tracking(pictures).session.measured.guess.sizes
+
+
 def test_a_known_background_is_not_learnt_again(pictures):
     full = Camera.from_fov(SIZE, np.radians(60))
     parts = np.random.default_rng(1), Clock(), Vigil("cam", SIZE, True), Timing(RATE)

@@ -243,11 +243,17 @@ def clear_silhouettes(footage: Footage, sample: Sample, seen: Silhouettes, optio
 
     A filter finds a body among specks and holes once its sizes are known; sizes and postures cannot be told from them.
     """
-    asked = options.silhouette
-    if seen.segmenter is None or (asked.cleaned and asked.method != "averaging"):
+    clean = clear_settings(options.silhouette)
+    if seen.segmenter is None or clean == options.silhouette:
         return seen
-    clean = SilhouetteSettings() if asked.method == "averaging" else replace(asked, clean=None)
     return silhouettes(footage, sample, replace(options, silhouette=clean))
+
+
+def clear_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
+    """Settings of silhouettes that a person can be measured in: those asked for, where these make clean ones."""
+    if asked.method == "averaging":
+        return SilhouetteSettings()
+    return asked if asked.cleaned else replace(asked, clean=None)
 
 
 def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.display.view import Angle, View
-from shadowpuppet.footage import Mask, Shot, Silhouettes, region_of, worked_size
+from shadowpuppet.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
 from shadowpuppet.initialization import Fit, find_person
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.learning import Learner
@@ -76,6 +76,7 @@ class Session:
         self._tracker: MonocularTracker | None = None
         self._state: State | None = None
         self._silhouettes: Silhouettes | None = None
+        self._clear: Silhouettes | None = None
         if self.scene:
             self._learnt(self.scene)
 
@@ -175,8 +176,11 @@ class Session:
     def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
         """The background; with pictures of the person also how blurred outlines are."""
         seen = Silhouettes("live", None, self._region, scene[0] if self._region else None)
-        segmenter = learn_background(scene, self.options.silhouette, film=[seen.visible(image) for image in film] if film else None)
-        self.scene, self._silhouettes = scene, Silhouettes("live", segmenter, self._region, seen.blank)
+        visible = [seen.visible(image) for image in film] if film else None
+        asked, clear = self.options.silhouette, clear_settings(self.options.silhouette)
+        self.scene = scene
+        self._silhouettes = replace(seen, segmenter=learn_background(scene, asked, film=visible))
+        self._clear = self._silhouettes if clear == asked else replace(seen, segmenter=learn_background(scene, clear, film=visible))
         self.phase, self._state = ("tracking" if self.fit else "waiting"), None
 
     def _pause(self, trouble: str) -> Outcome:
@@ -199,8 +203,10 @@ class Session:
         return np.asarray(cv2.resize(image, self.camera.size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _mask(self, shot: Snapshot, image: Image) -> Mask:
-        assert self._silhouettes is not None
-        return self._silhouettes(Shot(shot.captured, image, None))
+        """The silhouette (H, W): that which is tracked in, before that a clean one, in which a person can be measured."""
+        silhouettes = self._silhouettes if self.phase == "tracking" else self._clear
+        assert silhouettes is not None
+        return silhouettes(Shot(shot.captured, image, None))
 
     @cached_property
     def _columns(self) -> list[int]:
