@@ -146,7 +146,7 @@ def test_a_film_with_nobody_in_it_leaves_nothing(pictures, tmp_path, capsys):
     (["--show", "none", "--camera", "gopher://x"], "found an address of the kind 'gopher'"),
     (["--show", "tv"], "tv"),
     (["--show", "none", "--learn", "0"], "learn: found 0"),
-    (["--listen", "203.0.113.7", "--show", "browser"], "listen: 203.0.113.7: the page cannot be served there"),
+    (["--port", "1", "--listen", "127.0.0.999", "--show", "browser"], "listen: 127.0.0.999, port: 1: the page cannot be served there"),
 ])  # fmt: skip
 def test_what_cannot_be_is_said_in_a_line(flags, said, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)

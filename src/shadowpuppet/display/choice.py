@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 
 from shadowpuppet.display.view import Display
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 
 FOOTERS = {
     False: "Pictures stay in this machine's memory; joints and angles alone are saved.",
@@ -26,9 +27,13 @@ def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, 
             return WindowDisplay(FOOTERS[record])
         if show == "window":
             raise SettingsError(f"show: no window can be opened ({why}); --show browser shows the same on a page")
-    from shadowpuppet.display.web import WebDisplay
+    from shadowpuppet.display.web import WebDisplay, is_loopback
 
-    return WebDisplay(listen, port, FOOTERS[record])
+    display = WebDisplay(listen, port, FOOTERS[record])
+    if not is_loopback(listen):
+        warnings.warn(f"the page is served at {listen}: everybody who reaches this machine can see the person there, and press the buttons",
+                      ShadowPuppetWarning, stacklevel=2)
+    return display
 
 
 def has_screen() -> bool:

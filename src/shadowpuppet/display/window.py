@@ -77,7 +77,15 @@ class WindowDisplay(Display):
         return wish
 
     def show(self, view: View) -> None:
-        """Draw a view, and let the window live."""
+        """Draw a view, and let the window live; one whose screen is gone is a wish to stop."""
+        import tkinter
+
+        try:
+            self._show(view)
+        except tkinter.TclError:
+            self._ask("stop")
+
+    def _show(self, view: View) -> None:
         image = drawn(view)
         if image is not None:
             self._put(image)
