@@ -327,7 +327,8 @@ def test_a_browser_shows_the_page(page, tmp_path):
             page.show(tracked())
 
     threading.Thread(target=play, daemon=True).start()
-    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,760", "--timeout=4000", "--disable-dev-shm-usage",
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,760", "--timeout=4000",
+               "--disable-dev-shm-usage",
                "--enable-logging=stderr", f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={tmp_path / 'page.png'}", page.address]
     try:
         said = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False).stderr
