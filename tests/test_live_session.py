@@ -374,7 +374,7 @@ def test_a_silent_camera_is_said_and_the_person_is_kept(pictures, tracking):
 
 def test_a_reader_s_own_word_is_passed_on_at_once(pictures, tracking):
     stage = tracking
-    assert stage.idle(0.01, "cam: unplugged").view.trouble == "cam: unplugged; it is tried again"
+    assert stage.idle(0.01, "cam: unplugged").view.trouble == "cam: unplugged (it is tried again)"
 
 
 def test_a_frozen_picture_is_said_not_tracked_and_taken_up_when_it_moves(pictures, tracking):

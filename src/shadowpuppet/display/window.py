@@ -25,6 +25,8 @@ LATENCIES = 300
 """Pictures in the sparkline."""
 KEYS = {"q": "stop", "<Escape>": "stop", "b": "learn", "m": "measure"}
 
+KEYS_TOLD = "q  stop      b  learn the background anew      m  measure anew"
+
 
 def no_window() -> str:
     """Why no window can be opened; empty where one can."""
@@ -129,7 +131,7 @@ class WindowDisplay(Display):
                       + 8 * angle.name.startswith("right"))
         self._message(view)
         self._text(left, self.canvas.winfo_reqheight() - 26, self.footer, FAINT, 8)
-        self._text(MARGIN, self.canvas.winfo_reqheight() - 16, "q  stop      b  learn the background anew      m  measure anew", FAINT, 9)
+        self._text(MARGIN, self.canvas.winfo_reqheight() - 16, KEYS_TOLD, FAINT, 9, width=640)
 
     def _message(self, view: View) -> None:
         said = view.trouble or view.message
@@ -170,6 +172,7 @@ class WindowDisplay(Display):
         shown = f"{round(angle.value)}°" if np.isfinite(angle.value) else "–"
         self.canvas.create_text(left + SIDE, y, text=shown, fill=TEXT, font=(FONT, 10), anchor="e", tags="drawn")
 
-    def _text(self, x: float, y: float, text: str, colour: str = TEXT, size: int = 11, bold: bool = False) -> None:
-        self.canvas.create_text(x, y, text=text, fill=colour, font=(FONT, size, "bold" if bold else "normal"), anchor="w", width=SIDE,
+    def _text(self, x: float, y: float, text: str, colour: str = TEXT, size: int = 11, bold: bool = False,
+              width: int = SIDE) -> None:
+        self.canvas.create_text(x, y, text=text, fill=colour, font=(FONT, size, "bold" if bold else "normal"), anchor="w", width=width,
                                 tags="drawn")

@@ -48,7 +48,7 @@ class Vigil:
         """What is wrong where no picture came until now (s), with the usual seconds between two; `problem` is the reader's own word."""
         self._came = now if np.isnan(self._came) else self._came
         if problem:
-            return f"{problem}; it is tried again"
+            return f"{problem} (it is tried again)"
         usual = SILENT_FRAMES * interval if np.isfinite(interval) else 0.0
         silent = self.live and now - self._came > max(SILENT, usual)
         return f"{self.name}: no picture for {now - self._came:.0f} s" if silent else ""
