@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import naive
 from people import camera, picture, random_poses
-from shadowpuppet import projection, rasterize, skeleton
+from shadowpuppet import projection, rasterize, skeleton, spans
 from shadowpuppet.body import BODIES, Body, Quads
 from shadowpuppet.first_pose import arm_parts
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
@@ -197,13 +197,13 @@ def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
     for odd in (np.asfortranarray(poses), np.repeat(poses, 2, 0)[::2], poses.tolist()):
         silhouette_costs(view, observation, odd)
     np.testing.assert_array_equal(cost(np.asfortranarray(poses)), cost(poses))
-    for kernel in (skeleton._forward, projection.project_quads, rasterize._added):
+    for kernel in (skeleton._forward, projection.project_quads, rasterize._compare, spans.find_edges):
         for signature in getattr(kernel, "signatures", []):
             layouts = {kind.layout for kind in signature if hasattr(kind, "layout")}
             assert layouts <= {"C"}, (kernel, signature)
 
 
-@pytest.mark.skipif(not hasattr(rasterize._added, "signatures"), reason="kernels are not compiled")
+@pytest.mark.skipif(not hasattr(rasterize._compare, "signatures"), reason="kernels are not compiled")
 @pytest.mark.parametrize("stage", ["full", "arm"])
 def test_bits_are_several_times_faster_than_opencv(stage):
     """Measured side by side in turns: six to ten times, with OpenCV's polygons ready-made; the guard leaves a margin of two."""

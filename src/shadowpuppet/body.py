@@ -50,6 +50,14 @@ class Hulls:
     radii: Array
     """Along the axes of the joint's frame, of shape (S, E, 3), metres."""
 
+    @cached_property
+    def numbers(self) -> NDArray[np.int64]:
+        """Ellipsoids of each hull (S,), without copies of its last."""
+        same = self.joints == self.joints[:, -1:]
+        for array in self.arrays:
+            same &= (array == array[:, -1:]).all(2)
+        return same.shape[1] + 1 - np.cumprod(same[:, ::-1], axis=1).sum(1)
+
     @property
     def arrays(self) -> tuple[Array, ...]:
         """What depends on a person's sizes, and linearly so."""

@@ -78,13 +78,12 @@ class Bodies:
 
     def costs(self, camera: Camera, T_camera_base: Array, observation: Observation, poses: Array, sizes: Array, shift: Array) -> Array:
         """Eq. 2 (N,), pixels, of poses (N, D) with sizes (N, 18), moved by `shift` (N, 2) along the X and Z of the body's frame."""
-        picture, skeleton = Picture(self.body, camera, T_camera_base), self.body.skeleton
+        picture = Picture(self.body, camera, T_camera_base)
         offsets, *arrays = (np.ascontiguousarray(np.tensordot(sizes, slope, 1), float) for slope in self.slopes)
         offsets[:, 0, [0, 2]] += shift
-        transforms = np.empty((len(poses), len(skeleton.joints), 3, 4))
-        skeleton.forward_some(np.ascontiguousarray(poses), np.arange(len(skeleton.joints)), transforms, T_camera_base, offsets)
-        added = picture.added(transforms, np.arange(len(self.body.parts)), observation.silhouette, observation.ignore, tuple(arrays))
-        return observation.area + added[:, 0] - 2.0 * added[:, 1]
+        every = np.arange(len(self.body.parts))
+        added = picture.added(poses, every, observation.silhouette, observation.ignore, measures=(offsets, *arrays))
+        return observation.area + added.astype(float)
 
 
 class Hypotheses:

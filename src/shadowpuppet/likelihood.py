@@ -66,20 +66,13 @@ class PartialCost:
         moves = np.isin(body.shapes.joints, self.joints).any(1)
         self.moving, self.still = np.flatnonzero(moves & drawn), np.flatnonzero(~moves & drawn)
 
-    def transforms(self, poses: Array, around: Array) -> Array:
-        """Joint transforms (N, J, 3, 4) into the camera's frame; joints that do not move stand as in the pose `around` (D,)."""
-        out = np.repeat(self.picture.transforms(around[None]), len(poses), axis=0)
-        self.picture.body.skeleton.forward_some(poses, self.joints, out, self.picture.T_camera_base)
-        return out
-
     def costs(self, observation: Observation, around: Array) -> Callable[[Array], Array]:
         """Eq. 2 as a function of whole poses (N, D), all like `around` (D,) but for the DOF that vary: pixels (N,)."""
         fixed = self.picture.draw(around, self.still) | observation.ignore
         base = count(fixed ^ observation.silhouette)
 
         def cost(poses: Array) -> Array:
-            added = self.picture.added(self.transforms(poses, around), self.moving, observation.silhouette, fixed)
-            return base + added[:, 0] - 2.0 * added[:, 1]
+            return base + self.picture.added(poses, self.moving, observation.silhouette, fixed, self.joints).astype(float)
 
         return cost
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
+from shadowpuppet.kernels import kernel, part
 
 DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
 """Directions in which a hull's outline is taken: the corners of its polygon."""
@@ -29,100 +29,152 @@ def make_lens(camera: Camera) -> Lens:
     return camera.matrix, camera.distortion, camera.fisheye, bends, reach
 
 
-@numba.njit(cache=True)
-def project_quads(transforms, quads, joints, which, lens, corners, counts):  # pragma: no cover
-    """Quads (1 or N, S, 4, 3) into the camera's frame, cut at the near plane, projected: `corners` (N, S, 5, 2), `counts` (N, S)."""
-    K, k, fisheye, bends, reach = lens
-    P = np.empty((4, 3))
-    for n in range(transforms.shape[0]):
-        shape = quads[n if quads.shape[0] > 1 else 0]
-        for i in range(which.size):
-            q = which[i]
-            T = transforms[n, joints[q]]
-            for v in range(4):
-                x, y, z = shape[q, v, 0], shape[q, v, 1], shape[q, v, 2]
-                P[v, 0] = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
-                P[v, 1] = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
-                P[v, 2] = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
-            out = corners[n, i]
-            m = 0
-            if min(P[0, 2], P[1, 2], P[2, 2], P[3, 2]) >= NEAR:
-                for m in range(4):
-                    out[m, 0], out[m, 1] = P[m, 0] / P[m, 2], P[m, 1] / P[m, 2]
-                m = 4
-            else:
-                m = _clip(P, out)
-            for v in range(m):
-                x, y = out[v, 0], out[v, 1]
-                if bends:
-                    x, y = _bend_within(x, y, k, fisheye, reach)
-                out[v, 0], out[v, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
-            counts[n, i] = m
+@kernel
+def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # pragma: no cover
+    """Quads (1 or N, S, 4, 3) of a block of joints T (J, 3, 4, B), cut at the near plane: corners X, Y (S, 5, B), `counts` (S, B) of them.
 
-
-@numba.njit(cache=True)
-def project_hulls(transforms, centres, radii, joints, which, lens, directions, corners, counts):  # pragma: no cover
-    """Outlines of hulls of ellipsoids: in each direction n the farthest point of any of the ellipses that the ellipsoids look like.
-
-    An ellipse of centre c and semi-axes s_i reaches c + sum s_i (s_i . n) / h in direction n, h = sqrt(sum (s_i . n)^2).
+    Corners that a polygon has not got are its last one again. `quads` of N people: those from `begin` on. `work`: (12, B).
     """
-    K, k, fisheye, bends, reach = lens
-    count = centres.shape[2]
-    c, axes = np.empty((count, 2)), np.empty((count, 3, 2))
-    for n in range(transforms.shape[0]):
-        m = n if centres.shape[0] > 1 else 0
-        for i in range(which.size):
-            q = which[i]
-            ahead = False
-            for e in range(count):
-                T, p = transforms[n, joints[q, e]], centres[m, q, e]
-                x = T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2] + T[0, 3]
-                y = T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3]
-                z = T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3]
-                ahead |= z > NEAR
-                z = max(z, NEAR)
-                c[e, 0], c[e, 1] = x / z, y / z
-                for a in range(3):
-                    r = radii[m, q, e, a] / z
-                    axes[e, a, 0] = r * (T[0, a] - c[e, 0] * T[2, a])
-                    axes[e, a, 1] = r * (T[1, a] - c[e, 1] * T[2, a])
-            counts[n, i] = directions.shape[0] if ahead else 0
-            for d in range(directions.shape[0]):
-                u, v = directions[d, 0], directions[d, 1]
-                best, x, y = -np.inf, 0.0, 0.0
-                for e in range(count):
-                    s0 = axes[e, 0, 0] * u + axes[e, 0, 1] * v
-                    s1 = axes[e, 1, 0] * u + axes[e, 1, 1] * v
-                    s2 = axes[e, 2, 0] * u + axes[e, 2, 1] * v
-                    h = np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-                    value = c[e, 0] * u + c[e, 1] * v + h
-                    if value > best:
-                        best = value
-                        x = c[e, 0] + (axes[e, 0, 0] * s0 + axes[e, 1, 0] * s1 + axes[e, 2, 0] * s2) / h
-                        y = c[e, 1] + (axes[e, 0, 1] * s0 + axes[e, 1, 1] * s1 + axes[e, 2, 1] * s2) / h
-                if bends:
-                    x, y = _bend_within(x, y, k, fisheye, reach)
-                corners[n, i, d, 0], corners[n, i, d, 1] = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
+    size = X.shape[2]
+    for i in range(which.size):
+        q, behind = which[i], 0
+        joint, along, down, count = T[joints[q, 0]], X[i], Y[i], counts[i]
+        for v in range(4):
+            x, y, z, u, w = work[3 * v], work[3 * v + 1], work[3 * v + 2], along[v], down[v]
+            _take(quads[:, q, v], begin, x, y, z)
+            _move(joint, x, y, z)
+            for n in range(size):
+                behind += z[n] < NEAR
+                ahead = 1 / max(z[n], NEAR)
+                u[n], w[n] = x[n] * ahead, y[n] * ahead
+        u, w, x, y = along[3], down[3], along[4], down[4]
+        for n in range(size):
+            count[n], x[n], y[n] = 4, u[n], w[n]
+        if behind:
+            for n in range(size):
+                count[n] = _clip(work, n, along, down)
+        _to_pixels(X[i], Y[i], lens)
 
 
-@numba.njit(cache=True)
-def _clip(P, out):  # pragma: no cover
-    """Cut a quad (4, 3) at the near plane; x / z and y / z of the up to five corners left; returns their number."""
+@part
+def _take(points, begin, x, y, z):  # pragma: no cover
+    """Coordinates x, y, z (B,) of one point (1, 3), or of those of the people from `begin` on (N, 3), the last again where they end."""
+    if points.shape[0] == 1:
+        a, b, c = points[0, 0], points[0, 1], points[0, 2]
+        for n in range(x.size):
+            x[n], y[n], z[n] = a, b, c
+    else:
+        for n in range(x.size):
+            m = min(begin + n, points.shape[0] - 1)
+            x[n], y[n], z[n] = points[m, 0], points[m, 1], points[m, 2]
+
+
+@part
+def _move(T, x, y, z):  # pragma: no cover
+    """Points x, y, z (B,) by transforms (3, 4, B), in place."""
+    a, b, c, d = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
+    e, f, g, h = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
+    i, j, k, m = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
+    for n in range(x.size):
+        u, v, w = x[n], y[n], z[n]
+        x[n] = a[n] * u + b[n] * v + c[n] * w + d[n]
+        y[n] = e[n] * u + f[n] * v + g[n] * w + h[n]
+        z[n] = i[n] * u + j[n] * v + k[n] * w + m[n]
+
+
+@kernel
+def project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, counts, work):  # pragma: no cover
+    """Outlines of hulls of ellipsoids of a block of joints T (J, 3, 4, B): corners X, Y (S, K, B), `counts` (S, B), 0 where all is behind.
+
+    In each direction a corner is the farthest point of any of the ellipses that the ellipsoids look like. An ellipse of centre c and
+    matrix M, the sum of s s' over its conjugate half axes s, reaches c + M n / h in direction n, h = sqrt(n' M n); and c - M n / h in
+    the opposite one. `numbers` (S,): how many of a shape's ellipsoids differ. `work`: (5 E + 4, B).
+    """
+    half, room = DIRECTIONS.shape[0] // 2, work[work.shape[0] - 4 :]
+    for i in range(which.size):
+        q = which[i]
+        for n in range(X.shape[2]):
+            counts[i, n] = 0
+        for e in range(numbers[q]):
+            _look_like(T[joints[q, e]], begin, centres[:, q, e], radii[:, q, e], work[5 * e : 5 * e + 5], room, counts[i])
+        for d in range(half):
+            _reach_to(DIRECTIONS[d, 0], DIRECTIONS[d, 1], numbers[q], work, X[i, d], Y[i, d], X[i, d + half], Y[i, d + half])
+        _to_pixels(X[i], Y[i], lens)
+
+
+@part
+def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no cover
+    """The ellipse (5, B), centre and matrix (xx, xy, yy), that ellipsoids with centres and radii (1 or N, 3) look like. `room`: (4, B)."""
+    x, y, z, radius = room[0], room[1], room[2], room[0:3]
+    _take(centres, begin, x, y, z)
+    _move(T, x, y, z)
+    cx, cy, xx, xy, yy, near = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4], room[3]
+    for n in range(x.size):
+        counts[n] = DIRECTIONS.shape[0] if z[n] > NEAR else counts[n]
+        near[n] = 1 / max(z[n], NEAR)
+        cx[n], cy[n] = x[n] * near[n], y[n] * near[n]
+        xx[n], xy[n], yy[n] = 0.0, 0.0, 0.0
+    _take(radii, begin, x, y, z)
+    for a in range(3):
+        right, down, ahead, r = T[0, a], T[1, a], T[2, a], radius[a]
+        for n in range(x.size):
+            u, v = r[n] * near[n] * (right[n] - cx[n] * ahead[n]), r[n] * near[n] * (down[n] - cy[n] * ahead[n])
+            xx[n] += u * u
+            xy[n] += u * v
+            yy[n] += v * v
+
+
+@part
+def _reach_to(u, v, number, ellipses, x, y, other_x, other_y):  # pragma: no cover
+    """The farthest points x, y (B,) of the first ellipses in the direction (u, v), and those in the opposite one."""
+    for e in range(number):
+        cx, cy, xx = ellipses[5 * e], ellipses[5 * e + 1], ellipses[5 * e + 2]
+        xy, yy = ellipses[5 * e + 3], ellipses[5 * e + 4]
+        for n in range(x.size):
+            p, q = xx[n] * u + xy[n] * v, xy[n] * u + yy[n] * v
+            scale = 1 / np.sqrt(max(u * p + v * q, 1e-300))
+            p, q = p * scale, q * scale
+            a, b, c, d = cx[n] + p, cy[n] + q, cx[n] - p, cy[n] - q
+            if e > 0:
+                a, b = (a, b) if (a - x[n]) * u + (b - y[n]) * v > 0 else (x[n], y[n])
+                c, d = (c, d) if (c - other_x[n]) * u + (d - other_y[n]) * v < 0 else (other_x[n], other_y[n])
+            x[n], y[n], other_x[n], other_y[n] = a, b, c, d
+
+
+@part
+def _clip(points, n, X, Y):  # pragma: no cover
+    """Cut quad `n` of points (12, B) at the near plane; x / z and y / z of the up to five corners left into X, Y (5, B); their number."""
     m = 0
     for v in range(4):
-        w = (v + 1) & 3
-        if P[v, 2] >= NEAR:
-            out[m, 0], out[m, 1] = P[v, 0] / P[v, 2], P[v, 1] / P[v, 2]
+        a, b = 3 * v, 3 * ((v + 1) & 3)
+        z, after = points[a + 2, n], points[b + 2, n]
+        if z >= NEAR:
+            X[m, n], Y[m, n] = points[a, n] / z, points[a + 1, n] / z
             m += 1
-        if (P[v, 2] >= NEAR) != (P[w, 2] >= NEAR):
-            s = (NEAR - P[v, 2]) / (P[w, 2] - P[v, 2])
-            for a in range(2):
-                out[m, a] = (P[v, a] + s * (P[w, a] - P[v, a])) / NEAR
+        if (z >= NEAR) != (after >= NEAR):
+            s = (NEAR - z) / (after - z)
+            X[m, n] = (points[a, n] + s * (points[b, n] - points[a, n])) / NEAR
+            Y[m, n] = (points[a + 1, n] + s * (points[b + 1, n] - points[a + 1, n])) / NEAR
             m += 1
+    for v in range(m, 5):
+        X[v, n], Y[v, n] = (X[m - 1, n], Y[m - 1, n]) if m else (0.0, 0.0)
     return m
 
 
-@numba.njit(cache=True)
+@part
+def _to_pixels(X, Y, lens):  # pragma: no cover
+    """Points (K, B) on the plane z = 1 to pixels, in place."""
+    K, k, fisheye, bends, reach = lens
+    for v in range(X.shape[0]):
+        x, y = X[v], Y[v]
+        if bends:
+            for n in range(x.size):
+                x[n], y[n] = _bend_within(x[n], y[n], k, fisheye, reach)
+        for n in range(x.size):
+            x[n], y[n] = K[0, 0] * x[n] + K[0, 2], K[1, 1] * y[n] + K[1, 2]
+
+
+@part
 def _bend_within(x, y, k, fisheye, reach):  # pragma: no cover
     """Distortion of a point on the plane z = 1. Edges between bent corners stay straight: a card is small beside the lens's bend."""
     beyond = max(np.sqrt(x * x + y * y) / reach, 1.0)
@@ -130,7 +182,7 @@ def _bend_within(x, y, k, fisheye, reach):  # pragma: no cover
     return x * beyond, y * beyond
 
 
-@numba.njit(cache=True)
+@part
 def _bend(x, y, k, fisheye):  # pragma: no cover
     """OpenCV's formulas."""
     if fisheye:
@@ -144,7 +196,7 @@ def _bend(x, y, k, fisheye):  # pragma: no cover
     return x * s + 2 * k[2] * x * y + k[3] * (r + 2 * x * x), y * s + k[2] * (r + 2 * y * y) + 2 * k[3] * x * y
 
 
-@numba.njit(cache=True)
+@kernel
 def _reach(k, fisheye):  # pragma: no cover
     """Radius on the plane z = 1 up to which bent points move outward."""
     last, step = 0.0, np.pi / 2 / STEPS

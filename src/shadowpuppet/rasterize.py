@@ -9,23 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-import numba
 import numpy as np
-from numba.core import config, types
-from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body import Body, Quads
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
+from shadowpuppet.kernels import BLOCK, kernel, part
 from shadowpuppet.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
+from shadowpuppet.skeleton import load_joints, place_joints
+from shadowpuppet.spans import count_and_clear, draw_outline, find_edges, make_page
 
 Bits = NDArray[np.uint64]
-SNAP = 1e-9
-"""An edge this near (pixels) to a pixel's centre goes through it: rounding must not decide which of two neighbours gets the pixel."""
+Shapes = tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]
+"""Quads (1 or N, S, 4, 3); ellipsoids' centres and radii (1 or N, S, E, 3), how many of them differ (S,); joints (S, E)."""
 
 
 def pack(mask: ArrayLike) -> Bits:
@@ -72,17 +71,34 @@ class Picture:
 
         `arrays` are those of `Body.shapes`, each with a leading axis N, for poses of bodies of different sizes.
         """
+        block = self._block(len(which), min(BLOCK, max(len(transforms), 1)))
+        corners = np.empty((len(transforms), len(which), block[1].shape[1], 2))
+        counts = np.empty((len(transforms), len(which)), np.int64)
+        _polygons(np.ascontiguousarray(transforms), self._shapes(arrays), which, self._lens, block, corners, counts)
+        return corners, counts
+
+    @cached_property
+    def _frame(self) -> tuple:
+        """What kernels know of the skeleton and of where it stands."""
+        return self.body.skeleton.tree, self.body.skeleton.offsets, np.ascontiguousarray(self.T_camera_base[:3], float)
+
+    def _block(self, shapes: int, size: int) -> tuple:
+        """Room for `size` poses side by side: joints T (J, 3, 4, B), corners X, Y (S, K, B) and their numbers (S, B), boxes (S, 6, B),
+        lines (S, K, 3, B), and what lies between, (R, B)."""
+        joints, ellipsoids = len(self.body.skeleton.joints), self.body.shapes.joints.shape[1]
+        corners = 5 if isinstance(self.body.shapes, Quads) else len(DIRECTIONS)
+        X, Y = np.zeros((2, shapes, corners, size))
+        return (np.zeros((joints, 3, 4, size)), X, Y, np.zeros((shapes, size), np.int64), np.zeros((shapes, 6, size)),
+                np.zeros((shapes, corners, 3, size)), np.zeros((max(12, 5 * ellipsoids + 4), size)))
+
+    def _shapes(self, arrays: tuple[Array, ...] | None = None) -> Shapes:
+        """What kernels know of the body's shapes; one of the two kinds is empty."""
         shapes = self.body.shapes
         arrays = tuple(array[None] for array in shapes.arrays) if arrays is None else arrays
-        corners = np.empty((len(transforms), len(which), 5 if isinstance(shapes, Quads) else len(DIRECTIONS), 2))
-        counts = np.empty((len(transforms), len(which)), np.int64)
+        none = np.zeros((1, 0, 0, 3))
         if isinstance(shapes, Quads):
-            (quads,), joints = arrays, shapes.joints[:, 0].copy()
-            project_quads(transforms, quads, joints, which, self._lens, corners, counts)
-        else:
-            centres, radii = arrays
-            project_hulls(transforms, centres, radii, shapes.joints, which, self._lens, DIRECTIONS, corners, counts)
-        return corners, counts
+            return (*arrays, none, none, np.zeros(0, np.int64), shapes.joints)  # pyright: ignore[reportReturnType]
+        return none, *arrays, shapes.numbers, shapes.joints  # pyright: ignore[reportReturnType]
 
     def points(self, poses: Array, names: Iterable[str] | None = None) -> Array:
         """Landmarks (N, L, 3), metres, in the camera's frame, of poses (N, D); all, or those named."""
@@ -102,8 +118,7 @@ class Picture:
         poses = np.ascontiguousarray(np.asarray(pose, float)[None])
         which = np.arange(len(self.body.parts)) if which is None else which
         bits = self.empty()
-        corners, counts = self.polygons(self.transforms(poses), which)
-        _draw(corners[0], counts[0], self.camera.size[0], bits)
+        self._compare(poses, which, bits, bits, drawn=bits[None])
         return bits
 
     def legs(self, pose: ArrayLike, spread: float = np.radians(25)) -> NDArray[np.bool_]:
@@ -126,16 +141,41 @@ class Picture:
         """The silhouette of one pose (D,), of shape (H, W): h(x, y, d) of Liu 2011, eq. 2."""
         return unpack(self.draw(pose), self.camera.size[0])
 
-    def added(self, transforms: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits,
-              arrays: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
-        """What drawing some shapes adds to the mask `fixed`: pixels, and how many of them lie in the silhouette; (N, 2)."""
+    def added(self, poses: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits, joints: NDArray[np.int64] | None = None,
+              measures: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
+        """What drawing some shapes of poses (N, D) over the mask `fixed` adds to eq. 2, pixels (N,): those outside the silhouette less
+        those inside.
+
+        `joints`: those that move, if not all do; the others stand as in the first pose. `measures`: of bodies of different sizes, the
+        joints' offsets (N, J, 3) and the arrays of `Body.shapes` with a leading axis N.
+        """
         shape = self.empty().shape
         if silhouette.shape != shape or fixed.shape != shape:  # the kernel would write past their ends
             raise ShadowPuppetError(f"masks of {silhouette.shape} and {fixed.shape} words x rows, expected the camera's {shape}")
-        corners, counts = self.polygons(transforms, which, arrays)
-        out = np.empty((len(transforms), 2), np.int64)
-        _added(corners, counts, self.camera.size[0], silhouette, fixed, out)
+        return self._compare(poses, which, silhouette, fixed, joints, measures)
+
+    def _compare(self, poses: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits, joints: NDArray[np.int64] | None = None,
+                 measures: tuple[Array, ...] | None = None, drawn: Bits | None = None) -> NDArray[np.int64]:
+        tree, offsets, root = self._frame
+        frame, shapes = (tree, offsets if measures is None else measures[0], root), self._shapes(measures and measures[1:])
+        joints = np.arange(len(self.body.skeleton.joints)) if joints is None else joints
+        block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
+        out = np.empty(len(poses), np.int64)
+        _compare(np.ascontiguousarray(poses, float), joints, frame, shapes, which, self._lens, self.camera.size[0],
+                 (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
         return out
+
+    def _room(self, shapes: int, size: int) -> tuple:
+        """Room for a comparison, made once: a kernel keeps Python's lock while it uses it, and leaves nothing in it that counts."""
+        if (shapes, size) not in self._rooms:
+            block = self._block(shapes, size)
+            page = make_page(*self.empty().shape, block[1].shape[1])
+            self._rooms[shapes, size] = block, page, (np.zeros_like(page[0]), np.zeros_like(page[0]))
+        return self._rooms[shapes, size]
+
+    @cached_property
+    def _rooms(self) -> dict[tuple[int, int], tuple]:
+        return {}
 
 
 def place(camera: Camera, distance: float, elevation: float) -> Array:
@@ -155,105 +195,75 @@ def place(camera: Camera, distance: float, elevation: float) -> Array:
 
 def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
     """One convex polygon of corners (K, 2), pixels, drawn into an empty mask (H, W)."""
-    corners = np.ascontiguousarray(corners, float)
-    bits = np.zeros((-(-size[0] // 64), size[1]), np.uint64)
-    _draw(corners[None], np.array([len(corners)]), size[0], bits)
-    return unpack(bits, size[0])
+    corners = np.asarray(corners, float).reshape(-1, 2)
+    count, page = len(corners), make_page(-(-size[0] // 64), size[1], len(corners))
+    X, Y = (np.ascontiguousarray(corners[None, :, i, None]) for i in range(2))
+    if count:
+        _draw_corners(X, Y, np.full((1, 1), count), *size, np.empty((1, 6, 1)), np.empty((1, count, 3, 1)), page)
+    return unpack(page[0][:, : size[1]], size[0])
 
 
-@intrinsic
-def _ctpop(typingctx, word):  # pragma: no cover
-    """Number of bits set in a 64-bit word: LLVM's ctpop, which vectorises."""
-
-    def codegen(context, builder, signature, args):
-        return builder.ctpop(args[0])
-
-    return types.uint64(types.uint64), codegen
+# Kernels
 
 
-_popcount: Any = np.bitwise_count if config.DISABLE_JIT else _ctpop  # pyright: ignore[reportAttributeAccessIssue]
+@part
+def _project(begin, shapes, which, lens, block):  # pragma: no cover
+    """Corners of a block's shapes from its joints."""
+    quads, centres, radii, numbers, joints = shapes
+    T, X, Y, counts, work = block[0], block[1], block[2], block[3], block[6]
+    if quads.shape[1]:
+        project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work)
+    else:
+        project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, counts, work)
 
 
-@numba.njit(cache=True)
-def _spans(P, m, width, height, left, right):  # pragma: no cover
-    """First pixel and end of a convex polygon's span on every row it covers; returns its box (row, row end, word, word end).
+@kernel
+def _compare(poses, joints, frame, shapes, which, lens, width, masks, block, page, added, drawn):  # pragma: no cover
+    """For each pose the pixels that its shapes add to the mask `fixed` outside the silhouette, less those inside, (N,).
 
-    The span of a row is where it lies inside the half planes of all edges, so the edges' lines may be followed past their ends.
+    Joints that do not move stand as in the first pose. `masks`: silhouette and fixed, (C, H) each, and room for what counts outside and
+    inside, (C, rows). `drawn` (N or 0, C, H) gets what is drawn.
     """
-    if m < 3:
-        return 0, 0, 0, 0
-    top, bottom, west, east, area = P[0, 1], P[0, 1], P[0, 0], P[0, 0], 0.0
-    for v in range(m):
-        w = v + 1 if v + 1 < m else 0
-        area += P[v, 0] * P[w, 1] - P[w, 0] * P[v, 1]
-        top, bottom = min(top, P[v, 1]), max(bottom, P[v, 1])
-        west, east = min(west, P[v, 0]), max(east, P[v, 0])
-    if not 1e-9 <= abs(area) < 1e30 or bottom < 0 or top >= height or east < 0 or west >= width:  # edge-on, no numbers, or outside
-        return 0, 0, 0, 0
-    r0, r1 = int(np.ceil(max(top, 0.0))), int(np.ceil(min(bottom, float(height))))
-    rows = max(r1 - r0, 0)
-    for r in range(rows):
-        left[r], right[r] = 0.0, width
-    for v in range(m):
-        w = v + 1 if v + 1 < m else 0
-        dy = P[w, 1] - P[v, 1]
-        if dy == 0:
-            continue
-        slope = (P[w, 0] - P[v, 0]) / dy
-        x = P[v, 0] + (r0 - P[v, 1]) * slope - SNAP
-        if (dy > 0) != (area > 0):
-            for r in range(rows):
-                left[r] = max(left[r], x + r * slope)
-        else:
-            for r in range(rows):
-                right[r] = min(right[r], x + r * slope)
-    c0, c1 = int(max(west, 0.0)) >> 6, (int(min(np.ceil(east), float(width))) + 63) >> 6
-    return r0, r1, c0, c1
+    tree, offsets, root = frame
+    silhouette, fixed, outside, inside = masks
+    words, height = silhouette.shape
+    for c in range(words):
+        for r in range(height):
+            outside[c, r], inside[c, r] = ~fixed[c, r] & ~silhouette[c, r], ~fixed[c, r] & silhouette[c, r]
+    T, X, Y, counts, boxes, lines, work = block
+    if joints.size < T.shape[0]:
+        place_joints(poses[:1], 0, range(T.shape[0]), tree, offsets, root, T, work)
+    for begin in range(0, poses.shape[0], T.shape[3]):
+        place_joints(poses, begin, joints, tree, offsets, root, T, work)
+        _project(begin, shapes, which, lens, block)
+        find_edges(X, Y, counts, float(width), float(height), boxes, lines)
+        for n in range(min(T.shape[3], poses.shape[0] - begin)):
+            for s in range(which.size):
+                draw_outline(s, n, boxes, lines, float(width), page)
+            if drawn.shape[0]:
+                for c in range(words):
+                    for r in range(height):
+                        drawn[begin + n, c, r] = page[0][c, r]
+            added[begin + n] = count_and_clear(outside, inside, page)
 
 
-@numba.njit(cache=True)
-def _fill(left, right, r0, r1, c0, c1, bits):  # pragma: no cover
-    """Set the bits of the spans, word column by word column, without a branch."""
-    one, full = np.uint64(1), np.uint64(0xFFFFFFFFFFFFFFFF)
-    for c in range(c0, c1):
-        column = bits[c, r0:r1]
-        for r in range(column.size):
-            a = min(max(np.int64(np.ceil(left[r])) - 64 * c, 0), 64)
-            b = min(max(np.int64(np.ceil(right[r])) - 64 * c, 0), 64)
-            before = (one << np.uint64(a & 63)) - one if a < 64 else full
-            until = (one << np.uint64(b & 63)) - one if b < 64 else full
-            column[r] |= until & ~before
+@kernel
+def _draw_corners(X, Y, counts, width, height, boxes, lines, page):  # pragma: no cover
+    """Draw polygons of corners X, Y (S, K, 1) on a page."""
+    find_edges(X, Y, counts, float(width), float(height), boxes, lines)
+    for s in range(X.shape[0]):
+        draw_outline(s, 0, boxes, lines, float(width), page)
 
 
-@numba.njit(cache=True)
-def _draw(corners, counts, width, bits):  # pragma: no cover
-    """Draw polygons (Q, 5, 2) into bits."""
-    height = bits.shape[1]
-    left, right = np.empty(height), np.empty(height)
-    for i in range(counts.size):
-        r0, r1, c0, c1 = _spans(corners[i], counts[i], width, height, left, right)
-        _fill(left, right, r0, r1, c0, c1, bits)
-
-
-@numba.njit(cache=True)
-def _added(corners, counts, width, silhouette, fixed, out):  # pragma: no cover
-    """For each pose, the pixels that its polygons add to `fixed`, and how many of these lie in the silhouette."""
-    height = silhouette.shape[1]
-    left, right = np.empty(height), np.empty(height)
-    scratch = np.zeros_like(silhouette)
-    for n in range(corners.shape[0]):
-        R0, R1, C0, C1 = height, 0, silhouette.shape[0], 0
-        for i in range(counts.shape[1]):
-            r0, r1, c0, c1 = _spans(corners[n, i], counts[n, i], width, height, left, right)
-            if r1 > r0:
-                R0, R1, C0, C1 = min(R0, r0), max(R1, r1), min(C0, c0), max(C1, c1)
-                _fill(left, right, r0, r1, c0, c1, scratch)
-        total, inside = np.uint64(0), np.uint64(0)
-        for c in range(C0, C1):
-            drawn, kept, seen = scratch[c, R0:R1], fixed[c, R0:R1], silhouette[c, R0:R1]
-            for r in range(drawn.size):
-                v = drawn[r] & ~kept[r]
-                total += _popcount(v)
-                inside += _popcount(v & seen[r])
-            drawn[:] = 0
-        out[n, 0], out[n, 1] = total, inside
+@kernel
+def _polygons(transforms, shapes, which, lens, block, corners, counts):  # pragma: no cover
+    """Corners (N, S, K, 2) and their numbers (N, S) of some shapes, of joints (N, J, 3, 4)."""
+    T, X, Y, numbers = block[0], block[1], block[2], block[3]
+    for begin in range(0, transforms.shape[0], T.shape[3]):
+        load_joints(transforms, begin, T)
+        _project(begin, shapes, which, lens, block)
+        for n in range(min(T.shape[3], transforms.shape[0] - begin)):
+            for s in range(which.size):
+                counts[begin + n, s] = numbers[s, n]
+                for v in range(X.shape[1]):
+                    corners[begin + n, s, v, 0], corners[begin + n, s, v, 1] = X[s, v, n], Y[s, v, n]
