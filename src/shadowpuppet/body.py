@@ -93,10 +93,13 @@ class Body:
 
     def points(self, poses: ArrayLike, root: ArrayLike | None = None, names: Iterable[str] | None = None) -> Array:
         """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to; all, or those named."""
-        chosen = [self.landmarks[name] for name in (self.landmark_names if names is None else names)]
-        T = self.skeleton.forward(poses, root)[:, [self.skeleton.joint_index(joint) for joint, _ in chosen]]
-        local = np.array([place for _, place in chosen], float)
-        return (T[..., :3] @ local[:, :, None])[..., 0] + T[..., 3]
+        return self.skeleton.points(poses, *self._places(self.landmark_names if names is None else tuple(names)), root)
+
+    def _places(self, names: tuple[str, ...]) -> tuple[NDArray[np.int64], Array]:
+        """Joints (L,) of landmarks, and where in their frames these are (L, 3), metres."""
+        chosen = [self.landmarks[name] for name in names]
+        joints = np.array([self.skeleton.joint_index(joint) for joint, _ in chosen], np.int64)
+        return joints, np.array([place for _, place in chosen], float).reshape(-1, 3)
 
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:

@@ -158,7 +158,7 @@ class Picture:
                  measures: tuple[Array, ...] | None = None, drawn: Bits | None = None) -> NDArray[np.int64]:
         tree, offsets, root = self._frame
         frame, shapes = (tree, offsets if measures is None else measures[0], root), self._shapes(measures and measures[1:])
-        joints = np.arange(len(self.body.skeleton.joints)) if joints is None else joints
+        joints = self._every if joints is None else joints
         block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
         out = np.empty(len(poses), np.int64)
         _compare(np.ascontiguousarray(poses, float), joints, frame, shapes, which, self._lens, self.camera.size[0],
@@ -172,6 +172,10 @@ class Picture:
             page = make_page(*self.empty().shape, block[1].shape[1])
             self._rooms[shapes, size] = block, page, (np.zeros_like(page[0]), np.zeros_like(page[0]))
         return self._rooms[shapes, size]
+
+    @cached_property
+    def _every(self) -> NDArray[np.int64]:
+        return np.arange(len(self.body.skeleton.joints))
 
     @cached_property
     def _rooms(self) -> dict[tuple[int, int], tuple]:

@@ -172,6 +172,14 @@ class Skeleton:
         _forward(np.ascontiguousarray(poses, float), joints, self.tree, offsets, np.ascontiguousarray(root[:3]), transforms,
                  np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size)))
 
+    def points(self, poses: ArrayLike, joints: NDArray[np.int64], places: Array, root: ArrayLike | None = None) -> Array:
+        """Points (N, P, 3), metres, fixed to `joints` (P,) at `places` (P, 3) in their frames, of poses (N, D); `root` as in `forward`."""
+        poses = np.ascontiguousarray(poses, float)
+        out, size = np.empty((len(poses), len(joints), 3)), min(BLOCK, max(len(poses), 1))
+        _points(poses, self.tree, self.offsets, np.ascontiguousarray((np.eye(4) if root is None else np.asarray(root, float))[:3]), joints,
+                np.ascontiguousarray(places, float), out, np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size)))  # fmt: skip
+        return out
+
 
 # Coefficients of fdlibm's kernels (Sun Microsystems 1993): sine and cosine within pi / 4, and pi / 2 in three parts.
 _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
@@ -279,3 +287,16 @@ def _forward(poses, joints, tree, offsets, root, out, T, work):  # pragma: no co
                 for r in range(3):
                     for c in range(4):
                         out[begin + n, j, r, c] = T[j, r, c, n]
+
+
+@kernel
+def _points(poses, tree, offsets, root, joints, places, out, T, work):  # pragma: no cover
+    """Points (N, P, 3) at `places` (P, 3) in the frames of `joints` (P,). Room: T (J, 3, 4, B), work (6, B)."""
+    for begin in range(0, poses.shape[0], T.shape[3]):
+        place_joints(poses, begin, range(T.shape[0]), tree, offsets, root, T, work)
+        for i in range(joints.size):
+            x, y, z = places[i, 0], places[i, 1], places[i, 2]
+            for r in range(3):
+                row = T[joints[i], r]
+                for n in range(min(T.shape[3], poses.shape[0] - begin)):
+                    out[begin + n, i, r] = row[0, n] * x + row[1, n] * y + row[2, n] * z + row[3, n]

@@ -154,15 +154,15 @@ def draw_outline(s, n, boxes, lines, width, page):  # pragma: no cover
 def count_and_clear(outside, inside, page):  # pragma: no cover
     """Bits of a page that are set in `outside`, less those set in `inside`, (C, rows) each; the page is empty then."""
     bits, dirty = page[0], page[1]
-    total = np.uint64(0)
+    total = np.int64(0)
     for c in range(dirty[2], dirty[3]):
         column, out, within = bits[c, dirty[0] : dirty[1]], outside[c, dirty[0] : dirty[1]], inside[c, dirty[0] : dirty[1]]
         for r in range(column.size):
-            total += _popcount(column[r] & out[r]) - _popcount(column[r] & within[r])
+            total += np.int64(_popcount(column[r] & out[r])) - np.int64(_popcount(column[r] & within[r]))
         for r in range(column.size):
             column[r] = 0
     clean(page)
-    return np.int64(total)
+    return total
 
 
 @part
