@@ -227,6 +227,37 @@ def settings(*, preset: str = "default") -> None:
     print(options_text(make_options({"preset": preset})))
 
 
+@app.command
+def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool = False, quiet: Quiet = False) -> None:
+    """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. About a minute.
+
+    Parameters
+    ----------
+    json
+        File that gets all figures, by flat keys such as "mono.particle_us".
+    picture
+        File that gets cost against particles, picture size and cards (.png, .pdf or .svg; needs matplotlib).
+    quick
+        Fewer rounds, a shorter film, nothing compiled anew.
+    """
+    from shadowpuppet.bench.files import check_plans, write_figures
+    from shadowpuppet.bench.mono import run_bench
+    from shadowpuppet.tables import bench_tables
+    from shadowpuppet.terminal import show, terminal
+
+    check_plans(json, picture)
+    with terminal(quiet) as shown:
+        found = run_bench(quick, shown)
+    if json is not None:
+        write_figures(json, found)
+    if picture is not None:
+        from shadowpuppet.plots import plot_curves
+
+        plot_curves(found["curves"], picture)
+    if not quiet:
+        show(*bench_tables(found))
+
+
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     """What came out, and where it lies."""
     from shadowpuppet.tables import error_table, measures_table, pairs

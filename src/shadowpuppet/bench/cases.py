@@ -1,0 +1,110 @@
+"""What is timed: a person, poses around theirs, and eq. 2 of these poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import cycle
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.anthropometry import sizes_from_height
+from shadowpuppet.body import BODIES
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array
+from shadowpuppet.likelihood import Observation, PartialCost
+from shadowpuppet.rasterize import Picture, place, unpack
+from shadowpuppet.settings import make_settings
+from shadowpuppet.tracking import MonocularTracker
+
+SIZE = (320, 240)
+"""Liu 2011's pictures, pixels."""
+SPREAD = 0.1
+"""Deviation of the poses that are timed from the person's, rad."""
+
+
+def make_picture(body: str, size: tuple[int, int] = SIZE) -> Picture:
+    """A person of 1.75 m, 2.5 m before a camera that sees 60 degrees."""
+    camera = Camera.from_fov(size, np.radians(60))
+    return Picture(BODIES[body](sizes_from_height(1.75)), camera, place(camera, 2.5, -0.1))
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Costs of many poses: of the whole body, or of one arm over the rest."""
+
+    body: str = "cardbox"
+    stage: str = "full"
+    """`full` or `arm`."""
+    size: tuple[int, int] = SIZE
+    particles: int = 200
+
+    @cached_property
+    def picture(self) -> Picture:
+        """The person as the camera sees them."""
+        return make_picture(self.body, self.size)
+
+    @cached_property
+    def dofs(self) -> NDArray[np.int64]:
+        """What varies: all DOF, or the left arm's."""
+        names = self.picture.body.skeleton.dof_names
+        return np.flatnonzero([self.stage == "full" or name.startswith("left_") for name in names])
+
+    @cached_property
+    def pose(self) -> Array:
+        """The person's pose (D,): arms out, one of them bent."""
+        return self.picture.body.skeleton.pose(left_shoulder_abduction=1.2, left_elbow_flexion=1.0, right_shoulder_abduction=0.9)
+
+    @cached_property
+    def poses(self) -> Array:
+        """Those that are timed, of shape (N, D)."""
+        poses = np.repeat(self.pose[None], self.particles, axis=0)
+        poses[:, self.dofs] += SPREAD * np.random.default_rng(0).standard_normal((self.particles, len(self.dofs)))
+        return poses
+
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """The silhouette (H, W): of a pose like theirs."""
+        return self.picture.mask(0.9 * self.pose)
+
+    @cached_property
+    def partial(self) -> PartialCost:
+        """Which shapes move."""
+        return PartialCost(self.picture, self.dofs)
+
+    @cached_property
+    def fixed(self) -> NDArray[np.bool_]:
+        """What is drawn once for all poses, of shape (H, W)."""
+        return unpack(self.picture.draw(self.pose, self.partial.still), self.size[0])
+
+    @cached_property
+    def costs(self) -> Callable[[Array], Array]:
+        """Eq. 2 of whole poses (N, D), pixels (N,): kinematics, projection, drawing, counting."""
+        return self.partial.costs(Observation.of(self.mask), self.pose)
+
+    def run(self) -> Array:
+        """Costs of all poses, as the filter gets them."""
+        return self.costs(self.poses)
+
+
+class Follower:
+    """A tracker that follows a made motion to and fro, frame by frame without end; masks are there already."""
+
+    def __init__(self, preset: str, frames: int = 20) -> None:
+        """`preset`: the tracker's settings."""
+        settings = make_settings(preset)
+        picture = make_picture(settings.body)
+        phases = np.linspace(0, 1, frames)
+        poses = [picture.body.skeleton.pose(left_shoulder_abduction=0.8 + p, left_elbow_flexion=1.2 * p, right_shoulder_abduction=1 - 0.5 * p,
+                                            torso_bend=0.2 * p) for p in phases]
+        there = [picture.mask(pose) for pose in poses]
+        self.masks: Iterator[NDArray[np.bool_]] = cycle(there + there[::-1])
+        self.tracker, self.rng = MonocularTracker(picture, settings), np.random.default_rng(0)
+        self.state = self.tracker.start(self.rng, next(self.masks))
+
+    def run(self, frames: int = 10) -> None:
+        """Some more frames."""
+        for _ in range(frames):
+            self.state = self.tracker.step(self.rng, self.state, next(self.masks))

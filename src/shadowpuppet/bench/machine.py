@@ -1,0 +1,61 @@
+"""What this machine is, as far as it matters for speed."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ("shadowpuppet", "numpy", "numba", "llvmlite", "opencv-python-headless", "av")
+LEVELS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("neon", "NEON"))
+
+
+def environment() -> dict[str, Any]:
+    """Processor, cores, vector instructions, system and versions."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    level = next((name for feature, name in LEVELS if features.get(feature)), "none known")
+    return {"cpu": _model(), "llvm_cpu": llvm.get_host_cpu_name(), "cores": os.cpu_count(), "vectors": level, "system": platform.platform(),
+            "python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
+
+
+def resident_mb() -> float | None:
+    """Memory that this process holds now, 10^6 bytes; None where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text("ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return None
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def peak_mb() -> float | None:
+    """The most that this process held at a time, 10^6 bytes; None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most * (1 if platform.system() == "Darwin" else 1024) / 1e6
+
+
+def use_one_core() -> str:
+    """Keep this process to one core where the system can; says what was done. To be called before anything counts the cores."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    if hasattr(os, "sched_setaffinity"):
+        core = max(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {core})
+        return "the process kept to one core"
+    return "one thread each for OpenCV, Numba and BLAS"
+
+
+def _model() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
