@@ -1,9 +1,6 @@
-"""Eq. 2 by the XOR of drawn masks, partial costs by whole ones, what does not count, and the kernels' speed beside OpenCV's."""
+"""Eq. 2 by the XOR of drawn masks, partial costs by whole ones, what does not count."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,11 +12,11 @@ from people import camera, picture, random_poses
 from shadowpuppet import projection, rasterize, skeleton, spans
 from shadowpuppet.body import BODIES, Body, Quads
 from shadowpuppet.first_pose import arm_parts
+from shadowpuppet.kernels import BLOCK
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
 from shadowpuppet.rasterize import Picture, pack, unpack
 from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 STAGES = {"torso": "torso_", "left arm": "left_", "right arm": "right_", "both arms": ("left_", "right_"), "elbow": "left_elbow", "all": ""}
 
 
@@ -76,6 +73,21 @@ def test_a_cost_depends_on_its_own_pose_only(seed, order):
     costs = silhouette_costs(view, observation, poses)
     np.testing.assert_array_equal(silhouette_costs(view, observation, poses[list(order)]), costs[list(order)])
     np.testing.assert_array_equal(silhouette_costs(view, observation, poses[3:4]), costs[3:4])
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("distance", [2.5, 0.5])  # near enough that some of the arms, in some poses, cross the near plane
+@pytest.mark.parametrize("body", BODIES)
+def test_costs_do_not_depend_on_the_block_that_a_pose_is_in(body, distance, rng):
+    """Poses are worked on in blocks, side by side: full ones, a part of one, one alone."""
+    view = picture(body, camera((65, 48)), distance)
+    poses = random_poses(rng, view.body.skeleton, 2 * BLOCK + 5)
+    observation = Observation.of(noisy(rng, view.mask(poses[2])))
+    costs = silhouette_costs(view, observation, poses)
+    assert len(set(costs)) > BLOCK / 2
+    some = [0, BLOCK - 1, BLOCK, 2 * BLOCK, 2 * BLOCK + 4]
+    np.testing.assert_array_equal(costs[some], [naive.cost(view.mask(poses[n]), unpack(observation.silhouette, 65)) for n in some])
+    np.testing.assert_array_equal(silhouette_costs(view, observation, poses[BLOCK - 3 :])[[3, 8]], costs[[BLOCK, BLOCK + 5]])
 
 
 # Partial costs --------------------------------------------------------------------------------------------------------
@@ -201,30 +213,3 @@ def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
         for signature in getattr(kernel, "signatures", []):
             layouts = {kind.layout for kind in signature if hasattr(kind, "layout")}
             assert layouts <= {"C"}, (kernel, signature)
-
-
-@pytest.mark.skipif(not hasattr(rasterize._compare, "signatures"), reason="kernels are not compiled")
-@pytest.mark.parametrize("stage", ["full", "arm"])
-def test_bits_are_several_times_faster_than_opencv(stage):
-    """Measured side by side in turns: six to ten times, with OpenCV's polygons ready-made; the guard leaves a margin of two."""
-    import cv2
-    import kernels
-
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        runs = kernels.contenders("cardbox", stage, (320, 240), 100)
-        spent = kernels.medians({name: runs[name] for name in ("bits", "OpenCV")}, 9)
-    finally:
-        cv2.setNumThreads(threads)
-    assert spent["OpenCV"] > 3 * spent["bits"], spent
-
-
-@pytest.mark.parametrize("stage", ["full", "arm"])
-@pytest.mark.parametrize("body", BODIES)
-def test_what_the_benchmark_compares_is_the_same(body, stage):
-    import kernels
-
-    bits, opencv, plain = (np.asarray(run()) for run, _ in kernels.contenders(body, stage, (320, 240), kernels.NUMPY_PARTICLES).values())
-    np.testing.assert_array_equal(plain, bits)
-    np.testing.assert_allclose(opencv, bits, atol=900)  # corners at whole pixels, and all of the outline counted

@@ -12,7 +12,8 @@ from people import SIZES, random_poses
 from shadowpuppet.body import RISE, SIDES, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
-from shadowpuppet.skeleton import AXES, Coupling, Dof, Joint, Skeleton
+from shadowpuppet.kernels import BLOCK
+from shadowpuppet.skeleton import AXES, Coupling, Dof, Joint, Skeleton, sines
 
 UPPER = {"plain": upper_body_skeleton(SIZES), "clavicles": upper_body_skeleton(SIZES, clavicles=True)}
 ROOT = rigid(rotation_from_vector([0.3, -1.2, 0.5]), [0.1, -0.4, 2.5])
@@ -75,6 +76,29 @@ def test_a_pose_does_not_depend_on_its_neighbours_nor_on_how_the_array_lies_in_m
     np.testing.assert_array_equal(skeleton.forward(np.asfortranarray(poses)), whole)
     np.testing.assert_array_equal(skeleton.forward(np.repeat(poses, 2, axis=0)[::2]), whole)
     assert skeleton.forward(np.zeros((0, 12))).shape == (0, len(skeleton.joints), 3, 4)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(("scale", "tolerance"), [(1.0, 3e-16), (10.0, 3e-16), (1e5, 1e-15)])
+def test_sines_are_those_of_the_c_library(scale, tolerance, rng):
+    angles = np.concatenate([rng.uniform(-scale, scale, 200), np.arange(-8, 9) * np.pi / 4, [0.0, -0.0, 1e-300, np.nan]])
+    sine, cosine = np.full((2, len(angles)), -7.0)
+    sines(angles, sine, cosine)
+    np.testing.assert_allclose(sine, np.sin(angles), rtol=0, atol=tolerance)
+    np.testing.assert_allclose(cosine, np.cos(angles), rtol=0, atol=tolerance)
+
+
+@pytest.mark.kernels
+def test_more_poses_than_a_block_are_placed_as_one_by_one(rng):
+    skeleton = UPPER["clavicles"]
+    poses = random_poses(rng, skeleton, BLOCK + 3)
+    whole = skeleton.forward(poses, ROOT)
+    for n in (0, BLOCK - 1, BLOCK, BLOCK + 2):
+        expected = naive.forward(skeleton, poses[n], ROOT)
+        np.testing.assert_allclose(whole[n], [expected[name][:3] for name in skeleton.joint_names], atol=1e-12)
+    joints, places = np.array([5, 0]), rng.standard_normal((2, 3))
+    points = skeleton.points(poses, joints, places, ROOT)
+    np.testing.assert_allclose(points, (whole[:, joints, :, :3] @ places[:, :, None])[..., 0] + whole[:, joints, :, 3], atol=1e-12)
 
 
 def test_some_joints_are_recomputed_over_what_stands(rng):

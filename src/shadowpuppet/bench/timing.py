@@ -26,12 +26,15 @@ class Contender(NamedTuple):
 
 
 def in_turns(contenders: Mapping[str, Contender], rounds: int) -> dict[str, Times]:
-    """Times of each, by name: every round calls all, one after another; a first round, which may compile, does not count."""
+    """Times of each, by name: every round calls all, one after another.
+
+    Each call that is timed follows one that is not, so that none pays for what the one before it left in the caches.
+    """
     spent: dict[str, list[float]] = {name: [] for name in contenders}
-    for turn in range(rounds + 1):
+    for _ in range(rounds):
         for name, (run, units) in contenders.items():
+            run()
             start = time.perf_counter()
             run()
-            if turn:
-                spent[name].append((time.perf_counter() - start) / units)
+            spent[name].append((time.perf_counter() - start) / units)
     return {name: Times(float(np.median(took)), float(min(took)), rounds) for name, took in spent.items()}
