@@ -98,7 +98,8 @@ def test_more_poses_than_a_block_are_placed_as_one_by_one(rng):
         np.testing.assert_allclose(whole[n], [expected[name][:3] for name in skeleton.joint_names], atol=1e-12)
     joints, places = np.array([5, 0]), rng.standard_normal((2, 3))
     points = skeleton.points(poses, joints, places, ROOT)
-    np.testing.assert_allclose(points, (whole[:, joints, :, :3] @ places[:, :, None])[..., 0] + whole[:, joints, :, 3], atol=1e-12)
+    T = whole[:, joints]
+    np.testing.assert_allclose(points, (T[..., :3] @ places[:, :, None])[..., 0] + T[..., 3], atol=1e-12)
 
 
 def test_some_joints_are_recomputed_over_what_stands(rng):

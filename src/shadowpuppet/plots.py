@@ -25,8 +25,8 @@ def plot_curves(curves: Mapping[str, Any], path: Path) -> None:
             axes.plot(values, curves[name][body], ".-", color=COLOURS[body], label=body)
         if name != "cards":
             axes.set_xscale("log")
-            axes.set_xticks(values, [str(value) for value in values], fontsize=7)
             axes.minorticks_off()
+        axes.set_xticks(values, [str(value) for value in values], fontsize=7)
         axes.set_xlabel(label)
         axes.set_ylim(bottom=0)
         axes.grid(alpha=0.3)

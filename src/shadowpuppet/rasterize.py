@@ -169,7 +169,8 @@ class Picture:
         """Room for a comparison, made once: a kernel keeps Python's lock while it uses it, and leaves nothing in it that counts."""
         if (shapes, size) not in self._rooms:
             block = self._block(shapes, size)
-            page = make_page(*self.empty().shape, block[1].shape[1])
+            words, height = self.empty().shape
+            page = make_page(words, height, block[1].shape[1])
             self._rooms[shapes, size] = block, page, (np.zeros_like(page[0]), np.zeros_like(page[0]))
         return self._rooms[shapes, size]
 
@@ -203,7 +204,7 @@ def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]
     count, page = len(corners), make_page(-(-size[0] // 64), size[1], len(corners))
     X, Y = (np.ascontiguousarray(corners[None, :, i, None]) for i in range(2))
     if count:
-        _draw_corners(X, Y, np.full((1, 1), count), *size, np.empty((1, 6, 1)), np.empty((1, count, 3, 1)), page)
+        _draw_corners(X, Y, np.full((1, 1), count), size[0], size[1], np.empty((1, 6, 1)), np.empty((1, count, 3, 1)), page)
     return unpack(page[0][:, : size[1]], size[0])
 
 

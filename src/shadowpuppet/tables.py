@@ -144,26 +144,26 @@ def _motions(spec: Spec) -> str:
 def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
     """How fast it is here."""
     raw, here = found["raw"], found["environment"]
-    table = _table("time, of cardbox at 320 x 240", ("", "median", "least", "unit", "beside it"), right=(1, 2))
-    for key, name, scale, unit, beside in BENCHED:
-        table.add_row(name, *(f"{scale * raw[key][which]:.3g}" for which in ("median", "least")), unit,
-                      f"{found[beside]:.3g} times as long" if beside else "")
+    table = _table("time, at 320 x 240", ("", "median", "least", "", "times"), right=(1, 2, 4))
+    for key, name, scale, unit, ratio in BENCHED:
+        times = (f"{scale * raw[key][which]:.4g}" for which in ("median", "least"))
+        table.add_row(name, *times, unit, f"{found[ratio]:.3g}" if ratio else "")
     stages = ", ".join(f"{name} {found[f'mono.{stage}_ms']:.1f}" for stage, name in CHAIN.items())
     rows = [("filter", f"{found['mono.step_fps']:.0f} frames/s at Table I, {found['mono.default_fps']:.0f} with the default preset"),
             ("film to pose", f"{found['mono.chain_fps']:.0f} frames/s, {found['mono.one_core']} (ms a frame: {stages})"),
             ("memory", f"{_megabytes(found['mono.peak_mb'])} at most, grown by {_megabytes(found['mono.growth_mb'])} over "
                        f"{found['mono.chain_frames']} frames")]
     if "mono.compile_s" in found:
-        rows.append(("to a first pose", f"{found['mono.start_s']:.1f} s in a new process, {found['mono.compile_s']:.1f} s where all kernels "
-                                        "must be compiled"))
+        rows.append(("first pose", f"{found['mono.start_s']:.1f} s after the start of a new process, {found['mono.compile_s']:.1f} s where "
+                                   "all kernels must be compiled"))
     rows.append(("machine", f"{here['cpu']}, {here['cores']} cores, {here['vectors']}, Python {here['python']}, Numba {here['numba']}, "
                             f"OpenCV {here['opencv-python-headless']}"))
     return [table, pairs(rows)]
 
 
 BENCHED = (
-    # what was timed, its name, factor to the unit, unit, and what tells how much longer it takes
-    ("particle", "a particle, poses to costs", 1e6, "us", ""),
+    # what was timed, its name, factor to the unit, unit, and what tells how many times longer than the one above it takes
+    ("particle", "a particle of cardbox, pose to cost", 1e6, "us", ""),
     ("opencv", "  OpenCV, its polygons ready-made", 1e6, "us", "mono.ratio_opencv_full"),
     ("boxes", "  boxes instead of cardbox", 1e6, "us", "mono.ratio_boxes"),
     ("arm", "a particle of an arm's stage", 1e6, "us", ""),

@@ -96,9 +96,10 @@ class Follower:
         """`preset`: the tracker's settings."""
         settings = make_settings(preset)
         picture = make_picture(settings.body)
-        phases = np.linspace(0, 1, frames)
-        poses = [picture.body.skeleton.pose(left_shoulder_abduction=0.8 + p, left_elbow_flexion=1.2 * p, right_shoulder_abduction=1 - 0.5 * p,
-                                            torso_bend=0.2 * p) for p in phases]
+        ends = ({"left_shoulder_abduction": 0.8, "right_shoulder_abduction": 1.0},
+                {"left_shoulder_abduction": 1.8, "right_shoulder_abduction": 0.5, "left_elbow_flexion": 1.2, "torso_bend": 0.2})
+        start, end = (picture.body.skeleton.pose(**angles) for angles in ends)
+        poses = np.linspace(start, end, frames)
         there = [picture.mask(pose) for pose in poses]
         self.masks: Iterator[NDArray[np.bool_]] = cycle(there + there[::-1])
         self.tracker, self.rng = MonocularTracker(picture, settings), np.random.default_rng(0)
