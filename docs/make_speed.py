@@ -14,7 +14,7 @@ from shadowpuppet.tables import BENCHED
 
 PAGE = Path(__file__).parent / "speed.md"
 PICTURE = PAGE.parent / "assets" / "speed.png"
-PLACE = re.compile(r"(<!-- figures -->\n).*?(\n<!-- end of figures -->)", re.DOTALL)
+PLACE = re.compile(r"(<!-- figures -->\n).*?(<!-- end of figures -->)", re.DOTALL)
 KEYS = {
     "ratio_opencv_full": ("OpenCV's time over ours, all cards", ".1f"),
     "ratio_opencv_arm": ("OpenCV's time over ours, an arm's stage", ".1f"),
@@ -46,7 +46,7 @@ def tables(found: dict[str, Any]) -> str:
     for key, (what, form) in KEYS.items():
         if (value := found.get(f"mono.{key}")) is not None:
             lines.append(f"| `mono.{key}` | {what} | {value:{form}} |")
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:

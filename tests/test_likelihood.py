@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import naive
 from people import camera, picture, random_poses
-from shadowpuppet import projection, rasterize, skeleton, spans
+from shadowpuppet import kinematics, projection, rasterize, spans
 from shadowpuppet.body import BODIES, Body, Quads
 from shadowpuppet.first_pose import arm_parts
 from shadowpuppet.kernels import BLOCK
@@ -209,7 +209,7 @@ def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
     for odd in (np.asfortranarray(poses), np.repeat(poses, 2, 0)[::2], poses.tolist()):
         silhouette_costs(view, observation, odd)
     np.testing.assert_array_equal(cost(np.asfortranarray(poses)), cost(poses))
-    for kernel in (skeleton._forward, projection.project_quads, rasterize._compare, spans.find_edges):
+    for kernel in (kinematics.place_all, kinematics.place_points, projection.project_quads, rasterize._compare, spans.find_edges):
         for signature in getattr(kernel, "signatures", []):
             layouts = {kind.layout for kind in signature if hasattr(kind, "layout")}
             assert layouts <= {"C"}, (kernel, signature)

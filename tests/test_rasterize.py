@@ -206,6 +206,15 @@ def test_masks_of_another_size_are_refused():
             view.added(np.zeros((1, 12)), np.arange(3), silhouette, fixed)
 
 
+def test_poses_of_another_length_are_refused():
+    view = picture(cam=camera((100, 75)))
+    for wrong in (np.zeros((3, 11)), np.zeros(12), np.zeros((2, 3, 12))):
+        with pytest.raises(ShadowPuppetError, match=r"poses have shape .*, expected \(N, 12\)"):
+            view.added(wrong, np.arange(3), view.empty(), view.empty())
+    with pytest.raises(ShadowPuppetError, match="poses have shape"):
+        view.draw(np.zeros(13))
+
+
 # Where the body and its legs are --------------------------------------------------------------------------------------
 
 

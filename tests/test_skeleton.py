@@ -13,7 +13,8 @@ from shadowpuppet.body import RISE, SIDES, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 from shadowpuppet.kernels import BLOCK
-from shadowpuppet.skeleton import AXES, Coupling, Dof, Joint, Skeleton, sines
+from shadowpuppet.kinematics import sines
+from shadowpuppet.skeleton import AXES, Coupling, Dof, Joint, Skeleton
 
 UPPER = {"plain": upper_body_skeleton(SIZES), "clavicles": upper_body_skeleton(SIZES, clavicles=True)}
 ROOT = rigid(rotation_from_vector([0.3, -1.2, 0.5]), [0.1, -0.4, 2.5])

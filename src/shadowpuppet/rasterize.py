@@ -18,8 +18,8 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 from shadowpuppet.kernels import BLOCK, kernel, part
+from shadowpuppet.kinematics import load_joints, place_joints
 from shadowpuppet.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
-from shadowpuppet.skeleton import load_joints, place_joints
 from shadowpuppet.spans import count_and_clear, draw_outline, find_edges, make_page
 
 Bits = NDArray[np.uint64]
@@ -115,10 +115,9 @@ class Picture:
 
     def draw(self, pose: ArrayLike, which: NDArray[np.int64] | None = None) -> Bits:
         """The silhouette of one pose (D,) as bits; of all shapes, or of some."""
-        poses = np.ascontiguousarray(np.asarray(pose, float)[None])
         which = np.arange(len(self.body.parts)) if which is None else which
         bits = self.empty()
-        self._compare(poses, which, bits, bits, drawn=bits[None])
+        self._compare(np.asarray(pose, float)[None], which, bits, bits, drawn=bits[None])
         return bits
 
     def legs(self, pose: ArrayLike, spread: float = np.radians(25)) -> NDArray[np.bool_]:
@@ -160,8 +159,8 @@ class Picture:
         frame, shapes = (tree, offsets if measures is None else measures[0], root), self._shapes(measures and measures[1:])
         joints = self._every if joints is None else joints
         block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
-        out = np.empty(len(poses), np.int64)
-        _compare(np.ascontiguousarray(poses, float), joints, frame, shapes, which, self._lens, self.camera.size[0],
+        poses, out = self.body.skeleton.checked(poses), np.empty(len(poses), np.int64)
+        _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
                  (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
         return out
 
