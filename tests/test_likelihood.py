@@ -76,7 +76,7 @@ def test_a_cost_depends_on_its_own_pose_only(seed, order):
 
 
 @pytest.mark.kernels
-@pytest.mark.parametrize("distance", [2.5, 0.5])  # near enough that some of the arms, in some poses, cross the near plane
+@pytest.mark.parametrize("distance", [2.5, 0.5, 0.25])  # near enough that in some poses arms cross the near plane, or are behind it
 @pytest.mark.parametrize("body", BODIES)
 def test_costs_do_not_depend_on_the_block_that_a_pose_is_in(body, distance, rng):
     """Poses are worked on in blocks, side by side: full ones, a part of one, one alone."""
@@ -85,7 +85,7 @@ def test_costs_do_not_depend_on_the_block_that_a_pose_is_in(body, distance, rng)
     observation = Observation.of(noisy(rng, view.mask(poses[2])))
     costs = silhouette_costs(view, observation, poses)
     assert len(set(costs)) > BLOCK / 2
-    some = [0, BLOCK - 1, BLOCK, 2 * BLOCK, 2 * BLOCK + 4]
+    some = [*range(0, len(poses), 5), BLOCK - 1, BLOCK, len(poses) - 1]
     np.testing.assert_array_equal(costs[some], [naive.cost(view.mask(poses[n]), unpack(observation.silhouette, 65)) for n in some])
     np.testing.assert_array_equal(silhouette_costs(view, observation, poses[BLOCK - 3 :])[[3, 8]], costs[[BLOCK, BLOCK + 5]])
 

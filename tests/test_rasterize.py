@@ -14,6 +14,7 @@ from shadowpuppet.body import BODIES, Body, upper_body_skeleton
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
+from shadowpuppet.kernels import BLOCK
 from shadowpuppet.rasterize import Picture, count, draw_polygon, pack, place, unpack
 from test_body import mirrored
 
@@ -184,18 +185,26 @@ def test_added_counts_what_drawing_adds(body, rng):
         assert found[n] == (new & ~silhouette).sum() - (new & silhouette).sum()
 
 
-def test_people_of_different_sizes_are_drawn_at_once(rng):
-    view = picture("rounded")
-    people = [SIZES, SIZES.with_values(upper_arm_width=0.2), SIZES.with_values(head_height=0.4)]
-    poses = random_poses(rng, view.body.skeleton, 3)
-    bodies = [BODIES["rounded"](sizes) for sizes in people]
-    stacked = tuple(np.array([b.shapes.arrays[i] for b in bodies]) for i in range(2))
-    which = np.arange(len(view.body.parts))
-    T = view.transforms(poses)
-    corners = view.polygons(T, which, stacked)[0]
-    for n, body in enumerate(bodies):
-        alone = Picture(Body("b", view.body.skeleton, body.shapes, body.parts, {}, body.hem), view.camera, view.T_camera_base)
-        np.testing.assert_array_equal(corners[n], alone.polygons(T[n : n + 1], which)[0][0])
+@pytest.mark.parametrize("name", BODIES)
+def test_people_of_different_sizes_are_drawn_at_once(name, rng):
+    """More of them than a block holds; each as if alone."""
+    view = picture(name)
+    widths = rng.uniform(0.06, 0.2, BLOCK + 3)
+    people = [SIZES.with_values(upper_arm_width=width, head_height=2 * width, torso_height=0.3 + width) for width in widths]
+    poses = 0.5 * random_poses(rng, view.body.skeleton, len(people))
+    bodies = [BODIES[name](sizes) for sizes in people]
+    offsets = np.array([[joint.offset for joint in body.skeleton.joints] for body in bodies])
+    measures = (offsets, *(np.array([b.shapes.arrays[i] for b in bodies]) for i in range(len(view.body.shapes.arrays))))
+    which, none = np.arange(len(view.body.parts)), view.empty()
+    found = view.added(poses, which, none, none, measures=measures)
+    corners = view.polygons(view.transforms(poses), which, measures[1:])[0]
+    for n in (0, 1, BLOCK - 1, BLOCK, BLOCK + 2):
+        alone = Picture(bodies[n], view.camera, view.T_camera_base)
+        assert found[n] == alone.mask(poses[n]).sum()
+        with_own_joints = Picture(Body("b", view.body.skeleton, bodies[n].shapes, view.body.parts, {}, view.body.hem), view.camera,
+                                  view.T_camera_base)  # fmt: skip
+        expected = with_own_joints.polygons(view.transforms(poses[n : n + 1]), which)[0][0]
+        np.testing.assert_array_equal(corners[n], expected)
 
 
 def test_masks_of_another_size_are_refused():
