@@ -93,13 +93,15 @@ class Body:
 
     def points(self, poses: ArrayLike, root: ArrayLike | None = None, names: Iterable[str] | None = None) -> Array:
         """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to; all, or those named."""
-        return self.skeleton.points(poses, *self._places(self.landmark_names if names is None else tuple(names)), root)
+        joints, places = self._fixed
+        chosen = [self.landmark_names.index(name) for name in (self.landmark_names if names is None else names)]
+        return self.skeleton.points(poses, joints[chosen], places[chosen], root)
 
-    def _places(self, names: tuple[str, ...]) -> tuple[NDArray[np.int64], Array]:
-        """Joints (L,) of landmarks, and where in their frames these are (L, 3), metres."""
-        chosen = [self.landmarks[name] for name in names]
-        joints = np.array([self.skeleton.joint_index(joint) for joint, _ in chosen], np.int64)
-        return joints, np.array([place for _, place in chosen], float).reshape(-1, 3)
+    @cached_property
+    def _fixed(self) -> tuple[NDArray[np.int64], Array]:
+        """Joints (L,) of the landmarks, and where in their frames these are (L, 3), metres."""
+        joints = np.array([self.skeleton.joint_index(joint) for joint, _ in self.landmarks.values()], np.int64)
+        return joints, np.array([place for _, place in self.landmarks.values()], float).reshape(-1, 3)
 
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:

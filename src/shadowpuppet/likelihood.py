@@ -33,8 +33,8 @@ class Observation:
 
         Empty pixels there still count, so that the waist does not grow over them.
         """
-        mask = np.asarray(mask, bool)
-        return cls.of(mask, mask & picture.legs(pose))
+        silhouette = pack(mask)
+        return cls(silhouette, silhouette & picture.leg_bits(pose))
 
     @property
     def area(self) -> int:

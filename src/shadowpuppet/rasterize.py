@@ -94,11 +94,16 @@ class Picture:
     def _shapes(self, arrays: tuple[Array, ...] | None = None) -> Shapes:
         """What kernels know of the body's shapes; one of the two kinds is empty."""
         shapes = self.body.shapes
-        arrays = tuple(array[None] for array in shapes.arrays) if arrays is None else arrays
+        if arrays is None:
+            return self._own_shapes
         none = np.zeros((1, 0, 0, 3))
         if isinstance(shapes, Quads):
             return (*arrays, none, none, np.zeros(0, np.int64), shapes.joints)  # pyright: ignore[reportReturnType]
         return none, *arrays, shapes.numbers, shapes.joints  # pyright: ignore[reportReturnType]
+
+    @cached_property
+    def _own_shapes(self) -> Shapes:
+        return self._shapes(tuple(array[None] for array in self.body.shapes.arrays))
 
     def points(self, poses: Array, names: Iterable[str] | None = None) -> Array:
         """Landmarks (N, L, 3), metres, in the camera's frame, of poses (N, D); all, or those named."""
@@ -121,7 +126,11 @@ class Picture:
         return bits
 
     def legs(self, pose: ArrayLike, spread: float = np.radians(25)) -> NDArray[np.bool_]:
-        """Mask (H, W) of where the legs of a pose (D,) may be: under the waist's lower edge, wider by `spread` (rad) to each side.
+        """Mask (H, W) of `leg_bits`."""
+        return unpack(self.leg_bits(pose, spread), self.camera.size[0])
+
+    def leg_bits(self, pose: ArrayLike, spread: float = np.radians(25)) -> Bits:
+        """Bits of where the legs of a pose (D,) may be: under the waist's lower edge, wider by `spread` (rad) to each side.
 
         The model ends at the waist; what is seen below says nothing about it.
         """
@@ -129,12 +138,12 @@ class Picture:
         T = self.transforms(np.asarray(pose, float)[None])[0, self.body.skeleton.joint_index("pelvis")]
         low = self.body.hem @ T[:, :3].T + T[:, 3]
         if low[:, 2].min() < NEAR:
-            return np.zeros((height, width), bool)
+            return self.empty()
         pixels = self.camera.project(transform(inverse(self.camera.T_camera_world), low))
         left, right, top = pixels[:, 0].min(), pixels[:, 0].max(), np.median(pixels[:, 1])
         deep = max(height - top, 1.0)
         wide = deep * np.tan(spread)
-        return draw_polygon([[left, top], [right, top], [right + wide, top + deep], [left - wide, top + deep]], (width, height))
+        return polygon_bits([[left, top], [right, top], [right + wide, top + deep], [left - wide, top + deep]], (width, height))
 
     def mask(self, pose: ArrayLike) -> NDArray[np.bool_]:
         """The silhouette of one pose (D,), of shape (H, W): h(x, y, d) of Liu 2011, eq. 2."""
@@ -199,12 +208,17 @@ def place(camera: Camera, distance: float, elevation: float) -> Array:
 
 def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
     """One convex polygon of corners (K, 2), pixels, drawn into an empty mask (H, W)."""
+    return unpack(polygon_bits(corners, size), size[0])
+
+
+def polygon_bits(corners: ArrayLike, size: tuple[int, int]) -> Bits:
+    """One convex polygon of corners (K, 2), pixels, as bits of a mask."""
     corners = np.asarray(corners, float).reshape(-1, 2)
     count, page = len(corners), make_page(-(-size[0] // 64), size[1], len(corners))
     X, Y = (np.ascontiguousarray(corners[None, :, i, None]) for i in range(2))
     if count:
         _draw_corners(X, Y, np.full((1, 1), count), size[0], size[1], np.empty((1, 6, 1)), np.empty((1, count, 3, 1)), page)
-    return unpack(page[0][:, : size[1]], size[0])
+    return np.ascontiguousarray(page[0][:, : size[1]])
 
 
 # Kernels
