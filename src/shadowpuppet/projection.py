@@ -41,8 +41,7 @@ def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # 
         joint, along, down, count = T[joints[q, 0]], X[i], Y[i], counts[i]
         for v in range(4):
             x, y, z, u, w = work[3 * v], work[3 * v + 1], work[3 * v + 2], along[v], down[v]
-            _take(quads[:, q, v], begin, x, y, z)
-            _move(joint, x, y, z)
+            _move(joint, quads[:, q, v], begin, work[3 * v : 3 * v + 3])
             for n in range(size):
                 behind += z[n] < NEAR
                 ahead = 1 / max(z[n], NEAR)
@@ -57,29 +56,19 @@ def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # 
 
 
 @part
-def _take(points, begin, x, y, z):  # pragma: no cover
-    """Coordinates x, y, z (B,) of one point (1, 3), or of those of the people from `begin` on (N, 3), the last again where they end."""
-    if points.shape[0] == 1:
-        a, b, c = points[0, 0], points[0, 1], points[0, 2]
-        for n in range(x.size):
-            x[n], y[n], z[n] = a, b, c
-    else:
-        for n in range(x.size):
-            m = min(begin + n, points.shape[0] - 1)
-            x[n], y[n], z[n] = points[m, 0], points[m, 1], points[m, 2]
-
-
-@part
-def _move(T, x, y, z):  # pragma: no cover
-    """Points x, y, z (B,) by transforms (3, 4, B), in place."""
-    a, b, c, d = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
-    e, f, g, h = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
-    i, j, k, m = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
-    for n in range(x.size):
-        u, v, w = x[n], y[n], z[n]
-        x[n] = a[n] * u + b[n] * v + c[n] * w + d[n]
-        y[n] = e[n] * u + f[n] * v + g[n] * w + h[n]
-        z[n] = i[n] * u + j[n] * v + k[n] * w + m[n]
+def _move(T, points, begin, place):  # pragma: no cover
+    """Where transforms (3, 4, B) take one point (1, 3), or the points of the people from `begin` on (N, 3), the last again where they end;
+    into `place` (3, B)."""
+    for r in range(3):
+        a, b, c, d, out = T[r, 0], T[r, 1], T[r, 2], T[r, 3], place[r]
+        if points.shape[0] == 1:
+            x, y, z = points[0, 0], points[0, 1], points[0, 2]
+            for n in range(out.size):
+                out[n] = a[n] * x + b[n] * y + c[n] * z + d[n]
+        else:
+            for n in range(out.size):
+                m = min(begin + n, points.shape[0] - 1)
+                out[n] = a[n] * points[m, 0] + b[n] * points[m, 1] + c[n] * points[m, 2] + d[n]
 
 
 @kernel
@@ -105,18 +94,21 @@ def project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, 
 @part
 def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no cover
     """The ellipse (5, B), centre and matrix (xx, xy, yy), that ellipsoids with centres and radii (1 or N, 3) look like. `room`: (4, B)."""
-    x, y, z, radius = room[0], room[1], room[2], room[0:3]
-    _take(centres, begin, x, y, z)
-    _move(T, x, y, z)
+    x, y, z = room[0], room[1], room[2]
+    _move(T, centres, begin, room[0:3])
     cx, cy, xx, xy, yy, near = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4], room[3]
     for n in range(x.size):
         counts[n] = DIRECTIONS.shape[0] if z[n] > NEAR else counts[n]
         near[n] = 1 / max(z[n], NEAR)
         cx[n], cy[n] = x[n] * near[n], y[n] * near[n]
         xx[n], xy[n], yy[n] = 0.0, 0.0, 0.0
-    _take(radii, begin, x, y, z)
     for a in range(3):
-        right, down, ahead, r = T[0, a], T[1, a], T[2, a], radius[a]
+        right, down, ahead, r = T[0, a], T[1, a], T[2, a], x
+        for n in range(x.size):
+            r[n] = radii[0, a]
+        if radii.shape[0] > 1:
+            for n in range(x.size):
+                r[n] = radii[min(begin + n, radii.shape[0] - 1), a]
         for n in range(x.size):
             u, v = r[n] * near[n] * (right[n] - cx[n] * ahead[n]), r[n] * near[n] * (down[n] - cy[n] * ahead[n])
             xx[n] += u * u

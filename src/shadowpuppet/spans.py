@@ -58,12 +58,21 @@ def find_edges(X, Y, counts, width, height, boxes, lines):  # pragma: no cover
             base[n] = ROWS * np.floor(box[0, n] / ROWS)
         for v in range(X.shape[1]):
             w, line = v + 1 if v + 1 < count else 0, lines[s, v]
-            for n in range(size):
-                dy = y[w, n] - y[v, n] if v < count else 0.0
-                slope = (x[w, n] - x[v, n]) / (dy if dy != 0 else 1.0)
-                line[0, n] = x[v, n] + (base[n] - y[v, n]) * slope - SNAP
-                line[1, n] = slope
-                line[2, n] = dy * area[n]
+            if v < count:
+                _follow(x[v], y[v], x[w], y[w], base, area, line[0], line[1], line[2])
+            else:
+                for n in range(size):
+                    line[2, n] = 0.0
+
+
+@part
+def _follow(x, y, to_x, to_y, base, area, start, slope, side):  # pragma: no cover
+    """The lines (B,) of edges from one corner to the next: x in row `base`, x gained a row, and on which side they bound."""
+    for n in range(x.size):
+        dy = to_y[n] - y[n]
+        slope[n] = (to_x[n] - x[n]) / (dy if dy != 0 else 1.0)
+        side[n] = dy * area[n]
+        start[n] = x[n] + (base[n] - y[n]) * slope[n] - SNAP
 
 
 @part
