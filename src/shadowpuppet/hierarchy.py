@@ -11,7 +11,7 @@ from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import Scheme, make_scheme, normalise
-from shadowpuppet.settings import MonocularSettings
+from shadowpuppet.settings import MonocularSettings, pixel_scale
 
 PARTS = {"torso": "torso_", "left_arm": "left_", "right_arm": "right_"}
 """Parts that a stage can name, and how the names of their DOF begin."""
@@ -46,7 +46,7 @@ class FilterStage:
         self.turns = np.array([skeleton.dofs[d].kind == "rotation" for d in self.dofs])
         self.sigma = np.array([of[owner[d]].sigma_rotation if turn else of[owner[d]].sigma_translation
                                for d, turn in zip(self.dofs.tolist(), self.turns, strict=True)])
-        self.scale = picture.camera.size[0] * picture.camera.size[1] / (320 * 240)  # settings in pixels are for 320 x 240
+        self.scale = pixel_scale(picture.camera.size)
         self.sigma_cost = of[self.parts[0]].sigma_cost * self.scale
         self.held = [name for part in self.parts for name in HELD[part]]
 
