@@ -82,7 +82,7 @@ def by_phase(values, phase, places):
     (14, 218, "right_knee", (-0.099492006, -0.014145491, 0.506843448)),
 ])  # fmt: skip
 def test_the_motions_on_which_settings_were_chosen_stay_as_they_are(n, frame, joint, wanted):
-    _, found = perform([*proving_ground(), demo_spec()][n], np.random.default_rng([1, n]))
+    _, found = perform([*proving_ground()[:14], demo_spec()][n], np.random.default_rng([1, n]))
     np.testing.assert_allclose(at(found, joint)[frame], wanted, atol=2e-9)
 
 

@@ -33,6 +33,10 @@ PROVING = (
     ("woman_from_below", "woman", 12, "bow_forward 2.6, overhead 3, twist 3.2", 2.2, 60, -12, 2.5, 0),
     ("man_noisy", "man", 13, "wave_hands 3.4, random 6", 2.0, 60, 0, 8.0, 0),
     ("woman_noisy", "woman", 14, "bend_aside 3.4, reach 6", 2.3, 60, 0, 6.0, -10),
+    ("man_boxing", "man", 16, "box 9", 2.2, 60, 0, 2.5, 12),
+    ("woman_boxing", "woman", 17, "box 9", 2.4, 55, 0, 2.5, 0),
+    ("woman_twist_reach", "woman", 19, "twist 3.2, reach 6", 2.2, 60, 0, 2.5, 0),
+    ("child_reach", "child", 21, "reach 6, overhead 3", 2.0, 60, 0, 2.5, 0),
 )
 
 
