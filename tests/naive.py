@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.body import Hulls
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, transform
+from shadowpuppet.hidden_markov import Posterior
 from shadowpuppet.projection import DIRECTIONS, NEAR
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.skeleton import AXES, Skeleton
@@ -160,3 +162,20 @@ def convex_hull(points: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
             half.append(p)
         halves += half[:-1]
     return halves
+
+
+def posterior(log_densities: Array, initial: Array, transitions: Array) -> Posterior:
+    """Hidden Markov model: every path of states one by one."""
+    T, M = log_densities.shape
+    with np.errstate(divide="ignore"):
+        first, follow = np.log(initial), np.log(transitions)
+    paths = list(product(range(M), repeat=T))
+    logs = np.array([first[path[0]] + sum(follow[step] for step in pairwise(path)) + sum(log_densities[range(T), path]) for path in paths])
+    top, states, pairs = logs.max(), np.zeros((T, M)), np.zeros((M, M))
+    if top == -np.inf:
+        return Posterior(states, pairs, -np.inf)
+    total = float(top + np.log(np.exp(logs - top).sum()))
+    for path, log in zip(paths, logs):
+        states[range(T), path] += np.exp(log - total)
+        np.add.at(pairs, (path[:-1], path[1:]), np.exp(log - total))
+    return Posterior(states, pairs, total)

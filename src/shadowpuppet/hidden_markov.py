@@ -35,10 +35,10 @@ def posterior(log_densities: ArrayLike, initial: ArrayLike, transitions: ArrayLi
     `log_densities` (T, M): log b_j(x_t). `initial` (M,) and `transitions` (M, M), rows summing to one: probabilities.
     """
     with np.errstate(divide="ignore"):
-        log_initial, log_transitions = np.log(np.asarray(initial, float)), np.log(np.asarray(transitions, float))
+        log_initial, log_transitions = np.log(np.array(initial, float)), np.log(np.array(transitions, float))
     densities = np.ascontiguousarray(log_densities, float)
     alpha, beta, pairs = np.empty(densities.shape), np.empty(densities.shape), np.zeros(log_transitions.shape)
-    total = _forward_backward(densities, log_initial, np.ascontiguousarray(log_transitions), alpha, beta, pairs)
+    total = _forward_backward(densities, log_initial, log_transitions, alpha, beta, pairs)
     if total == -np.inf:
         return Posterior(np.zeros(densities.shape), pairs, -np.inf)
     states = np.exp(alpha + beta - total)
@@ -70,6 +70,8 @@ def _forward_backward(densities, initial, transitions, alpha, beta, pairs):  # p
                 terms[i] = alpha[t - 1, i] + transitions[i, j]
             alpha[t, j] = _log_sum(terms) + densities[t, j]
     total = _log_sum(alpha[T - 1])
+    if total == -np.inf:
+        return total
     beta[T - 1] = 0.0
     for t in range(T - 2, -1, -1):
         ahead = densities[t + 1] + beta[t + 1]
@@ -77,7 +79,7 @@ def _forward_backward(densities, initial, transitions, alpha, beta, pairs):  # p
             for j in range(M):
                 terms[j] = transitions[i, j] + ahead[j]
                 share = alpha[t, i] + terms[j] - total
-                if share > NEGLIGIBLE:  # false for -inf, and for the not-a-number of an impossible sequence
+                if share > NEGLIGIBLE:
                     pairs[i, j] += np.exp(share)
             beta[t, i] = _log_sum(terms)
     return total

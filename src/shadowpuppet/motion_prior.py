@@ -71,25 +71,33 @@ class MotionPrior:
             raise ShadowPuppetError(f"rate: found {self.rate}, expected frames a second, more than zero")
 
     def encode(self, poses: ArrayLike) -> Codes:
-        """Poses (N, D) by the region whose subspace is nearest, and the coordinates there (eqs. 8, 18)."""
+        """Poses (N, D) by the region whose subspace is nearest, and the coordinates there (eqs. 8, 18). Raises `ShadowPuppetError`."""
         return Codes(*self.subspaces.nearest(self._checked(poses)))
 
     def reconstruct(self, codes: Codes) -> Array:
-        """Poses (N, D) of codes (eq. 19)."""
-        return self.subspaces.reconstruct(np.asarray(codes.values, float), self._checked_regions(codes.regions, len(codes.values)))
+        """Poses (N, D) of codes (eq. 19). Raises `ShadowPuppetError` where they are none of this prior's."""
+        values = np.asarray(codes.values, float)
+        if values.ndim != 2 or values.shape[1] != self.subspaces.dimensions:
+            raise ShadowPuppetError(f"values: found shape {values.shape}, expected (N, {self.subspaces.dimensions})")
+        return self.subspaces.reconstruct(values, self._checked_regions(codes.regions, len(values)))
 
-    def propose(self, rng: np.random.Generator, poses: ArrayLike, regions: ArrayLike | None = None) -> Proposal:
+    def propose(self, rng: np.random.Generator, poses: ArrayLike, regions: ArrayLike | None = None, keep: float = 0.0) -> Proposal:
         """Where poses (N, D) in regions (N,) may be a frame later (Ni 2008, V-A, step 3).
 
         The next region is drawn from the transitions, the pose projected into its subspace and moved there by Gaussian noise of the
-        region's own variances. Without `regions` each pose has its nearest. Raises `ShadowPuppetError` where an array does not fit.
+        region's own variances. Without `regions` each pose has its nearest. In the paper a proposal forgets all that the subspace cannot
+        hold, such as another person's posture; `keep` is the share of that which stays, where a pose is from its last region's subspace.
+        Raises `ShadowPuppetError` where an array does not fit.
         """
         poses = self._checked(poses)
         regions = self.subspaces.nearest(poses)[0] if regions is None else self._checked_regions(regions, len(poses))
         drawn = self._follow(regions, 1 - rng.random(len(poses)))  # step 3a, eq. 24
         values = self.subspaces.project(poses, drawn)  # step 3b, eq. 27
         values += rng.standard_normal(values.shape) * self._deviations[drawn]  # step 3c
-        return Proposal(self.subspaces.reconstruct(values, drawn), drawn)  # step 3d, eq. 28
+        proposed = self.subspaces.reconstruct(values, drawn)  # step 3d, eq. 28
+        if keep:
+            proposed += keep * (poses - self.subspaces.reconstruct(self.subspaces.project(poses, regions), regions))
+        return Proposal(proposed, drawn)
 
     @cached_property
     def _deviations(self) -> Array:

@@ -77,7 +77,7 @@ class Subspaces:
     def coordinates(self, poses: Array) -> Array:
         """Coordinates (N, M, m) of poses (N, D) in every region's subspace, from its centre (eq. 18)."""
         middle, _, flat, origin = self._flat
-        return ((poses - middle) @ flat - origin).reshape(len(poses), len(self), -1)
+        return ((poses - middle) @ flat - origin).reshape(len(poses), len(self), self.dimensions)
 
     def project(self, poses: Array, regions: Regions) -> Array:
         """Coordinates (N, m) of poses (N, D), each in one region's subspace (eqs. 18, 25, 27)."""

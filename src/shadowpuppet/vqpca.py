@@ -88,7 +88,8 @@ def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candida
     tried = sorted({int(number) for number in candidates if number <= most})
     if not tried:
         raise ShadowPuppetError(f"clips: found {most} different poses beside each fold, expected {min(candidates, default=1)} or more")
-    errors = np.array([[_errors(each, kept, out, settings, number) for (kept, out), each in zip(splits, rng.spawn(folds))]
+    seeds = rng.integers(2**63, size=len(splits))  # the same for every candidate
+    errors = np.array([[_errors(np.random.default_rng(seed), *split, settings, number) for split, seed in zip(splits, seeds, strict=True)]
                        for number in tried])
     training, held_out = np.sqrt((errors**2).mean(1)).T
     chosen = tried[int(np.flatnonzero(held_out <= (1 + margin) * held_out.min())[0])]

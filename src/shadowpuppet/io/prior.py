@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import lzma
+import struct
 import zipfile
 import zlib
 from pathlib import Path
@@ -19,6 +21,10 @@ FORMAT, VERSION = "shadowpuppet motion prior", 1
 NUMBERS = ("centres", "bases", "variances", "noise", "transitions", "initial", "rate")
 """Arrays of numbers in the file, as `Subspaces` and `MotionPrior` have them; `rate` is not a number where it is not known."""
 
+BROKEN = (EOFError, ValueError, TypeError, KeyError, OverflowError, MemoryError, RuntimeError, SyntaxError, struct.error, zlib.error,
+          lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
+"""What reading raises, beside `OSError`, where an archive is damaged, encrypted or none."""
+
 
 def read_prior(path: str | Path) -> MotionPrior:
     """A prior from a file. Raises `FormatError`, naming file and array, where it cannot be read or is none."""
@@ -30,7 +36,7 @@ def read_prior(path: str | Path) -> MotionPrior:
         problem = reason(error)
     except ShadowPuppetError as error:
         problem = str(error)
-    except (EOFError, ValueError, TypeError, KeyError, OverflowError, MemoryError, NotImplementedError, zlib.error, zipfile.BadZipFile):
+    except BROKEN:
         problem = "not a whole archive of arrays"
     raise FormatError(f"{path}: cannot be read as a motion prior ({problem})")
 
