@@ -13,7 +13,7 @@ from scipy.special import xlogy
 from motions import gait, prior, walk
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.settings import PriorSettings
-from shadowpuppet.vqpca import Fit, choose_regions, fit, likeliest_rows, log_likelihood, reconstruction_error
+from shadowpuppet.vqpca import Fit, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -30,7 +30,7 @@ def same(one: Fit, other: Fit) -> bool:
 def test_a_made_motion_is_found_again(rng):
     """Regions well apart: centres, subspaces, variances and transitions of 6,000 frames in two clips."""
     made = prior(rng, regions=5, width=6, dimensions=2)
-    found = fit(rng, [walk(rng, made, 3000)[0] for _ in range(2)], PriorSettings(regions=5, dimensions=2, starts=8, leave=0.0)).prior
+    found = fit_prior(rng, [walk(rng, made, 3000)[0] for _ in range(2)], PriorSettings(regions=5, dimensions=2, starts=8, leave=0.0)).prior
     _, match = linear_sum_assignment(cdist(made.subspaces.centres, found.subspaces.centres))
     inner, wanted = found.subspaces, made.subspaces
     np.testing.assert_allclose(inner.centres[match], wanted.centres, atol=0.05)
@@ -43,7 +43,7 @@ def test_a_made_motion_is_found_again(rng):
 
 def test_a_gait_becomes_a_ring_of_regions_in_order_of_time():
     """Of one and a half cycles: every region is left for the next, or for that in which the cycle begins again."""
-    made = fit(np.random.default_rng(3), [gait(90)], PriorSettings(regions=12, leave=0.0)).prior
+    made = fit_prior(np.random.default_rng(3), [gait(90)], PriorSettings(regions=12, leave=0.0)).prior
     following = np.where(np.eye(12, dtype=bool), 0, made.transitions).argmax(1)
     left = (made.transitions.diagonal() < 1).nonzero()[0]
     assert (following[left[:-1]] == left[:-1] + 1).all()
@@ -54,15 +54,16 @@ def test_a_gait_becomes_a_ring_of_regions_in_order_of_time():
 def test_no_transition_leads_from_clip_to_clip():
     """Two poses, one clip of each: the other is never followed."""
     clips = [np.stack([0.001 * np.arange(20), np.full(20, value)], 1) for value in (0.0, 10.0)]
-    learnt = fit(np.random.default_rng(0), clips, PriorSettings(regions=2, dimensions=1, leave=0.0, starts=20)).prior
+    how = PriorSettings(regions=2, dimensions=1, leave=0.0, starts=20)
+    learnt = fit_prior(np.random.default_rng(0), clips, how).prior
     np.testing.assert_allclose(learnt.transitions, np.eye(2), atol=1e-9)
-    joined = fit(np.random.default_rng(0), [np.concatenate(clips)], PriorSettings(regions=2, dimensions=1, leave=0.0, starts=20)).prior
+    joined = fit_prior(np.random.default_rng(0), [np.concatenate(clips)], how).prior
     assert joined.transitions[0, 1] == pytest.approx(1 / 20)
 
 
 def test_names_and_rate_are_kept():
     names = tuple(f"angle_{i}" for i in range(25))
-    learnt = fit(np.random.default_rng(0), [gait(40)], PriorSettings(regions=4), names=names, rate=60.0).prior
+    learnt = fit_prior(np.random.default_rng(0), [gait(40)], PriorSettings(regions=4), names=names, rate=60.0).prior
     assert (learnt.names, learnt.rate) == (names, 60.0)
 
 
@@ -80,7 +81,7 @@ def test_no_round_is_worse_and_nothing_is_not_a_number(seed, frames, width, regi
     poses = np.concatenate([poses, poses[: frames // 3]])
     how = PriorSettings(regions=min(regions, frames), dimensions=min(dimensions, width), leave=leave, starts=2)
     clips = [poses[: len(poses) // 2], poses[len(poses) // 2 :]]
-    learnt = fit(rng, clips, how)
+    learnt = fit_prior(rng, clips, how)
     made, inner, rounding = learnt.prior, learnt.prior.subspaces, 1e-7 * np.ptp(poses)  # a root of squares has half the digits
     assert (np.diff(learnt.errors) <= rounding).all()
     assert (np.diff(learnt.log_likelihoods) >= -1e-9 * (1 + np.abs(learnt.log_likelihoods[0]))).all()
@@ -101,7 +102,7 @@ def test_the_error_settles_where_frames_belong_to_their_nearest_region(seed):
     """The last round's regions are the means of what is nearest to them, or the tolerance ended it: run on with none, nothing moves."""
     how = PriorSettings(regions=6, dimensions=2, tolerance=0.0, iterations=1000, starts=1)
     poses = gait(80) + 0.05 * np.random.default_rng(seed).standard_normal((80, 25))
-    made = fit(np.random.default_rng(seed), [poses], how).prior
+    made = fit_prior(np.random.default_rng(seed), [poses], how).prior
     regions = made.encode(poses).regions
     assert set(regions.tolist()) == set(range(6))
     for i in range(6):
@@ -110,19 +111,19 @@ def test_the_error_settles_where_frames_belong_to_their_nearest_region(seed):
 
 def test_the_same_seed_learns_the_same_and_another_another():
     how = PriorSettings(regions=6, starts=1)
-    first, again, other = (fit(np.random.default_rng(seed), [gait(60), gait(30, phase=1.0)], how) for seed in (1, 1, 2))
+    first, again, other = (fit_prior(np.random.default_rng(seed), [gait(60), gait(30, phase=1.0)], how) for seed in (1, 1, 2))
     assert same(first, again)
     assert not same(first, other)
 
 
 def test_the_best_of_several_starts_is_kept():
-    errors = [fit(np.random.default_rng(5), [gait(100)], PriorSettings(regions=8, starts=starts)).errors[-1] for starts in (1, 3, 12)]
+    errors = [fit_prior(np.random.default_rng(5), [gait(100)], PriorSettings(regions=8, starts=starts)).errors[-1] for starts in (1, 3, 12)]
     assert errors[0] >= errors[1] >= errors[2]
     assert errors[0] > errors[2]
 
 
 def test_as_many_regions_as_poses_reconstruct_all():
-    learnt = fit(np.random.default_rng(0), [gait(30)], PriorSettings(regions=30))
+    learnt = fit_prior(np.random.default_rng(0), [gait(30)], PriorSettings(regions=30))
     assert learnt.errors[-1] < 1e-7
     assert len(set(learnt.prior.encode(gait(30)).regions.tolist())) > 20
 
@@ -132,7 +133,7 @@ def test_no_region_is_left_empty():
     rng = np.random.default_rng(1)
     poses = np.concatenate([1e-9 * rng.standard_normal((30, 4)), rng.standard_normal((10, 4))])
     for seed in range(20):
-        learnt = fit(np.random.default_rng(seed), [poses], PriorSettings(regions=12, dimensions=1, starts=1))
+        learnt = fit_prior(np.random.default_rng(seed), [poses], PriorSettings(regions=12, dimensions=1, starts=1))
         assert len(np.unique(learnt.prior.subspaces.centres, axis=0)) == 12
 
 
@@ -198,7 +199,7 @@ def test_the_candidates_do_not_depend_on_one_another():
 ])
 def test_clips_that_do_not_do_are_said(clips, how, said):
     with pytest.raises(ShadowPuppetError, match=said):
-        fit(np.random.default_rng(0), clips, PriorSettings(**how))
+        fit_prior(np.random.default_rng(0), clips, PriorSettings(**how))
 
 
 def test_settings_that_cannot_be_are_said():

@@ -15,20 +15,23 @@ if TYPE_CHECKING:
     from shadowpuppet.io.calibration import read_calibration, write_calibration
     from shadowpuppet.io.joints import read_joints, write_joints
     from shadowpuppet.io.person import Person, read_person, write_person
+    from shadowpuppet.io.prior import read_prior, write_prior
     from shadowpuppet.io.recording import Recording, read_recording
     from shadowpuppet.io.run import Run, read_run
     from shadowpuppet.look import Look
     from shadowpuppet.metrics import evaluate
     from shadowpuppet.motion import JointTable, Motion
+    from shadowpuppet.motion_prior import MotionPrior
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.rasterize import Picture
-    from shadowpuppet.settings import MonocularSettings, make_settings
+    from shadowpuppet.settings import MonocularSettings, PriorSettings, make_settings
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking import MonocularTracker
     from shadowpuppet.video import open_frames, write_frames
+    from shadowpuppet.vqpca import choose_regions, fit_prior
 
     __version__: str
 
@@ -41,7 +44,8 @@ _HOMES = {
     "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
     "Picture": "rasterize", "MonocularSettings": "settings", "make_settings": "settings", "SilhouetteSettings": "silhouette",
     "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video",
-    "write_frames": "video",
+    "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
+    "read_prior": "io.prior", "write_prior": "io.prior",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -51,6 +55,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "find_person", "fit_references", "learn_background", "look_at", "make_options", "make_settings", "open_frames",
     "read_calibration", "read_joints", "read_person", "read_recording", "read_run", "synthesize", "track_recording",
     "write_calibration", "write_frames", "write_joints", "write_person",
+    "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior",
 ]  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """What a motion is like: regions of poses with a subspace each, and how it goes from one to the next (Ni 2008, IV).
 
-A VQPCA in a hidden Markov model. Learnt by `vqpca.fit`; poses are arrays (N, D) of any numbers that vary smoothly: angles must have been
-unwrapped, and be of the same unit or of comparable size.
+A VQPCA in a hidden Markov model, learnt by `vqpca.fit_prior`. Poses are arrays (N, D) of any numbers that vary smoothly and are of
+comparable size: angles must have been unwrapped.
 """
 
 from __future__ import annotations

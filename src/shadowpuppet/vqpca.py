@@ -53,7 +53,7 @@ class Choice(NamedTuple):
     """The same of those that were not."""
 
 
-def fit(rng: np.random.Generator, clips: Sequence[ArrayLike], settings: PriorSettings | None = None, *, names: Sequence[str] = (),
+def fit_prior(rng: np.random.Generator, clips: Sequence[ArrayLike], settings: PriorSettings | None = None, *, names: Sequence[str] = (),
         rate: float | None = None) -> Fit:
     """Learn a motion from clips (T, D), one or several, of poses in the order of time, all at one frame rate.
 
@@ -75,7 +75,7 @@ def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candida
 
     Each clip is cut into `folds` pieces; each piece in turn is left out and reconstructed from what was learnt without. (The paper takes
     the number by eye, from the training error, which always falls.) Candidates for which there are too few poses are left out.
-    Raises as `fit` does, where there is none left.
+    Raises as `fit_prior` does, where there is none left.
     """
     settings, arrays = settings or PriorSettings(), check_clips(clips)
     if folds < 2:
@@ -161,7 +161,7 @@ def _error(subspaces: Subspaces, poses: Array) -> float:
 
 
 def learn_subspaces(rng: np.random.Generator, poses: Array, settings: PriorSettings) -> tuple[Subspaces, list[float]]:
-    """Regions of poses (T, D), in order of time, and the errors of the rounds in which they were learnt. Raises as `fit` does."""
+    """Regions of poses (T, D), in order of time, and the errors of the rounds in which they were learnt. Raises as `fit_prior` does."""
     _check_settings(settings, poses)
     floor = max(settings.noise * float(poses.var(0).mean()), LEAST_VARIANCE)
     learnt = [_quantise(rng, poses, settings, floor) for _ in range(settings.starts)]

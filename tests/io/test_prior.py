@@ -16,7 +16,7 @@ from motions import gait, prior
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.settings import PriorSettings
-from shadowpuppet.vqpca import fit
+from shadowpuppet.vqpca import fit_prior
 
 
 def fields(of) -> list[np.ndarray]:
@@ -37,7 +37,7 @@ def test_what_is_written_is_read(tmp_path, seed, regions, width, dimensions, nam
 
 
 def test_a_learnt_prior_proposes_the_same_after_it_was_kept(tmp_path):
-    made = fit(np.random.default_rng(0), [gait(60)], PriorSettings(regions=6), rate=60.0).prior
+    made = fit_prior(np.random.default_rng(0), [gait(60)], PriorSettings(regions=6), rate=60.0).prior
     write_prior(tmp_path / "walk.npz", made)
     read = read_prior(str(tmp_path / "walk.npz"))
     proposed = [each.propose(np.random.default_rng(1), gait(60)).poses for each in (made, read)]
