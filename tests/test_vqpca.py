@@ -13,7 +13,7 @@ from scipy.special import xlogy
 from motions import gait, prior, walk
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.settings import PriorSettings
-from shadowpuppet.vqpca import Fit, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
+from shadowpuppet.vqpca import Fit, _fill, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -135,6 +135,11 @@ def test_no_region_is_left_empty():
     for seed in range(20):
         learnt = fit_prior(np.random.default_rng(seed), [poses], PriorSettings(regions=12, dimensions=1, starts=1))
         assert len(np.unique(learnt.prior.subspaces.centres, axis=0)) == 12
+
+
+def test_an_empty_region_gets_the_frame_that_is_reconstructed_worst_of_those_that_leave_another_behind():
+    filled = _fill(np.array([0, 0, 0, 3, 4]), np.array([0.1, 0.3, 0.2, 9.0, 8.0]), 5)
+    assert filled.tolist() == [0, 1, 2, 3, 4]
 
 
 # Transitions

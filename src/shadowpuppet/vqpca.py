@@ -24,8 +24,6 @@ from shadowpuppet.subspaces import Regions, Subspaces, principal_subspaces
 
 GREATEST = 1e9
 """Numbers of poses are less than this: squares of greater ones have too few digits."""
-TIE = 1e-12
-"""Weight of a frame's distance from its centre beside its distance from the subspace, where an empty region looks for a frame."""
 LEAST_VARIANCE = 1e-150
 """Where the poses hardly vary, so that densities stay finite."""
 
@@ -182,8 +180,7 @@ def _quantise(rng: np.random.Generator, poses: Array, settings: PriorSettings, f
         distances = found.distances(poses)  # eqs. 9, 10
         errors.append(float(np.sqrt(distances[every, partition].mean() / poses.shape[1])))
         nearest = distances.argmin(1)  # eq. 8
-        score = distances[every, nearest] + TIE * ((poses - found.centres[nearest]) ** 2).sum(1)
-        following = _fill(nearest, score, M)
+        following = _fill(nearest, distances[every, nearest], M)
         settled = len(errors) > 1 and errors[-2] - errors[-1] <= settings.tolerance * errors[-2]
         if settled or len(errors) >= settings.iterations or (following == partition).all():
             return partition, errors
