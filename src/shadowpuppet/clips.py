@@ -30,8 +30,8 @@ def mirrored(table: JointTable) -> JointTable:
 def resampled(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
     """Times (K,), a step of 1 / rate apart from the first on, and the values (K, ...) there of values (T, ...) at times (T,), seconds.
 
-    By cubic splines through what is known; not a number where either neighbour in time is none. Angles must have been unwrapped. Motion
-    faster than half the new rate, which bodies do not have from 20 frames/s on, is not taken out. Raises `ShadowPuppetError`.
+    By cubic splines through what is known; not a number where either neighbour in time is none. Angles must have been unwrapped.
+    Nothing is smoothed: what is faster than half the new rate is not taken out. Raises `ShadowPuppetError`.
     """
     times, values = np.asarray(times, float), np.asarray(values, float)
     if times.ndim != 1 or not len(times) or len(times) != len(values) or not (np.diff(times) > 0).all() or not np.isfinite(times).all():
