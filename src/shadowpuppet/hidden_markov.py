@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.geometry import Array
+from shadowpuppet.kernels import joined, kernel
 
 NEGLIGIBLE = -40.0
 """A term of a sum that is less than e^NEGLIGIBLE of its greatest changes no digit of it."""
@@ -38,32 +38,33 @@ def posterior(log_densities: ArrayLike, initial: ArrayLike, transitions: ArrayLi
         log_initial, log_transitions = np.log(np.array(initial, float)), np.log(np.array(transitions, float))
     densities = np.ascontiguousarray(log_densities, float)
     alpha, beta, pairs = np.empty(densities.shape), np.empty(densities.shape), np.zeros(log_transitions.shape)
-    total = _forward_backward(densities, log_initial, log_transitions, alpha, beta, pairs)
+    total = _forward_backward(densities, log_initial, log_transitions, np.empty(len(pairs)), alpha, beta, pairs)
     if total == -np.inf:
         return Posterior(np.zeros(densities.shape), pairs, -np.inf)
     states = np.exp(alpha + beta - total)
     return Posterior(states / states.sum(1, keepdims=True), pairs, float(total))
 
 
-@numba.njit(cache=True)
+@joined
 def _log_sum(terms):  # pragma: no cover
     """log(sum(exp(terms)))."""
-    top = terms.max()
+    top, total = -np.inf, 0.0
+    for term in terms:
+        top = max(top, term)
     if top == -np.inf:
         return top
-    total = 0.0
     for term in terms:
         if term - top > NEGLIGIBLE:
             total += np.exp(term - top)
     return top + np.log(total)
 
 
-@numba.njit(cache=True)
-def _forward_backward(densities, initial, transitions, alpha, beta, pairs):  # pragma: no cover
-    """Logarithms throughout; fills alpha and beta (T, M), adds to pairs (M, M), returns the log likelihood."""
+@kernel
+def _forward_backward(densities, initial, transitions, terms, alpha, beta, pairs):  # pragma: no cover
+    """Logarithms throughout; fills alpha and beta (T, M), adds to pairs (M, M), returns the log likelihood. `terms` (M,) is scratch."""
     T, M = densities.shape
-    terms = np.empty(M)
-    alpha[0] = initial + densities[0]
+    for j in range(M):
+        alpha[0, j] = initial[j] + densities[0, j]
     for t in range(1, T):
         for j in range(M):
             for i in range(M):
@@ -74,10 +75,9 @@ def _forward_backward(densities, initial, transitions, alpha, beta, pairs):  # p
         return total
     beta[T - 1] = 0.0
     for t in range(T - 2, -1, -1):
-        ahead = densities[t + 1] + beta[t + 1]
         for i in range(M):
             for j in range(M):
-                terms[j] = transitions[i, j] + ahead[j]
+                terms[j] = transitions[i, j] + densities[t + 1, j] + beta[t + 1, j]
                 share = alpha[t, i] + terms[j] - total
                 if share > NEGLIGIBLE:
                     pairs[i, j] += np.exp(share)
