@@ -69,10 +69,10 @@ class Case:
         picture = person.picture(self.camera, settings.body)
         tracker = MonocularTracker(picture, settings)
         states = [tracker.start(rng, self.masks[0])]
-        start = time.perf_counter()
+        start = time.process_time()  # what else the machine does is not counted
         for mask in self.masks[1:]:
             states.append(tracker.step(rng, states[-1], mask))
-        spent = time.perf_counter() - start
+        spent = time.process_time() - start
         table = JointTable(self.times, picture.body.landmark_names, picture.points_world(np.array([state.pose for state in states])))
         costs = [state.cost for state in states]
         return self.measure(table) | {"cost": float(np.nanmean(costs)), "ms": 1000 * spent / max(len(states) - 1, 1)}
