@@ -25,12 +25,13 @@ if TYPE_CHECKING:
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.rasterize import Picture
-    from shadowpuppet.settings import MonocularSettings, PriorSettings, make_settings
+    from shadowpuppet.settings import HullSettings, MonocularSettings, PriorSettings, make_settings
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking import MonocularTracker
     from shadowpuppet.video import open_frames, write_frames
+    from shadowpuppet.visual_hull import SurfacePoints, VisualHull
     from shadowpuppet.vqpca import choose_regions, fit_prior
 
     __version__: str
@@ -45,7 +46,7 @@ _HOMES = {
     "Picture": "rasterize", "MonocularSettings": "settings", "make_settings": "settings", "SilhouetteSettings": "silhouette",
     "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video",
     "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
-    "read_prior": "io.prior", "write_prior": "io.prior",
+    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull", "VisualHull": "visual_hull",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -55,7 +56,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "find_person", "fit_references", "learn_background", "look_at", "make_options", "make_settings", "open_frames",
     "read_calibration", "read_joints", "read_person", "read_recording", "read_run", "synthesize", "track_recording",
     "write_calibration", "write_frames", "write_joints", "write_person",
-    "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior",
+    "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints", "VisualHull",
 ]  # fmt: skip
 
 

@@ -161,13 +161,13 @@ def _to_pixels(X, Y, lens):  # pragma: no cover
         x, y = X[v], Y[v]
         if bends:
             for n in range(x.size):
-                x[n], y[n] = _bend_within(x[n], y[n], k, fisheye, reach)
+                x[n], y[n] = bend_within(x[n], y[n], k, fisheye, reach)
         for n in range(x.size):
             x[n], y[n] = K[0, 0] * x[n] + K[0, 2], K[1, 1] * y[n] + K[1, 2]
 
 
 @part
-def _bend_within(x, y, k, fisheye, reach):  # pragma: no cover
+def bend_within(x, y, k, fisheye, reach):  # pragma: no cover
     """Distortion of a point on the plane z = 1. Edges between bent corners stay straight: a card is small beside the lens's bend."""
     beyond = max(np.sqrt(x * x + y * y) / reach, 1.0)
     x, y = _bend(x / beyond, y / beyond, k, fisheye)

@@ -211,3 +211,21 @@ class PriorSettings:
     """Least variance in any direction, as a share of the training poses' mean variance: a region of few frames has none in most."""
     leave: Annotated[float, Field(ge=0, lt=1)] = 0.01
     """Share of the transitions from each region that goes to all alike, at least, so that the filter is never caught in one."""
+
+
+@checked
+class HullSettings:
+    """How surface points are taken from the silhouettes of several cameras (Ni 2008, III). The paper gives no values."""
+
+    rays: Annotated[int, Field(ge=1, le=1_000_000)] = 2000
+    """Viewing rays, spread evenly along the contours of all cameras (at most one for two pixels' sides): points are about as many however
+    large the pictures are."""
+    longest: Positive = 0.25
+    """Viewing edges longer than this (m) are left out: few cameras look there."""
+    falloff: Positive = 0.1
+    """A viewing edge this long (m) has half the weight of a short one."""
+    pitch: Positive = 0.25
+    """Points on a viewing edge are at most this far apart (m)."""
+    tolerated: Annotated[int, Field(ge=0, le=100)] = 1
+    """So many cameras may say empty where at least three times as many others see the person, as one does whose silhouette has a hole;
+    asked only along rays on which nothing is left otherwise. With 0, each camera carves."""

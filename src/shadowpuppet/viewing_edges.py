@@ -1,0 +1,283 @@
+"""Viewing edges: what silhouettes, as polygons on the plane z = 1 of their cameras, leave of the rays of other cameras.
+
+Interval arithmetic along each ray (Matusik et al. 2000, "Image-based visual hulls"). In another camera's plane a ray is a straight line
+of which a side of a polygon is crossed where its two ends lie on different sides; sides are passed over in runs, by circles around them.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from shadowpuppet.contours import ARM
+from shadowpuppet.projection import NEAR, bend_within
+
+FAR = 100.0
+"""Rays end here (m)."""
+SHORTEST = 1e-6
+"""What is left of a ray by less than this (m) is rounding."""
+APART = 1e-3
+"""Cameras nearer to each other than this (m) say nothing about depth along each other's rays."""
+CONFIRMED = 3
+"""A place that a view denies is kept where at least so many others see the person: two alone may see different parts of it there."""
+CHUNK = 8
+"""Sides of a contour in a run."""
+
+
+@numba.njit(cache=True)
+def straighten(points, starts, person, grid, width, height):  # pragma: no cover
+    """Contours through the lens, closed; viewing planes' outward normals, 0 where none is known; where each polygon ends."""
+    polygons = starts.size - 1
+    lines, outward = np.empty((points.shape[0] + polygons, 2)), np.zeros((points.shape[0] + polygons, 3))
+    across, down = (grid.shape[1] - 1) / width, (grid.shape[0] - 1) / height
+    n = 0
+    for m in range(polygons):
+        first, size = n, starts[m + 1] - starts[m]
+        for k in range(size + 1):
+            at = starts[m] + (k if k < size else 0)
+            x, y = (points[at, 0] + 0.5) * across, (points[at, 1] + 0.5) * down
+            c, r = min(int(x), grid.shape[1] - 2), min(int(y), grid.shape[0] - 2)
+            x, y = x - c, y - r
+            for axis in range(2):
+                top = grid[r, c, axis] + x * (grid[r, c + 1, axis] - grid[r, c, axis])
+                low = grid[r + 1, c, axis] + x * (grid[r + 1, c + 1, axis] - grid[r + 1, c, axis])
+                lines[n, axis] = top + y * (low - top)
+            n += 1
+        for k in range(size if size > 3 * ARM else 0):
+            if person[starts[m] + k]:
+                before, after = first + (k - ARM) % size, first + (k + ARM) % size
+                dx, dy = lines[after, 0] - lines[before, 0], lines[after, 1] - lines[before, 1]
+                x, y = lines[first + k, 0], lines[first + k, 1]
+                dz = dx * y - dy * x
+                length = np.sqrt(dx * dx + dy * dy + dz * dz)
+                if length > 0:
+                    outward[first + k, 0], outward[first + k, 1], outward[first + k, 2] = dy / length, -dx / length, dz / length
+    return lines, outward, starts + np.arange(polygons + 1)
+
+
+@numba.njit(cache=True)
+def circles(lines, ends):  # pragma: no cover
+    """Runs of sides of closed polygons, each within a circle: circles (3, C), first side and end of each (C, 2)."""
+    count = 0
+    for m in range(ends.size - 1):
+        count += (ends[m + 1] - ends[m] - 1 + CHUNK - 1) // CHUNK
+    circles, spans = np.empty((3, count)), np.empty((count, 2), np.int64)
+    n = 0
+    for m in range(ends.size - 1):
+        for a in range(ends[m], ends[m + 1] - 1, CHUNK):
+            b = min(a + CHUNK, ends[m + 1] - 1)
+            x, y = (lines[a, 0] + lines[b, 0]) / 2, (lines[a, 1] + lines[b, 1]) / 2
+            farthest = 0.0
+            for k in range(a, b + 1):
+                farthest = max(farthest, (lines[k, 0] - x) ** 2 + (lines[k, 1] - y) ** 2)
+            circles[0, n], circles[1, n], circles[2, n] = x, y, np.sqrt(farthest) + 1e-9
+            spans[n, 0], spans[n, 1] = a, b
+            n += 1
+    return circles, spans
+
+
+@numba.njit(cache=True)
+def length(lines, outward):  # pragma: no cover
+    """Length of the contours on which rays are taken."""
+    total = 0.0
+    for k in range(lines.shape[0] - 1):
+        if outward[k].any():
+            total += np.hypot(lines[k + 1, 0] - lines[k, 0], lines[k + 1, 1] - lines[k, 1])
+    return total
+
+
+@numba.njit(cache=True)
+def spread(lines, outward, step):  # pragma: no cover
+    """Vertices `step` apart along the contours, as near as there are any."""
+    out, n, passed = np.empty(lines.shape[0], np.int64), 0, step / 2
+    for k in range(lines.shape[0] - 1):
+        if outward[k].any():
+            passed += np.hypot(lines[k + 1, 0] - lines[k, 0], lines[k + 1, 1] - lines[k, 1])
+            if passed >= step:
+                out[n] = k
+                n += 1
+                passed = min(passed - step, step)
+    return out[:n]
+
+
+@numba.njit(cache=True, nogil=True)
+def cut(camera, rays, relative, lines, spans, circles, bounds, lenses, tolerated):  # pragma: no cover
+    """What the other views leave of rays (R, 3), z = 1, of cameras (R,): the ray (E,) of each viewing edge, and its depths (E, 2).
+
+    `relative` (V, V, 4, 4) leads from view to view; `lines` are (2, N); `circles` (3, C) and `spans` (C, 2) of view j are those from
+    `bounds[j]` to `bounds[j + 1]`. Where nothing is left of a ray, what one view denies is, and so on up to what `tolerated` deny.
+    """
+    ray, depths, count = np.empty(rays.shape[0], np.int64), np.empty((rays.shape[0], 2)), 0
+    most = lines.shape[1] + 2  # each side is crossed once at most
+    scratch = np.empty(most, np.int64), np.empty(most), np.empty((most, 2))
+    pieces = np.empty((2, most, 3))
+    polygons = lines[0], lines[1], spans, circles, bounds
+    apart = np.sqrt(np.sum(relative[:, :, :3, 3] ** 2, 2)) > APART  # and no view from itself
+    for r in range(rays.shape[0]):
+        i, u, v, level, before = camera[r], rays[r, 0], rays[r, 1], 0, count
+        while level <= tolerated and count == before:
+            at, n = _leave(relative, i, apart, u, v, polygons, level, scratch, pieces)
+            k = 0
+            while k < n:
+                lo, hi, k = _whole(pieces, at, n, k)
+                needed = max(1, (1 + CONFIRMED) * level)
+                found = lo > NEAR and hi < FAR and hi - lo > SHORTEST
+                if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
+                    if count == ray.size:
+                        ray, depths = np.concatenate((ray, ray)), np.concatenate((depths, depths))
+                    ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
+                    count += 1
+            level += 1
+    return ray[:count], depths[:count]
+
+
+@numba.njit(cache=True)
+def _leave(relative, i, apart, u, v, polygons, level, scratch, pieces):  # pragma: no cover
+    """Pieces of a ray (u, v, 1) of view i that at most `level` others deny: pieces[at, :n]; returns at and n."""
+    bounds = polygons[-1]
+    at, n = 0, 1
+    pieces[0, 0, 0], pieces[0, 0, 1], pieces[0, 0, 2] = NEAR, FAR, 0
+    for j in range(bounds.size - 1):
+        if n > 0 and apart[i, j]:
+            lo, hi = pieces[at, 0, 0], pieces[at, n - 1, 1]
+            m = _deny(relative, i, j, u, v, lo, hi, polygons, scratch)
+            n = _carve(pieces, at, n, scratch[-1], m, level)
+            at = 1 - at
+    return at, n
+
+
+@numba.njit(cache=True)
+def _whole(pieces, at, n, k):  # pragma: no cover
+    """From, to, and the next: piece k with those that go on where it ends, however many views deny each."""
+    lo, hi = pieces[at, k, 0], pieces[at, k, 1]
+    k += 1
+    while k < n and pieces[at, k, 0] == hi:
+        hi = pieces[at, k, 1]
+        k += 1
+    return lo, hi, k
+
+
+@numba.njit(cache=True)
+def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
+    """Between which depths of a ray of view i, from `lo` to `hi`, view j denies that anything is there: scratch[-1][:M]; returns M.
+
+    Places along the ray's line in the view are told by s. A place is denied if an odd number of crossings with contours come before it.
+    """
+    _, crossings, denied = scratch
+    ax, bx = T[i, j, 0, 3], T[i, j, 0, 0] * u + T[i, j, 0, 1] * v + T[i, j, 0, 2]
+    ay, by = T[i, j, 1, 3], T[i, j, 1, 0] * u + T[i, j, 1, 1] * v + T[i, j, 1, 2]
+    az, bz = T[i, j, 2, 3], T[i, j, 2, 0] * u + T[i, j, 2, 1] * v + T[i, j, 2, 2]
+    nx, ny, c = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    norm = np.sqrt(nx * nx + ny * ny)
+    if bz > 0:
+        lo = max(lo, (NEAR - az) / bz)
+    elif bz < 0:
+        hi = min(hi, (NEAR - az) / bz)
+    if lo >= hi or norm < 1e-12 or (bz == 0 and az < NEAR):  # behind the view, or straight through its centre
+        return 0
+    nx, ny, c = nx / norm, ny / norm, c / norm
+    au, bu = nx * ay - ny * ax, nx * by - ny * bx
+    s, t = (au + lo * bu) / (az + lo * bz), (au + hi * bu) / (az + hi * bz)
+    n = _cross(nx, ny, c, min(s, t), max(s, t), polygons, j, scratch)
+    for k in range(n):
+        at = crossings[k]  # rounding must not leave a sliver at an end
+        crossings[k] = lo if at == s else hi if at == t else min(max((at * az - au) / (bu - at * bz), lo), hi)
+    for k in range(0, n, 2):
+        h = k if s < t else n - 2 - k
+        denied[k // 2, 0], denied[k // 2, 1] = min(crossings[h], crossings[h + 1]), max(crossings[h], crossings[h + 1])
+    return n // 2
+
+
+@numba.njit(cache=True)
+def _cross(nx, ny, c, low, high, polygons, j, scratch):  # pragma: no cover
+    """Where a line, nx x + ny y + c = 0, goes into and out of what polygons hold between s = low and high; how many places.
+
+    s = nx y - ny x. Runs of sides wholly before `low` matter by whether their ends lie on different sides of the line.
+    """
+    x, y, spans, circles, bounds = polygons
+    near, crossings, _ = scratch
+    count = 0
+    for q in range(bounds[j], bounds[j + 1]):
+        u, v, radius = circles[0, q], circles[1, q], circles[2, q]
+        near[count] = q
+        count += (abs(nx * u + ny * v + c) <= radius) & (nx * v - ny * u - radius <= high)
+    n, odd = 0, False
+    for h in range(count):
+        q = near[h]
+        a, b = spans[q, 0], spans[q, 1]
+        side = nx * x[a] + ny * y[a] + c
+        if nx * circles[1, q] - ny * circles[0, q] + circles[2, q] < low:
+            odd ^= (side >= 0) != (nx * x[b] + ny * y[b] + c >= 0)
+            continue
+        for k in range(a + 1, b + 1):
+            before, side = side, nx * x[k] + ny * y[k] + c
+            if (before >= 0) != (side >= 0):
+                t = side / (side - before)
+                s = nx * (y[k] + t * (y[k - 1] - y[k])) - ny * (x[k] + t * (x[k - 1] - x[k]))
+                if s < low:
+                    odd = not odd
+                elif s < high:
+                    crossings[n] = s
+                    n += 1
+    if odd:
+        crossings[n] = low
+        n += 1
+    _sort(crossings, n)
+    if n & 1:
+        crossings[n] = high
+        n += 1
+    return n
+
+
+@numba.njit(cache=True)
+def _sort(values, n):  # pragma: no cover
+    """Sort the first n values: a few, as a rule."""
+    if n > 64:
+        values[:n] = np.sort(values[:n])
+        return
+    for k in range(1, n):
+        value, h = values[k], k
+        while h > 0 and values[h - 1] > value:
+            values[h] = values[h - 1]
+            h -= 1
+        values[h] = value
+
+
+@numba.njit(cache=True)
+def _carve(pieces, at, n, denied, m, level):  # pragma: no cover
+    """Pieces (from, to, by how many views denied) pieces[at, :n] into pieces[1 - at] after one more view; their number.
+
+    What more than `level` views deny is left out.
+    """
+    count, h, to = 0, 0, 1 - at
+    for k in range(n):
+        z, end, times = pieces[at, k, 0], pieces[at, k, 1], pieces[at, k, 2]
+        while h > 0 and denied[h - 1, 1] > z:  # the last interval may reach into this piece, too
+            h -= 1
+        while z < end:
+            while h < m and denied[h, 1] <= z:
+                h += 1
+            inside = h < m and denied[h, 0] <= z
+            stop = min(end, denied[h, 1] if inside else denied[h, 0]) if h < m else end
+            if times + inside <= level:
+                pieces[to, count, 0], pieces[to, count, 1], pieces[to, count, 2] = z, stop, times + inside
+                count += 1
+            z = stop
+    return count
+
+
+@numba.njit(cache=True)
+def _witnessed(T, i, apart, u, v, z, lenses, needed):  # pragma: no cover
+    """Whether `needed` other views have a place in their pictures: that at depth z on a ray of view i."""
+    for j in range(lenses.shape[0]):
+        w = (T[i, j, 2, 0] * u + T[i, j, 2, 1] * v + T[i, j, 2, 2]) * z + T[i, j, 2, 3]
+        if apart[i, j] and w >= NEAR:
+            x = ((T[i, j, 0, 0] * u + T[i, j, 0, 1] * v + T[i, j, 0, 2]) * z + T[i, j, 0, 3]) / w
+            y = ((T[i, j, 1, 0] * u + T[i, j, 1, 1] * v + T[i, j, 1, 2]) * z + T[i, j, 1, 3]) / w
+            if x * x + y * y < lenses[j, 7] ** 2:
+                x, y = bend_within(x, y, lenses[j, 8:], lenses[j, 6] > 0, lenses[j, 7])
+                x, y = lenses[j, 0] * x + lenses[j, 2], lenses[j, 1] * y + lenses[j, 3]
+                needed -= -0.5 <= x < lenses[j, 4] - 0.5 and -0.5 <= y < lenses[j, 5] - 0.5
+                if needed == 0:
+                    return True
+    return False

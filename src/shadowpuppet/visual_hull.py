@@ -1,0 +1,166 @@
+"""Surface points of the visual hull: silhouettes of several calibrated cameras to points in space with outward normals.
+
+After Ni 2008, III: a contour's pixel is seen along a ray, and somewhere on it the ray touches the person. What the other cameras leave of
+the ray is its viewing edge (Matusik et al. 2000, "Image-based visual hulls"). The other silhouettes cut it as polygons, in the plane
+z = 1 of their cameras, where a ray is a straight line whatever the lens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.contours import trace
+from shadowpuppet.errors import CalibrationError, TrackingError
+from shadowpuppet.geometry import Array, inverse, transform
+from shadowpuppet.masks import Mask, check_mask, may_be_person
+from shadowpuppet.projection import make_lens
+from shadowpuppet.settings import HullSettings
+from shadowpuppet.viewing_edges import circles, cut, length, spread, straighten
+
+GRID = 4
+"""The lens is undone exactly at points this far apart (pixels), and linearly between."""
+TRUE = 0.05
+"""A pixel whose ray comes back farther off than this (pixels) lies beyond what the lens's formula can say."""
+WIDEST = 20.0
+"""Radius on the plane z = 1 up to which rays are used: 87 degrees off the axis."""
+
+
+class SurfacePoints(NamedTuple):
+    """Points on the visual hull, in the order of the cameras and of their contours."""
+
+    points: Array
+    """World coordinates, of shape (P, 3), metres."""
+    normals: Array
+    """Unit normals, outward, world, of shape (P, 3)."""
+    weights: Array
+    """1 / (1 + (length / falloff)^2) of the viewing edge that each came from, falloff 0.1 m, of shape (P,)."""
+    cameras: NDArray[np.int64]
+    """Index of the camera on whose contour each lies, of shape (P,)."""
+
+
+class _View(NamedTuple):
+    """A camera as the kernels know it."""
+
+    rays: Array
+    """Points on the plane z = 1 of a grid of pixels from (-0.5, -0.5) to (W - 0.5, H - 0.5), of shape (R, C, 2)."""
+    seen: Mask | None
+    """Where the lens's formula holds, of shape (H, W); None: everywhere."""
+    lens: Array
+    """fx, fy, cx, cy, width, height, whether it is a fisheye's, the formula's reach, and 8 numbers of distortion, of shape (16,)."""
+
+
+class _Silhouette(NamedTuple):
+    """What one picture denies, on the plane z = 1."""
+
+    lines: Array
+    """Closed polygons one after the other, each ending with its first vertex again, of shape (N, 2)."""
+    ends: NDArray[np.int64]
+    """Where each polygon starts, and N at the end."""
+    outward: Array
+    """Outward normals of the viewing planes (camera's frame), of shape (N, 3); 0 where no ray is to be taken."""
+    chunks: Array
+    """Circles around runs of sides: centre and radius, of shape (3, C)."""
+    spans: NDArray[np.int64]
+    """First side of each run and its end, of shape (C, 2)."""
+
+
+class VisualHull:
+    """The cameras' half of the work, done once: `points` is then called with each frame's silhouettes.
+
+    Raises `CalibrationError` for fewer than two cameras, or for one of which it is not known where it stands.
+    """
+
+    def __init__(self, cameras: Iterable[Camera], settings: HullSettings | None = None) -> None:
+        """Undo the lenses once for all."""
+        self.cameras = tuple(cameras)
+        self.settings = settings or HullSettings()
+        if len(self.cameras) < 2:
+            raise CalibrationError(f"a visual hull: found {len(self.cameras)} cameras, expected two or more")
+        for camera in self.cameras:
+            if not camera.oriented:
+                raise CalibrationError(f"camera {camera.name!r}: found only a field of view, expected also where it stands in the world")
+        self._views = [_view(camera) for camera in self.cameras]
+        self._T = np.stack([camera.T_camera_world for camera in self.cameras])
+
+    def points(self, masks: Sequence[ArrayLike | None]) -> SurfacePoints:
+        """Surface points of one frame's masks (H, W), one a camera, in their order.
+
+        A mask that is None, empty, or nearly all of the picture is no person's and says nothing; neither does a picture about what lies
+        beyond its border. There are no points where fewer than two masks are left. Raises `TrackingError` where masks are not as many
+        as cameras, or not of their pictures' size.
+        """
+        if len(masks) != len(self.cameras):
+            raise TrackingError(f"silhouettes: found {len(masks)}, expected {len(self.cameras)}, one a camera (None where there is none)")
+        given = {n: check_mask(mask, camera.size, f"camera {camera.name!r}: mask")
+                 for n, (mask, camera) in enumerate(zip(masks, self.cameras)) if mask is not None}
+        people = {n: mask for n, mask in given.items() if may_be_person(mask)}
+        if len(people) < 2:
+            return SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
+        silhouettes = [_silhouette(mask, self._views[n]) for n, mask in people.items()]
+        return self._sampled(*self._edges(silhouettes, np.array(list(people))))
+
+    def _edges(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array, Array, Array]:
+        """Viewing edges: camera (E,), ray (E, 3) with z = 1, normal (E, 3), both in the camera's frame, and depths (E, 2)."""
+        step = sum(length(s.lines, s.outward) for s in silhouettes) / self.settings.rays
+        taken = [spread(s.lines, s.outward, step) for s in silhouettes]
+        camera = np.repeat(np.arange(len(which)), [len(t) for t in taken])
+        rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
+        rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
+        outward = np.concatenate([s.outward[t] for s, t in zip(silhouettes, taken)])
+        lines = np.ascontiguousarray(np.concatenate([s.lines for s in silhouettes]).T)
+        firsts = np.cumsum([0, *(len(s.lines) for s in silhouettes)])
+        spans = np.concatenate([s.spans + first for s, first in zip(silhouettes, firsts)])
+        chunks = np.concatenate([s.chunks for s in silhouettes], 1)
+        bounds = np.cumsum([0, *(len(s.spans) for s in silhouettes)])
+        lenses = np.stack([self._views[n].lens for n in which])
+        T = self._T[which]
+        relative = T[None] @ inverse(T)[:, None]  # [i, j]: from camera i to j
+        ray, depths = cut(camera, rays, relative, lines, spans, chunks, bounds, lenses, self.settings.tolerated)
+        return which[camera[ray]], rays[ray], outward[ray], depths
+
+    def _sampled(self, camera: NDArray[np.int64], rays: Array, outward: Array, depths: Array) -> SurfacePoints:
+        """Points along viewing edges of the cameras."""
+        lengths = np.linalg.norm(rays, axis=1) * (depths[:, 1] - depths[:, 0])
+        kept = np.flatnonzero(lengths <= self.settings.longest)
+        count = np.maximum(np.ceil(lengths[kept] / self.settings.pitch), 1).astype(np.int64)
+        edge = np.repeat(kept, count)
+        place = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / np.repeat(count, count)
+        depth = depths[edge, 0] + place * (depths[edge, 1] - depths[edge, 0])
+        back, which = inverse(self._T), camera[edge]
+        R = back[which, :3, :3]
+        points = np.einsum("pij,pj->pi", R, rays[edge] * depth[:, None]) + back[which, :3, 3]
+        weights = 1 / (1 + (lengths[edge] / self.settings.falloff) ** 2)
+        return SurfacePoints(points, np.einsum("pij,pj->pi", R, outward[edge]), weights, which)
+
+
+def _view(camera: Camera) -> _View:
+    """What of a camera does not change."""
+    (width, height), lens = camera.size, make_lens(camera)
+    x, y = (np.linspace(-0.5, side - 0.5, -(-side // GRID) + 1) for side in (width, height))
+    pixels = np.stack(np.meshgrid(x, y), -1)
+    rays = camera.rays(pixels)
+    back = camera.project(transform(inverse(camera.T_camera_world), rays))
+    good = (np.abs(back - pixels).max(-1) < TRUE) & (np.linalg.norm(rays[..., :2], axis=-1) < min(camera.reach, WIDEST))
+    numbers = [*np.diag(camera.matrix)[:2], *camera.matrix[:2, 2], width, height, camera.fisheye, min(lens[-1], WIDEST)]
+    flat = np.where(good[..., None], rays[..., :2], 0.0)
+    return _View(flat, None if good.all() else _seen(good, camera.size), np.pad(np.array([*numbers, *camera.distortion]), (0, 8))[:16])
+
+
+def _seen(good: NDArray[np.bool_], size: tuple[int, int]) -> Mask:
+    """Pixels (H, W) in cells of the grid of which all corners, and their neighbours, are good."""
+    wide = np.pad(good, 1, mode="edge")
+    firm = np.lib.stride_tricks.sliding_window_view(wide, (4, 4)).all((2, 3))
+    columns, rows = (((np.arange(side) + 0.5) / side * cells).astype(int) for side, cells in zip(size, firm.shape[::-1]))
+    return np.asarray(firm)[rows[:, None], columns]
+
+
+def _silhouette(mask: Mask, view: _View) -> _Silhouette:
+    """A mask's contours on the plane z = 1."""
+    contours = trace(mask, view.seen)
+    lines, outward, ends = straighten(*contours, view.rays, view.lens[4], view.lens[5])
+    return _Silhouette(lines, ends, outward, *circles(lines, ends))
