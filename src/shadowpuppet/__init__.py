@@ -46,7 +46,8 @@ _HOMES = {
     "Picture": "rasterize", "MonocularSettings": "settings", "make_settings": "settings", "SilhouetteSettings": "silhouette",
     "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video",
     "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
-    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull", "VisualHull": "visual_hull",
+    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull",
+    "VisualHull": "visual_hull",
 }  # fmt: skip
 """Where each public name lives."""
 
