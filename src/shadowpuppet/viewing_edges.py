@@ -8,9 +8,14 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.contours import ARM
+from shadowpuppet.geometry import Array
+from shadowpuppet.kernels import kernel
 from shadowpuppet.projection import NEAR, bend_within
+
+Indices = NDArray[np.int64]
 
 FAR = 100.0
 """Rays end here (m)."""
@@ -100,53 +105,63 @@ def spread(lines, outward, step):  # pragma: no cover
     return out[:n]
 
 
-@numba.njit(cache=True, nogil=True)
-def cut(camera, rays, relative, lines, spans, circles, bounds, lenses, tolerated):  # pragma: no cover
+def cut(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
+        tolerated: int) -> tuple[Indices, Array]:
     """What the other views leave of rays (R, 3), z = 1, of cameras (R,): the ray (E,) of each viewing edge, and its depths (E, 2).
 
     `relative` (V, V, 4, 4) leads from view to view; `lines` are (2, N); `circles` (3, C) and `spans` (C, 2) of view j are those from
     `bounds[j]` to `bounds[j + 1]`. Where nothing is left of a ray, what one view denies is, and so on up to what `tolerated` deny.
     """
-    ray, depths, count = np.empty(rays.shape[0], np.int64), np.empty((rays.shape[0], 2)), 0
+    apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > APART  # and no view from itself
     most = lines.shape[1] + 2  # each side is crossed once at most
-    scratch = np.empty(most, np.int64), np.empty(most), np.empty((most, 2))
-    pieces = np.empty((2, most, 3))
+    scratch = np.empty(most, np.int64), np.empty(most), np.empty((most, 2)), np.empty((2, most, 3))
     polygons = lines[0], lines[1], spans, circles, bounds
-    apart = np.sqrt(np.sum(relative[:, :, :3, 3] ** 2, 2)) > APART  # and no view from itself
+    room = 2 * len(rays) + most
+    while True:
+        ray, depths = np.empty(room, np.int64), np.empty((room, 2))
+        count, done = _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ray, depths)
+        if done:
+            return ray[:count], depths[:count]
+        room *= 4
+
+
+@kernel
+def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ray, depths):  # pragma: no cover
+    """Fill `ray` and `depths`; how many edges there are, and whether there was room for all."""
+    count, pieces = 0, scratch[-1]
     for r in range(rays.shape[0]):
         i, u, v, level, before = camera[r], rays[r, 0], rays[r, 1], 0, count
+        if count + pieces.shape[1] > ray.size:
+            return count, False
         while level <= tolerated and count == before:
-            at, n = _leave(relative, i, apart, u, v, polygons, level, scratch, pieces)
-            k = 0
+            at, n = _leave(relative, i, apart, u, v, polygons, level, scratch)
+            k, needed = 0, max(1, (1 + CONFIRMED) * level)
             while k < n:
                 lo, hi, k = _whole(pieces, at, n, k)
-                needed = max(1, (1 + CONFIRMED) * level)
                 found = lo > NEAR and hi < FAR and hi - lo > SHORTEST
                 if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
-                    if count == ray.size:
-                        ray, depths = np.concatenate((ray, ray)), np.concatenate((depths, depths))
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1
             level += 1
-    return ray[:count], depths[:count]
+    return count, True
 
 
-@numba.njit(cache=True)
-def _leave(relative, i, apart, u, v, polygons, level, scratch, pieces):  # pragma: no cover
+@kernel
+def _leave(relative, i, apart, u, v, polygons, level, scratch):  # pragma: no cover
     """Pieces of a ray (u, v, 1) of view i that at most `level` others deny: pieces[at, :n]; returns at and n."""
-    bounds = polygons[-1]
+    bounds, denied, pieces = polygons[-1], scratch[2], scratch[3]
     at, n = 0, 1
     pieces[0, 0, 0], pieces[0, 0, 1], pieces[0, 0, 2] = NEAR, FAR, 0
     for j in range(bounds.size - 1):
         if n > 0 and apart[i, j]:
             lo, hi = pieces[at, 0, 0], pieces[at, n - 1, 1]
             m = _deny(relative, i, j, u, v, lo, hi, polygons, scratch)
-            n = _carve(pieces, at, n, scratch[-1], m, level)
+            n = _carve(pieces, at, n, denied, m, level)
             at = 1 - at
     return at, n
 
 
-@numba.njit(cache=True)
+@kernel
 def _whole(pieces, at, n, k):  # pragma: no cover
     """From, to, and the next: piece k with those that go on where it ends, however many views deny each."""
     lo, hi = pieces[at, k, 0], pieces[at, k, 1]
@@ -157,13 +172,13 @@ def _whole(pieces, at, n, k):  # pragma: no cover
     return lo, hi, k
 
 
-@numba.njit(cache=True)
+@kernel
 def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
-    """Between which depths of a ray of view i, from `lo` to `hi`, view j denies that anything is there: scratch[-1][:M]; returns M.
+    """Between which depths of a ray of view i, from `lo` to `hi`, view j denies that anything is there: scratch[2][:M]; returns M.
 
     Places along the ray's line in the view are told by s. A place is denied if an odd number of crossings with contours come before it.
     """
-    _, crossings, denied = scratch
+    crossings, denied = scratch[1], scratch[2]
     ax, bx = T[i, j, 0, 3], T[i, j, 0, 0] * u + T[i, j, 0, 1] * v + T[i, j, 0, 2]
     ay, by = T[i, j, 1, 3], T[i, j, 1, 0] * u + T[i, j, 1, 1] * v + T[i, j, 1, 2]
     az, bz = T[i, j, 2, 3], T[i, j, 2, 0] * u + T[i, j, 2, 1] * v + T[i, j, 2, 2]
@@ -188,14 +203,14 @@ def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
     return n // 2
 
 
-@numba.njit(cache=True)
+@kernel
 def _cross(nx, ny, c, low, high, polygons, j, scratch):  # pragma: no cover
     """Where a line, nx x + ny y + c = 0, goes into and out of what polygons hold between s = low and high; how many places.
 
     s = nx y - ny x. Runs of sides wholly before `low` matter by whether their ends lie on different sides of the line.
     """
     x, y, spans, circles, bounds = polygons
-    near, crossings, _ = scratch
+    near, crossings = scratch[0], scratch[1]
     count = 0
     for q in range(bounds[j], bounds[j + 1]):
         u, v, radius = circles[0, q], circles[1, q], circles[2, q]
@@ -229,12 +244,9 @@ def _cross(nx, ny, c, low, high, polygons, j, scratch):  # pragma: no cover
     return n
 
 
-@numba.njit(cache=True)
+@kernel
 def _sort(values, n):  # pragma: no cover
     """Sort the first n values: a few, as a rule."""
-    if n > 64:
-        values[:n] = np.sort(values[:n])
-        return
     for k in range(1, n):
         value, h = values[k], k
         while h > 0 and values[h - 1] > value:
@@ -243,7 +255,7 @@ def _sort(values, n):  # pragma: no cover
         values[h] = value
 
 
-@numba.njit(cache=True)
+@kernel
 def _carve(pieces, at, n, denied, m, level):  # pragma: no cover
     """Pieces (from, to, by how many views denied) pieces[at, :n] into pieces[1 - at] after one more view; their number.
 
@@ -266,7 +278,7 @@ def _carve(pieces, at, n, denied, m, level):  # pragma: no cover
     return count
 
 
-@numba.njit(cache=True)
+@kernel
 def _witnessed(T, i, apart, u, v, z, lenses, needed):  # pragma: no cover
     """Whether `needed` other views have a place in their pictures: that at depth z on a ray of view i."""
     for j in range(lenses.shape[0]):
