@@ -35,12 +35,12 @@ def hull(cameras, *solids, settings=SHARP) -> SurfacePoints:
 
 
 def outside(cameras, masks, points) -> np.ndarray:
-    """How far (pixels) each point lies outside any silhouette."""
+    """How far (pixels) each point lies outside any silhouette; the picture's outermost pixels say nothing, whose corners are cut."""
     farthest = np.zeros(len(points))
     for camera, mask in zip(cameras, masks):
         distance = cv2.distanceTransform(1 - mask.astype(np.uint8), cv2.DIST_L2, 5)
         x, y = np.rint(camera.project(points)).astype(int).T
-        within = (x >= 0) & (y >= 0) & (x < camera.size[0]) & (y < camera.size[1])
+        within = (x > 0) & (y > 0) & (x < camera.size[0] - 1) & (y < camera.size[1] - 1)
         farthest[within] = np.maximum(farthest[within], distance[y[within], x[within]])
     return farthest
 

@@ -57,7 +57,8 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "find_person", "fit_references", "learn_background", "look_at", "make_options", "make_settings", "open_frames",
     "read_calibration", "read_joints", "read_person", "read_recording", "read_run", "synthesize", "track_recording",
     "write_calibration", "write_frames", "write_joints", "write_person",
-    "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints", "VisualHull",
+    "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
+    "VisualHull",
 ]  # fmt: skip
 
 
