@@ -317,7 +317,17 @@ def test_any_masks_give_points_inside_the_others(seed):
     found = VisualHull(cameras, SHARP).points(masks)
     assert np.isfinite(found.points).all()
     assert ((found.weights > 0) & (found.weights <= 1)).all()
-    assert outside(cameras, masks, found.points).max(initial=0) < 2.5
+    assert outside(cameras, masks, found.points).max(initial=0) < 1.5
+
+
+def test_rays_may_be_cut_into_many_edges():
+    cameras = ring(3, size=(320, 240))
+    masks = [np.ones((240, 320), bool) for _ in cameras]
+    for mask in masks:
+        mask[:, ::6] = mask[:, 1::6] = False  # a fence
+    found = VisualHull(cameras, HullSettings(tolerated=0, rays=300)).points(masks)
+    assert len(found.points) > 300 * 15  # more than there was room for at first
+    assert outside(cameras, masks, found.points).max() < 1.5
 
 
 def test_the_same_masks_give_the_same_points_in_any_thread():
