@@ -44,7 +44,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "exact masks": {"masks": True},
     "cardbox": {"tracker": {"body": "cardbox"}},
     "no exploring": {"tracker": {"explore": 0}},
-    "explore 500": {"tracker": {"explore": 500}},
+    "explore 2000": {"tracker": {"explore": 2000}},
     "best particle": {"tracker": {"estimate": "best"}},
     "no motion pull": {"tracker": {"motion_weight": 0}},
     "motion pull x 2": {"tracker": {"motion_weight": 400}},

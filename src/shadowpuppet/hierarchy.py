@@ -19,7 +19,7 @@ HELD = {"torso": ("left_shoulder", "right_shoulder"), "left_arm": ("left_elbow",
 """Points of each part that the motion's pull holds."""
 WANDER, AROUND = 0.3, 0.2
 """Where a stage explores: deviation of the torso's angles from upright, and of an arm's from a coarse arm, rad."""
-TEMPERATURE = 20.0
+TEMPERATURE = 50.0
 """For the mean estimate: a particle worse by so many pixels (at 320 x 240) weighs 1/e."""
 
 

@@ -73,17 +73,17 @@ class MonocularSettings:
     """The body's model."""
     resampling: Literal["deterministic", "stratified", "systematic", "multinomial", "residual"] = "deterministic"
     """DRS (Algorithm 4), SRS (Algorithm 3), or another scheme in SRS's place."""
-    torso: PartSettings = PartSettings()
+    torso: PartSettings = PartSettings(particles=500)
     """The torso's stage."""
-    arm: PartSettings = PartSettings(survival=0.4, sigma_rotation=0.25, sigma_cost=4000.0)
+    arm: PartSettings = PartSettings(particles=500, survival=0.4, sigma_rotation=0.25, sigma_cost=4000.0)
     """Each arm's stage."""
     stages: Annotated[tuple[str, ...], Field(min_length=1)] = ("torso", "left_arm", "right_arm")
     """The filter's stages, in order; parts joined by + are moved at once ("torso+left_arm+right_arm" is a flat filter)."""
-    cycles: Annotated[int, Field(ge=1, le=100)] = 3
-    """Estimation cycles a frame."""
+    cycles: Annotated[int, Field(ge=1, le=100)] = 1
+    """Estimation cycles a frame. More of them fit the silhouette closer, but not the person: many particles in one cycle do better."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
     """The noise of each cycle is that of the last times this."""
-    explore: Annotated[int, Field(ge=0, le=100_000)] = 200
+    explore: Annotated[int, Field(ge=0, le=100_000)] = 500
     """Poses from all over a part's range that are tried beside the particles, in each frame's first cycle."""
     rank_by: Literal["last", "new"] = "last"
     """Costs that rank and weigh before resampling: as known from the last picture, or measured again in the new one (eq. 8 as it is
