@@ -74,7 +74,7 @@ def test_a_look_is_plain(look):
 
 
 def test_the_same_look_comes_before_a_run(recording, look, tmp_path):
-    run = track_recording(recording, tmp_path / "run", make_options({"tracker": {"explore": 200}}))
+    run = track_recording(recording, tmp_path / "run", make_options())
     assert json_text(run.look) == json_text(look)
 
 
@@ -152,6 +152,13 @@ def test_an_assumed_scale_is_said(recording, tmp_path):
     assert "neither height nor distance is known: the average height of 1.70 m, assumed" in doubts(unknown, initialization=QUICK)
     assert "neither" not in doubts(unknown, height=1.8, initialization=QUICK)
     assert look_at(unknown, make_options({"distance": 2.5, "initialization": QUICK})).person["distance"] == pytest.approx(2.5)
+
+
+def test_a_distance_that_only_the_silhouette_tells_is_doubted(recording, tmp_path):
+    alone = made.copied(recording, tmp_path / "alone", without=["recording.toml", "references"])
+    said = doubts(alone, initialization=QUICK, height=1.7)
+    assert "the distance is not known: it is found from the silhouette" in said
+    assert "the distance is not known" not in doubts(alone, initialization=QUICK, height=1.7, distance=2.0)
 
 
 def test_a_guessed_camera_is_said(recording, tmp_path):

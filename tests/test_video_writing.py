@@ -66,6 +66,27 @@ with write_frames(sys.argv[1], 10, lossless=sys.argv[2] == "True") as film:
 """
 
 
+@pytest.mark.parametrize(("name", "lossless"), KINDS)
+def test_ctrl_c_within_the_encoder_keeps_the_frames_before(tmp_path, name, lossless, monkeypatch):
+    film = write_frames(tmp_path / name, 10, lossless=lossless)
+    with pytest.raises(KeyboardInterrupt):
+        write_until_ctrl_c(film, monkeypatch)
+    assert len(list(open_frames(film.partial))) == 20
+
+
+def write_until_ctrl_c(film, monkeypatch):
+    with film:
+        for image in noise(20):
+            film.write(image)
+        encode = film._stream.encode
+        monkeypatch.setattr(film, "_stream", SimpleNamespace(encode=lambda frame: encode(frame) if frame is None else ctrl_c()))
+        film.write(noise(1)[0])
+
+
+def ctrl_c():
+    raise KeyboardInterrupt
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system has no SIGKILL")
 @pytest.mark.parametrize(("name", "lossless"), KINDS[::2])
 def test_a_killed_program_leaves_a_film_that_can_be_played(tmp_path, name, lossless):

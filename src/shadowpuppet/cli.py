@@ -206,7 +206,7 @@ def synthesize(spec: SpecPath = None, /, *,
     from shadowpuppet.tables import made_table
 
     folder = folder or Path(made.name)
-    with terminal(quiet, folder) as shown:
+    with terminal(quiet, folder, f"no frame was made yet, and what {folder} has is no whole recording; make it again") as shown:
         recording = make_recording(made, folder, shown, force)
     if not quiet:
         show(made_table(made, recording))

@@ -138,6 +138,9 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
                     "depths and the world's axes are as good as that; give a calibration.toml")
     if subject.height is None and subject.distance is None:
         said.append(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give --height")
+    elif subject.distance is None and not footage.recording.references:
+        said.append("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as wrong as "
+                    "that; measure it and give --distance, or take references")
     if footage.view.background is None and look.key != "none":
         said.append("no picture of the empty scene: it is the median of the film, so whoever stands still becomes background; "
                     "give background/<camera>.mp4 or --background")

@@ -14,7 +14,7 @@ from rich.text import Text
 from shadowpuppet.fitting import Found
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
-from shadowpuppet.metrics import FAR
+from shadowpuppet.metrics import FAR, LOST
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.synthetic.spec import Spec
 
@@ -71,7 +71,9 @@ def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     if errors:
         rows.append(("error", f"{errors['mean_mm']:.1f} mm (plane {errors['plane_mm']:.1f}, depth {errors['depth_mm']:.1f}); aligned "
                               f"{errors['aligned_mean_mm']:.1f} mm; {100 * errors['far']:.1f} % off by over {1000 * FAR:.0f} mm"))
-        rows += [("lost", f"{errors['lost']} of {errors['frames']} frames count as far off")] if errors["lost"] else []
+        lost, known, frames = errors["lost"], errors["frames"], metrics["frames"]
+        rows += [("lost", f"{lost} of the truth's {known} frames have no pose: {1000 * LOST:.0f} mm off each")] if lost else []
+        rows += [("compared", f"the truth has {known} frames, the run {frames}: is it this recording's?")] if known != frames else []
     return pairs(rows)
 
 

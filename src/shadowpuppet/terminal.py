@@ -95,8 +95,8 @@ class Terminal(LiveListener):
 
 
 @contextmanager
-def terminal(quiet: bool = False, folder: Path | None = None) -> Iterator[Terminal]:
-    """A terminal to be told things; `folder` is where an interrupted run can be found."""
+def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written") -> Iterator[Terminal]:
+    """A terminal to be told things; `folder` is where an interrupted run can be found, `nothing` what is said before its first frame."""
     shown = Terminal(quiet)
     with warnings.catch_warnings():
         warnings.simplefilter("always", ShadowPuppetWarning)
@@ -104,7 +104,7 @@ def terminal(quiet: bool = False, folder: Path | None = None) -> Iterator[Termin
         try:
             yield shown
         except KeyboardInterrupt:
-            kept = f"the {shown.frames} frames so far are in {folder}" if shown.frames and folder else "nothing was written"
+            kept = f"the {shown.frames} frames so far are in {folder}" if shown.frames and folder else nothing
             raise KeyboardInterrupt(kept) from None
         finally:
             shown.stop()

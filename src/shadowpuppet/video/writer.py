@@ -123,11 +123,14 @@ class FrameWriter:
             stream.codec_context.colorspace, stream.codec_context.color_range = BT601, STUDIO_RANGE
         self._stream = stream
         container.start_encoding()  # creates the file: what stands in its way shows now, not many pictures later
+        self._sound = True
 
     def _encode(self, frame: VideoFrame | None) -> None:
-        self._sound = False  # FFmpeg crashes where more is written to a film after a failure
-        self._container.mux(self._stream.encode(frame))
-        self._sound = True
+        try:
+            self._container.mux(self._stream.encode(frame))
+        except Exception:  # FFmpeg crashes where more is written to a film after a failure; after Ctrl-C it can be finished
+            self._sound = False
+            raise
 
     def _close(self) -> None:
         if self._container is None:
