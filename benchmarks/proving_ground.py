@@ -142,7 +142,9 @@ def draw(found: Mapping[str, Mapping[str, list[dict[str, float]]]], file: Path) 
     for row, mark in (("default", "k*"), ("liu2011", "r^")):
         if row in next(iter(found.values())):
             axes.plot(mean(row, "ms"), mean(row, "mean"), mark, ms=11, label=row)
+    ticks = (0.5, 1, 2, 5, 10, 20)
     axes.set(xscale="log", xlabel="milliseconds a frame, filter only, one core", ylabel="mean joint error, mm")
+    axes.set_xticks(ticks, labels=[f"{tick:g}" for tick in ticks])
     axes.grid(alpha=0.3, which="both")
     axes.legend()
     figure.savefig(file, dpi=150)
