@@ -12,8 +12,6 @@ DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) *
 """Directions in which a hull's outline is taken: the corners of its polygon."""
 NEAR = 0.05
 """What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
-STEPS = 1000
-"""Angles off the optical axis at which a lens is tried."""
 Lens = tuple[Array, Array, bool, bool, float]
 """Matrix (3, 3); distortion (8,) or (4,); whether it is a fisheye's; whether it bends; the radius on the plane z = 1 to which it holds."""
 
@@ -25,8 +23,7 @@ def make_lens(camera: Camera) -> Lens:
     what lies far out. Where they turn they end here, and points go on outward in proportion.
     """
     bends = bool(camera.fisheye or camera.distortion.any())
-    reach = float(_reach(camera.distortion, camera.fisheye)) if bends else np.inf
-    return camera.matrix, camera.distortion, camera.fisheye, bends, reach
+    return camera.matrix, camera.distortion, camera.fisheye, bends, camera.reach
 
 
 @kernel
@@ -186,15 +183,3 @@ def _bend(x, y, k, fisheye):  # pragma: no cover
     r = x * x + y * y
     s = (1 + r * (k[0] + r * (k[1] + r * k[4]))) / (1 + r * (k[5] + r * (k[6] + r * k[7])))
     return x * s + 2 * k[2] * x * y + k[3] * (r + 2 * x * x), y * s + k[2] * (r + 2 * y * y) + 2 * k[3] * x * y
-
-
-@kernel
-def _reach(k, fisheye):  # pragma: no cover
-    """Radius on the plane z = 1 up to which bent points move outward."""
-    last, step = 0.0, np.pi / 2 / STEPS
-    for i in range(1, STEPS):
-        x = _bend(np.tan(i * step), 0.0, k, fisheye)[0]
-        if x <= last:
-            return np.tan(max(i - 1, 1) * step)
-        last = x
-    return np.inf

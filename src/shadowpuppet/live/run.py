@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
     body, joints = named_body(options.tracker.body)
-    told = validate(LiveSettings, _plain(settings) | {"camera": without_secrets(settings.camera)})
+    told = validate(LiveSettings, asdict(settings) | {"camera": without_secrets(settings.camera)})
     info = {"camera": told.camera, "method": "Liu 2011, one camera, live", "started": datetime.now().astimezone().isoformat("T", "seconds"),
             "settings": plain_options(options), "live": told}
     folder = Path(folder)
@@ -182,9 +183,3 @@ def _said(phase: str, message: str, countdown: float | None) -> str:
     if countdown is None:
         return message or phase
     return f"{message}: {np.ceil(countdown):.0f}" if countdown > 0 else ""
-
-
-def _plain(settings: LiveSettings) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    return asdict(settings)
