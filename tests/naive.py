@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body import Hulls
 from shadowpuppet.camera import Camera
-from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, transform
+from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, rotation_from_vector, transform
 from shadowpuppet.hidden_markov import Posterior
 from shadowpuppet.projection import DIRECTIONS, NEAR
 from shadowpuppet.rasterize import Picture
@@ -30,8 +30,11 @@ def forward(skeleton: Skeleton, pose: ArrayLike, root: ArrayLike | None = None) 
                 offset = offset + values[coupling.dof] * np.array(coupling.shift)
         T = (np.eye(4) if root is None else np.asarray(root)) if joint.parent is None else out[joint.parent]
         T = T @ rigid(np.eye(3), offset)
-        for dof in skeleton.dofs:
-            if dof.joint == joint.name:
+        for d, dof in enumerate(skeleton.dofs):
+            if dof.joint == joint.name and dof.kind == "vector":
+                three = [values[each.name] for each in skeleton.dofs[d : d + 3]]
+                T = T @ rigid(rotation_from_vector(three), np.zeros(3)) if dof.axis == "x" else T
+            elif dof.joint == joint.name:
                 index, sign = AXES[dof.axis]
                 axis = sign * np.eye(3)[index]
                 turn = dof.kind == "rotation"

@@ -29,8 +29,9 @@ def skeletons(draw) -> Skeleton:
         joints.append(Joint(f"j{i}", draw(st.sampled_from([None, *(j.name for j in joints)])), draw(lengths)))
     for joint in joints:
         for _ in range(draw(st.integers(0, 3))):
-            kind = draw(st.sampled_from(["rotation", "translation"]))
-            dofs.append(Dof(f"d{len(dofs)}", joint.name, draw(st.sampled_from(list(AXES))), kind=kind))  # type: ignore[arg-type]
+            kind = draw(st.sampled_from(["rotation", "translation", "vector"]))
+            axes = "xyz" if kind == "vector" else [draw(st.sampled_from(list(AXES)))]
+            dofs += [Dof(f"d{len(dofs) + n}", joint.name, axis, kind=kind) for n, axis in enumerate(axes)]  # type: ignore[arg-type]
     for dof in dofs:
         if draw(st.booleans()):
             couplings.append(Coupling(draw(st.sampled_from(joints)).name, dof.name, draw(lengths)))

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.sizes import CardboxSizes
+from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes
+
+Whole = TypeVar("Whole", bound=BoneSizes)
 
 AVERAGE_HEIGHT = 1.70
 """Stature (m) taken where neither height nor distance is known: the mean adult of ANSUR II (Gordon et al. 2014), women and men."""
@@ -35,6 +39,41 @@ SHOULDER_JOINT = (0.103, 0.06)
 """Half the distance of the shoulders' joints: half the biacromial breadth of ANSUR II less some 2 cm to the humerus' centre."""
 TRUNK = (0.518, 0.03)
 """From the crotch to the crown: one less ANSUR II's crotch height. Of all upright measures the steadiest fraction of stature."""
+
+
+BONES: Mapping[str, tuple[float, float]] = {
+    "hip_distance": (0.108, 0.012), "hip_drop": (0.005, 0.008), "hip_forward": (0.0, 0.008),
+    "neck_length": (0.072, 0.012), "head_forward": (0.020, 0.010), "head_height": (0.084, 0.006),
+    "shoulder_distance": (0.203, 0.012), "shoulder_drop": (0.045, 0.012), "shoulder_forward": (0.010, 0.008),
+    "upper_arm_length": (0.1602, 0.008), "forearm_length": (0.1534, 0.008), "hand_point": (0.019, 0.004), "hand_length": (0.090, 0.015),
+    "thigh_length": (0.245, 0.010), "shank_length": (0.246, 0.010), "ankle_height": (0.042, 0.006),
+}  # fmt: skip
+"""Sizes that both whole bodies have, as fractions of the stature, and their standard deviations among adults, likewise.
+
+Arms by de Leva (1996, table 4; means of women and men), legs and heights along the trunk by Drillis & Contini (1966) as given by Winter
+(2009, fig. 4.1); shoulders' joints as `SHOULDER_JOINT`; hips' joints and what lies forward by CMU's mocap skeletons.
+"""
+CYLINDERS: Mapping[str, tuple[float, float]] = {
+    **BONES, "trunk_height": (0.308, 0.012), "trunk_width": (0.185, 0.020), "trunk_depth": (0.130, 0.020), "head_width": (0.092, 0.006),
+    "upper_arm_width": (0.052, 0.008), "forearm_width": (0.042, 0.006), "thigh_width": (0.090, 0.010), "shank_width": (0.058, 0.007),
+}  # fmt: skip
+"""The sizes of `cylinders`; each width is about the mean of those along the part in `ANATOMICAL`."""
+ANATOMICAL: Mapping[str, tuple[float, float]] = {
+    **BONES, "lumbar_height": (0.1355, 0.010), "thorax_height": (0.1725, 0.010), "foot_length": (0.153, 0.006),
+    "pelvis_width": (0.196, 0.015), "pelvis_depth": (0.143, 0.015), "waist_width": (0.180, 0.018), "waist_depth": (0.135, 0.018),
+    "chest_width": (0.198, 0.014), "chest_depth": (0.125, 0.014), "neck_width": (0.0685, 0.006),
+    "head_width": (0.0893, 0.004), "head_depth": (0.115, 0.005), "upper_arm_width": (0.0593, 0.007), "elbow_width": (0.0480, 0.005),
+    "forearm_width": (0.0500, 0.005), "wrist_width": (0.0312, 0.003), "hand_width": (0.0496, 0.004), "thigh_width": (0.1130, 0.010),
+    "knee_width": (0.0690, 0.006), "calf_width": (0.0700, 0.006), "ankle_width": (0.0419, 0.004), "foot_width": (0.0577, 0.004),
+}  # fmt: skip
+"""The sizes of `anatomical`; breadths, depths, girths over pi and the foot rounded from ANSUR II (Gordon et al. 2014)."""
+
+
+def whole_sizes_from_height(kind: type[Whole], height: float) -> Whole:
+    """Sizes of a whole body, `AnatomicalSizes` or `CylinderSizes`, of the average person of a height (m, shoes on)."""
+    shares = ANATOMICAL if issubclass(kind, AnatomicalSizes) else CYLINDERS
+    return kind(**{name: shares[name][0] * (height - SOLE) for name in kind.names()})
+
 
 def sizes_from_height(height: float) -> CardboxSizes:
     """Sizes of the average person of a height (m, shoes on)."""

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
+from shadowpuppet.limbs import Limbs
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
@@ -76,8 +77,10 @@ class Body:
     """Body part that each shape belongs to, S names."""
     landmarks: Mapping[str, tuple[str, tuple[float, float, float]]]
     """Points that a motion reports: name to joint and place in its frame, metres."""
-    hem: Array
-    """The two ends of the waist's lower edge in the pelvis' frame, of shape (2, 3), metres: the model ends here."""
+    hem: Array | None
+    """The two ends of the waist's lower edge in the pelvis' frame, of shape (2, 3), metres: the model ends here; None: it has legs."""
+    limbs: Limbs | None = None
+    """The same as solids that points can be compared with; None: only its picture is known."""
 
     @cached_property
     def landmark_names(self) -> tuple[str, ...]:

@@ -12,6 +12,8 @@ _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298
 _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
            -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11)  # fmt: skip
 _QUARTER = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
+SHIFT, TURN, VECTOR = 0, 1, 2
+"""Kinds of DOF: a shift along an axis, a turn about one, a component of a rotation vector (three in a row)."""
 
 
 @part
@@ -64,16 +66,21 @@ def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma:
 
     Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B).
     """
-    first, axes, signs, turns = tree[1], tree[2], tree[3], tree[4]
+    first, axes, signs, kinds = tree[1], tree[2], tree[3], tree[4]
     value, sine, cosine = work[3], work[4], work[5]
     for j in joints:
         _begin_joint(poses, begin, j, tree, offsets, root, T, work)
         for d in range(first[j], first[j + 1]):
             for n in range(value.size):
                 value[n] = signs[d] * poses[min(begin + n, poses.shape[0] - 1), d]
-            if turns[d]:
+            if kinds[d] == TURN:
                 sines(value, sine, cosine)
                 _turn(T[j], (axes[d] + 1) % 3, (axes[d] + 2) % 3, sine, cosine)
+            elif kinds[d] == VECTOR:
+                for n in range(value.size):
+                    work[axes[d], n] = value[n]
+                if axes[d] == 2:
+                    _turn_by_vector(T[j], work)
             else:
                 for r in range(3):
                     along, place = T[j, r, axes[d]], T[j, r, 3]
@@ -89,6 +96,28 @@ def _turn(T, a, b, sine, cosine):  # pragma: no cover
         for n in range(sine.size):
             x, y = u[n], v[n]
             u[n], v[n] = cosine[n] * x + sine[n] * y, cosine[n] * y - sine[n] * x
+
+
+@part
+def _turn_by_vector(T, work):  # pragma: no cover
+    """Transforms (3, 4, B) turned by rotation vectors, the first rows of `work` (6, B): Rodrigues' formula, row by row.
+
+    A row w becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle: no digits are lost
+    near zero.
+    """
+    u, v, w, half, sine, cosine = work[0], work[1], work[2], work[3], work[4], work[5]
+    for n in range(half.size):
+        half[n] = max(0.5 * np.sqrt(u[n] * u[n] + v[n] * v[n] + w[n] * w[n]), 1e-150)
+    sines(half, sine, cosine)
+    for r in range(3):
+        x, y, z = T[r, 0], T[r, 1], T[r, 2]
+        for n in range(half.size):
+            share = sine[n] / half[n]
+            a, b = share * cosine[n], 0.5 * share * share
+            p, q, s = y[n] * w[n] - z[n] * v[n], z[n] * u[n] - x[n] * w[n], x[n] * v[n] - y[n] * u[n]
+            x[n] += a * p + b * (q * w[n] - s * v[n])
+            y[n] += a * q + b * (s * u[n] - p * w[n])
+            z[n] += a * s + b * (p * v[n] - q * u[n])
 
 
 @part

@@ -132,9 +132,11 @@ class Picture:
     def leg_bits(self, pose: ArrayLike, spread: float = np.radians(25)) -> Bits:
         """Bits of where the legs of a pose (D,) may be: under the waist's lower edge, wider by `spread` (rad) to each side.
 
-        The model ends at the waist; what is seen below says nothing about it.
+        An upper body ends at the waist; what is seen below says nothing about it. A whole one has legs: there are no such bits.
         """
         width, height = self.camera.size
+        if self.body.hem is None:
+            return self.empty()
         T = self.transforms(np.asarray(pose, float)[None])[0, self.body.skeleton.joint_index("pelvis")]
         low = self.body.hem @ T[:, :3].T + T[:, 3]
         if low[:, 2].min() < NEAR:

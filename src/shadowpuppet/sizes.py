@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,8 +27,59 @@ def expected_metres(value: object, limits: tuple[float, float]) -> str:
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
+LEAST, MOST = 0.005, 2.0
+"""What a size can be, metres; offsets can be less."""
+
+
 @dataclass(frozen=True)
-class CardboxSizes:
+class Sizes:
+    """Named sizes, metres; left and right share values. Raises `ShadowPuppetError` for values that no person has."""
+
+    def __post_init__(self) -> None:
+        """Check every size."""
+        for field in fields(self):
+            value, least = getattr(self, field.name), -0.2 if field.name in self.offsets() else LEAST
+            if not least <= value <= MOST:
+                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to {MOST} metres")
+
+    @classmethod
+    def offsets(cls) -> tuple[str, ...]:
+        """Names of those that may be nothing, or negative."""
+        return ()
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """The names, in their order."""
+        return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, float], source: str = "sizes") -> Self:
+        """Sizes from named values. Raises `ShadowPuppetError` for names missing or unknown."""
+        unknown, missing = set(values) - set(cls.names()), set(cls.names()) - set(values)
+        if unknown or missing:
+            what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
+            raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
+        for name, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ShadowPuppetError(f"{source}: {name}: found {shown(value)}, expected a number of metres")
+        return cls(**{name: float(value) for name, value in values.items()})
+
+    @classmethod
+    def from_array(cls, values: ArrayLike) -> Self:
+        """Sizes from an array, in the order of `names`."""
+        return cls(*(float(v) for v in np.asarray(values)))
+
+    def to_array(self) -> Array:
+        """The sizes as an array, in the order of `names`."""
+        return np.array([getattr(self, name) for name in self.names()])
+
+    def with_values(self, **values: float) -> Self:
+        """A copy with some sizes replaced."""
+        return replace(self, **values)
+
+
+@dataclass(frozen=True)
+class CardboxSizes(Sizes):
     """The 18 sizes a1..a18 of Liu 2011, Fig. 2, metres; left and right share values."""
 
     head_width: float
@@ -54,42 +106,10 @@ class CardboxSizes:
     shoulder_inset: float
     """From the torso's edge inward to the shoulder joint."""
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            least = -0.2 if field.name in ("neck_gap", "shoulder_inset") else 0.005
-            if not least <= value <= 2.0:
-                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to 2.0 metres")
-
     @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """The 18 names, in the paper's order a1..a18."""
-        return tuple(field.name for field in fields(cls))
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, float], source: str = "sizes") -> CardboxSizes:
-        """Sizes from named values. Raises `ShadowPuppetError` for names missing or unknown."""
-        unknown, missing = set(values) - set(cls.names()), set(cls.names()) - set(values)
-        if unknown or missing:
-            what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
-            raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
-        for name, value in values.items():
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise ShadowPuppetError(f"{source}: {name}: found {shown(value)}, expected a number of metres")
-        return cls(**{name: float(value) for name, value in values.items()})
-
-    @classmethod
-    def from_array(cls, values: ArrayLike) -> CardboxSizes:
-        """Sizes from an array (18,) in the paper's order."""
-        return cls(*(float(v) for v in np.asarray(values)))
-
-    def to_array(self) -> Array:
-        """The sizes as an array (18,) in the paper's order."""
-        return np.array([getattr(self, name) for name in self.names()])
-
-    def with_values(self, **values: float) -> CardboxSizes:
-        """A copy with some sizes replaced."""
-        return replace(self, **values)
+    def offsets(cls) -> tuple[str, ...]:
+        """Gaps and insets."""
+        return "neck_gap", "shoulder_inset"
 
 
 SUBSETS = {"O1": CardboxSizes.names()[:8], "O2": CardboxSizes.names()[8:12], "O3": CardboxSizes.names()[12:]}

@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import BLOCK
-from shadowpuppet.kinematics import place_all, place_points
+from shadowpuppet.kinematics import SHIFT, TURN, VECTOR, place_all, place_points
 
 AXES = {"x": (0, 1.0), "y": (1, 1.0), "z": (2, 1.0), "-x": (0, -1.0), "-y": (1, -1.0), "-z": (2, -1.0)}
+
+KINDS = {"translation": SHIFT, "rotation": TURN, "vector": VECTOR}
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Dof:
-    """One degree of freedom: a rotation about, or a shift along, an axis of its joint's frame."""
+    """One degree of freedom: a rotation about, or a shift along, an axis of its joint's frame; or a component of a rotation vector.
+
+    The three components x, y, z of a vector stand one after another; no posture within a full turn is singular.
+    """
 
     name: str
     joint: str
@@ -38,7 +43,7 @@ class Dof:
     low: float = -np.inf
     """Limits, radians or metres."""
     high: float = np.inf
-    kind: Literal["rotation", "translation"] = "rotation"
+    kind: Literal["rotation", "translation", "vector"] = "rotation"
     rest: float = 0.0
     """Its usual value."""
     spread: tuple[float, float] = (np.inf, np.inf)
@@ -80,6 +85,16 @@ class Skeleton:
         order = [self.joint_index(dof.joint) for dof in self.dofs]
         if order != sorted(order):
             raise ShadowPuppetError("degrees of freedom must be grouped by joint, in the joints' order")
+        self._check_vectors()
+
+    def _check_vectors(self) -> None:
+        vectors = [d for d, dof in enumerate(self.dofs) if dof.kind == "vector"]
+        for n, d in enumerate(vectors):
+            first = vectors[n - n % 3]
+            three = self.dofs[first : first + 3]
+            if [dof.axis for dof in three if dof.kind == "vector" and dof.joint == three[0].joint] != ["x", "y", "z"]:
+                raise ShadowPuppetError(f"degree of freedom {self.dofs[d].name!r}: a rotation vector has three components in a row, of one "
+                                        "joint, along x, y, z")
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
@@ -110,10 +125,10 @@ class Skeleton:
         first = np.searchsorted(owners, np.arange(len(self.joints) + 1))
         axes = np.array([AXES[dof.axis][0] for dof in self.dofs], np.int64)
         signs = np.array([AXES[dof.axis][1] for dof in self.dofs], float)
-        turns = np.array([dof.kind == "rotation" for dof in self.dofs], bool)
+        kinds = np.array([KINDS[dof.kind] for dof in self.dofs], np.int64)
         pairs = [(self.joint_index(c.joint), self.dof_indices([c.dof])[0]) for c in self.couplings]
         shifts = np.array([c.shift for c in self.couplings], float).reshape(-1, 3)
-        return parents, first, axes, signs, turns, np.array(pairs, np.int64).reshape(-1, 2), shifts
+        return parents, first, axes, signs, kinds, np.array(pairs, np.int64).reshape(-1, 2), shifts
 
     def joint_index(self, name: str) -> int:
         """Index of a joint. Raises `ShadowPuppetError` with the names there are."""
