@@ -18,3 +18,7 @@ joined = numba.njit(**BARE, forceinline=True)
 """A kernel that another calls so often that the call itself would take time: LLVM puts it in its place."""
 part = numba.njit(inline="always")
 """A part of one or two kernels, compiled with them only."""
+LOOSE = {"reassoc", "contract", "nsz", "arcp", "nnan"}
+"""Freedom that lets sums and greatest values be taken in lanes; infinities keep their meaning, and what is not a number must not come in."""
+summing = numba.njit(**BARE, fastmath=LOOSE)
+"""A kernel of sums over finite numbers, which lanes add up in any order."""

@@ -229,3 +229,33 @@ class HullSettings:
     tolerated: Annotated[int, Field(ge=0, le=100)] = 1
     """So many cameras may say empty where at least three times as many others see the person, as one does whose silhouette has a hole;
     asked only along rays on which nothing is left otherwise. With 0, each camera carves."""
+
+
+@checked
+class SurfaceSettings:
+    """How far surface points are from a body (Ni 2008, eqs. 29-31). The paper gives no values."""
+
+    epsilon: Annotated[float, Field(ge=0, lt=1)] = 0.3
+    """How much more a distance counts where the normals disagree: by the factor 1 - epsilon cos."""
+    tau: Positive = 0.06
+    """Distance (m) beyond which a point counts no more."""
+    damping: Positive = 0.03
+    """Share of its own curvature by which each DOF is held back at first, in Gauss-Newton."""
+
+
+@checked
+class ForceSettings:
+    """Refinement by simulated force and moment (Ni 2008, eqs. 32-41)."""
+
+    iterations: Annotated[int, Field(ge=0, le=1000)] = 20
+    """Iterations."""
+    translation: Positive = 1.0
+    """Weight of the forces on the root, as a share of what their mean distance would take."""
+    rotation: Positive = 0.5
+    """Weight of the moments, likewise: limbs and what they hang on move at once."""
+    modulated: bool = True
+    """Whether a force goes by how well the normals agree, and is none where they disagree."""
+    robust: bool = True
+    """Whether a force is bounded."""
+    hierarchical: bool = True
+    """Whether a joint feels all that hangs on it, or only its own part."""

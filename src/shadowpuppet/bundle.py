@@ -1,0 +1,188 @@
+"""A person's sizes and poses solved together over some frames (bundle adjustment), so that the body fits the hulls of all.
+
+Bodies are linear in their sizes: offsets of joints, and what limbs are made of, are sums of what every size adds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body import Body
+from shadowpuppet.closest import LANES, Cloud, Single, constants, measure, nearest, place_parts
+from shadowpuppet.geometry import Array
+from shadowpuppet.kernels import kernel
+from shadowpuppet.screws import make_chain, place_one
+from shadowpuppet.settings import SurfaceSettings
+from shadowpuppet.sizes import Sizes
+
+Measured = TypeVar("Measured", bound=Sizes)
+NUDGE = 1e-3
+"""Step (m) by which what a size does to the points is found."""
+NOISE, WORTH = 0.01, 30.0
+"""Deviation (m) of a surface point from its body, and how many points of a frame tell something of their own: neighbours err alike."""
+ROUNDS = 10
+FARTHEST, FARTHEST_TURN = 0.03, 0.3
+"""No size (m) and no DOF (rad or m) goes farther in a round."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle(Generic[Measured]):
+    """What was solved for."""
+
+    sizes: Measured
+    poses: Array
+    """Of the frames, of shape (F, D)."""
+    residual: float
+    """Root mean square distance of the points to the tangent planes, metres, those that count."""
+
+
+def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
+                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float = 1e-6) -> Bundle[Measured]:
+    """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
+
+    Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull` holds poses where the points say
+    nothing, and points count less the farther off they are, both as in `Refiner.gauss_newton`.
+    """
+    settings, start, about = settings or SurfaceSettings(), poses, expected.to_array()
+    free, scale = np.flatnonzero(spread > 0), WORTH / NOISE**2
+    at, damping, best = (about, poses), 1e-2, None
+    for turn in range(rounds + 1):
+        body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
+        frames = [_equations(body, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
+        strain = (at[0] - about)[free] / spread[free]
+        cost = scale * (sum(frame.cost for frame in frames) + pull * ((at[1] - start) ** 2).sum()) + (strain**2).sum()
+        better = best is None or cost < best.cost
+        damping *= 0.3 if better else 8
+        if best is None or better:
+            best = _Solution(at, cost, frames, strain / spread[free], body)
+        if turn < rounds:
+            at = _moved(best, free, 1 / spread[free] ** 2 / scale, scale, start, pull, damping)
+    residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
+    return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
+
+
+class _Frame(NamedTuple):
+    """A frame's normal equations, divided by the weight of its points."""
+
+    cost: float
+    """Bounded, as in eq. 31."""
+    squared: float
+    """Mean square distance to the tangent planes of the points that count, m^2."""
+    rows: Array
+    """What poses and sizes do to the distances, of shape (D + K, D + K), summed over the points."""
+    gradient: Array
+    """Of shape (D + K,)."""
+
+
+class _Solution(NamedTuple):
+    """Sizes and poses, what they cost, and how they would be better."""
+
+    at: tuple[Array, Array]
+    cost: float
+    frames: list[_Frame]
+    strain: Array
+    body: Body
+
+
+def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[Body]:
+    """Bodies of which one size each is larger."""
+    return [make(kind.from_array(at + NUDGE * (np.arange(len(at)) == k))) for k in free]
+
+
+def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: float,
+           damping: float) -> tuple[Array, Array]:
+    """Sizes and poses after a step: the frames' poses are eliminated, the sizes solved for, the poses found from them."""
+    D, K = start.shape[1], len(free)
+    total, right, parts = np.diag(tight * (1 + damping)), -best.strain / scale, []
+    for frame, pose, first in zip(best.frames, best.at[1], start, strict=True):
+        H, g = frame.rows.copy(), frame.gradient.copy()
+        H[np.arange(D), np.arange(D)] += pull
+        g[:D] -= pull * (pose - first)
+        H[np.arange(D + K), np.arange(D + K)] *= 1 + damping
+        H[np.arange(D), np.arange(D)] += 1e-9
+        solved = np.linalg.solve(H[:D, :D], np.concatenate([H[:D, D:], g[:D, None]], 1))
+        total = total + H[D:, D:] - H[D:, :D] @ solved[:, :K]
+        right = right + g[D:] - H[D:, :D] @ solved[:, K]
+        parts.append(solved)
+    step = np.linalg.solve(total, right)
+    sizes = best.at[0].copy()
+    step = np.clip(step, -FARTHEST, FARTHEST)
+    sizes[free] += step
+    moves = np.array([solved[:, K] - solved[:, :K] @ step for solved in parts])
+    return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -FARTHEST_TURN, FARTHEST_TURN))
+
+
+def _equations(body: Body, nudged: list[Body], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
+    """What a frame's points say about its pose and the sizes."""
+    near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
+    T, screws, out = _measured(body, pose, cloud, settings, near, True)
+    distances, weights, levers = out[0], out[1] / max(cloud.total, 1e-9), out[2:8].T
+    screws[:, 3:] -= np.cross(cloud.origin, screws[:, :3])
+    reach = _hangs(body)[:, body.limbs.joints[near[:, LANES:].ravel().astype(int)]]  # pyright: ignore[reportOptionalMemberAccess]
+    moves = (levers @ screws.T) * reach.T
+    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[2][0]) / NUDGE for other in nudged]
+    rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), -1)], 1)
+    weighed = rows * weights[:, None]
+    squared = float(weights @ distances**2 / max(weights.sum(), 1e-9))
+    return _Frame(float(out[8].sum()) / max(cloud.total, 1e-9), squared, rows.T @ weighed, weighed.T @ distances)
+
+
+def _measured(body: Body, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array, Array]:
+    """Transforms, screws, and of every point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
+    limbs, chain = body.limbs, make_chain(body.skeleton)
+    assert limbs is not None
+    T, screws, out = np.zeros((len(chain.parents), 3, 4)), np.zeros((len(pose), 6)), np.zeros((9, len(cloud.rows) * LANES))
+    place_one(pose, chain, T, screws, np.zeros((3, 3, 3)))
+    _tangents(T, limbs.joints, limbs.rotations, limbs.starts, constants(limbs), cloud.rows, cloud.spheres, cloud.origin,
+              np.float32(settings.epsilon), np.float32(settings.tau), associate, near, np.zeros(8 * LANES, np.float32), out)
+    return T, screws, out
+
+
+def _hangs(body: Body) -> NDArray[np.bool_]:
+    """Whether a DOF moves a joint, of shape (D, J)."""
+    skeleton = body.skeleton
+    parents = skeleton.tree[0]
+    above = np.eye(len(parents), dtype=bool)
+    for j, parent in enumerate(parents):
+        if parent >= 0:
+            above[:, j] |= above[:, parent]
+    return above[[skeleton.joint_index(dof.joint) for dof in skeleton.dofs]]
+
+
+@kernel
+def _tangents(T, joints, rotations, starts, parts, rows, spheres, origin, epsilon, tau, associate, near, room, out):  # pragma: no cover
+    """See `_measured`; with `associate`, nearest parts are found, else those in `near` (G, 2 LANES) are kept."""
+    one, nil = np.float32(1), np.float32(0)
+    place_parts(T, origin, joints, rotations, starts, parts)
+    for group in range(spheres.shape[0]):
+        points, own = rows[group], near[group]
+        if associate:
+            nearest(parts, points, spheres[group], epsilon, own)
+        for s in range(joints.size):
+            used = False
+            for i in range(LANES):
+                used |= own[LANES + i] == s
+            if not used:
+                continue
+            q = parts[s]
+            measure(q, points, room)
+            for i in range(LANES):
+                if own[LANES + i] != s:
+                    continue
+                f0, f1, f2, at = room[2 * LANES + i], room[3 * LANES + i], room[4 * LANES + i], group * LANES + i
+                x = q[0] * f0 + q[3] * f1 + q[6] * f2 + q[9]
+                y = q[1] * f0 + q[4] * f1 + q[7] * f2 + q[10]
+                z = q[2] * f0 + q[5] * f1 + q[8] * f2 + q[11]
+                nx, ny, nz = points[3 * LANES + i], points[4 * LANES + i], points[5 * LANES + i]
+                share = own[i] / tau
+                fade = one / (one + share * share)
+                out[0, at] = (points[i] - x) * nx + (points[LANES + i] - y) * ny + (points[2 * LANES + i] - z) * nz
+                out[1, at] = points[6 * LANES + i] * fade * fade * max(room[LANES + i], nil)
+                out[2, at], out[3, at], out[4, at] = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+                out[5, at], out[6, at], out[7, at] = nx, ny, nz
+                out[8, at] = points[6 * LANES + i] * min(own[i], tau) ** 2

@@ -1,0 +1,208 @@
+"""Which part of a body is nearest to each of many surface points, and where on it: what surface costs and refinements are made of.
+
+Distances are of first order: the level of the part's own function over the length of its gradient. They are exact for circles and
+right for ellipses near the surface. A distance counts more where the normals disagree: d = (1 - eps cos) |pp'| (Ni 2008, eqs. 29-31).
+
+Points come in groups of `LANES` that lie close together, so that most parts are ruled out for a whole group by a bounding sphere.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.kernels import part, summing
+from shadowpuppet.limbs import Limbs
+
+Single = NDArray[np.float32]
+LANES = 16
+"""Points of a group: what one AVX-512 instruction works on."""
+FAR = np.float32(1e6)
+LEAST = np.float32(1e-12)
+NUMBERS = 25
+"""Numbers of a part: 9 of its frame's axes, 3 of its origin, 3 of its middle, bounding radius, length, shear (2), radii (4), caps (2)."""
+
+
+class Cloud(NamedTuple):
+    """Surface points as kernels take them."""
+
+    rows: Single
+    """x, y, z, normal (3), weight of the groups' points, of shape (G, 7 LANES), the x of all in a group first; metres from `origin`.
+    What fills up the last group has no weight."""
+    spheres: Single
+    """Middle and radius of every group, of shape (G, 4)."""
+    origin: Array
+    """World, metres, of shape (3,)."""
+    total: float
+    """Sum of the weights."""
+
+
+def make_cloud(points: Array, normals: Array, weights: Array, origin: Array | None = None) -> Cloud:
+    """Points (P, 3) with normals (P, 3) and weights (P,), ordered so that groups lie close together."""
+    origin = (points.mean(0) if len(points) else np.zeros(3)) if origin is None else origin
+    order = _along_a_curve(points - origin)
+    groups = -(-len(points) // LANES)
+    flat = np.zeros((7, groups * LANES), np.float32)
+    flat[:3, : len(points)] = (points - origin)[order].T
+    flat[3:6, : len(points)] = normals[order].T
+    flat[6, : len(points)] = weights[order]
+    if len(points):
+        flat[:6, len(points) :] = flat[:6, len(points) - 1 : len(points)]
+    rows = np.ascontiguousarray(flat.reshape(7, groups, LANES).swapaxes(0, 1))
+    weight = float(rows[:, 6].sum())
+    low, high = rows[:, :3].min(2), rows[:, :3].max(2)
+    middle = (low + high) / 2
+    radius = np.sqrt(((rows[:, :3] - middle[..., None]) ** 2).sum(1).max(1))
+    return Cloud(rows.reshape(groups, -1), np.concatenate([middle, radius[:, None]], 1), np.asarray(origin, float), weight)
+
+
+def _along_a_curve(points: Array, bits: int = 6, reach: float = 1.5) -> NDArray[np.int64]:
+    """Order of points (P, 3) along Morton's curve."""
+    cells = np.clip((points / (2 * reach) + 0.5) * (1 << bits), 0, (1 << bits) - 1).astype(np.int64)
+    key = np.zeros(len(points), np.int64)
+    for bit in range(bits):
+        for axis in range(3):
+            key |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return key.argsort(kind="stable")
+
+
+def constants(limbs: Limbs) -> Single:
+    """Numbers of the parts that do not change with the pose, of shape (S, NUMBERS); the rest is filled in by `place_parts`."""
+    out = np.zeros((len(limbs.joints), NUMBERS), np.float32)
+    out[:, 16], out[:, 17:19] = limbs.lengths, limbs.shears
+    out[:, 19:23], out[:, 23:25] = limbs.radii.reshape(-1, 4), limbs.caps
+    high = limbs.lengths + limbs.caps.sum(1)
+    wide = np.hypot(limbs.radii.max((1, 2)) + np.abs(limbs.shears).max(1), 0.5 * high)
+    out[:, 15] = wide
+    return out
+
+
+@part
+def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cover
+    """Fill in frames, origins and middles of parts (S, NUMBERS) under transforms T (J, 3, 4), metres from `origin` (3,)."""
+    for s in range(joints.size):
+        joint, numbers = T[joints[s]], parts[s]
+        middle = 0.5 * (numbers[16] + numbers[24] - numbers[23])
+        for r in range(3):
+            for c in range(3):
+                numbers[3 * c + r] = (joint[r, 0] * rotations[s, 0, c] + joint[r, 1] * rotations[s, 1, c]
+                                      + joint[r, 2] * rotations[s, 2, c])
+            numbers[9 + r] = (joint[r, 0] * starts[s, 0] + joint[r, 1] * starts[s, 1] + joint[r, 2] * starts[s, 2] + joint[r, 3]
+                              - origin[r])
+        for r in range(3):
+            numbers[12 + r] = (numbers[9 + r] + 0.5 * (numbers[17] * numbers[r] + numbers[18] * numbers[3 + r])
+                               + middle * numbers[6 + r])
+
+
+@summing
+def measure(q, rows, out):  # pragma: no cover
+    """Of a group of points (7 LANES,) to one part q (NUMBERS,): out (8 LANES,) gets the signed distance, the cosine between the normals,
+    the closest point (3) and its outward normal (3), all but the first two in the part's frame."""
+    for i in range(LANES):
+        x, y, z, nx, ny, nz = _load(rows, i)
+        d, cosine, fx, fy, fz, ux, uy, uz = _closest(q, x, y, z, nx, ny, nz)
+        out[i], out[LANES + i] = d, cosine
+        out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i] = fx, fy, fz
+        out[5 * LANES + i], out[6 * LANES + i], out[7 * LANES + i] = ux, uy, uz
+
+
+@summing
+def _compete(q, number, rows, epsilon, near):  # pragma: no cover
+    """Where part q is nearer to points of a group than `near` (2 LANES,) has it, put down its distance and its number."""
+    one = np.float32(1)
+    for i in range(LANES):
+        x, y, z, nx, ny, nz = _load(rows, i)
+        d, cosine, _, _, _, _, _, _ = _closest(q, x, y, z, nx, ny, nz)
+        d = abs(d) * (one - epsilon * cosine)
+        closer = d < near[i]
+        near[LANES + i] = number if closer else near[LANES + i]
+        near[i] = d if closer else near[i]
+
+
+@summing
+def nearest(parts, rows, sphere, epsilon, near):  # pragma: no cover
+    """The distance d (1 - epsilon cos) of each point of a group to its nearest part, and the part's number: near (2 LANES,).
+
+    The number that stands at near[LANES] is tried first.
+    """
+    x, y, z, radius = sphere[0], sphere[1], sphere[2], sphere[3]
+    first, worst = np.int64(near[LANES]), FAR
+    for i in range(LANES):
+        near[i] = FAR
+    for turn in range(parts.shape[0]):
+        s = first if turn == 0 else (turn - 1 if turn <= first else turn)
+        q = parts[s]
+        dx, dy, dz = q[12] - x, q[13] - y, q[14] - z
+        gap = np.sqrt(dx * dx + dy * dy + dz * dz) - radius - q[15]
+        if gap * (np.float32(1) - epsilon) <= worst:
+            _compete(q, np.float32(s), rows, epsilon, near)
+            worst = _greatest(near)
+
+
+@summing
+def _greatest(near):  # pragma: no cover
+    """The greatest of near (LANES,)."""
+    worst = near[0]
+    for i in range(LANES):
+        worst = max(worst, near[i])
+    return worst
+
+
+@part
+def _load(rows, i):  # pragma: no cover
+    """Point and normal number i of a group."""
+    return rows[i], rows[LANES + i], rows[2 * LANES + i], rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
+
+
+@part
+def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
+    """Signed distance of a point to part q, cosine of the normals, closest point (3) and outward normal (3) in the part's frame."""
+    one, nil, half = np.float32(1), np.float32(0), np.float32(1e-4)
+    L, a0, b0, a1, b1, h0, h1 = q[16], q[19], q[20], q[21], q[22], q[23], q[24]
+    slope_x, slope_y, slope_a, slope_b = q[17] / L, q[18] / L, (a1 - a0) / L, (b1 - b0) / L
+    x, y, z = x - q[9], y - q[10], z - q[11]
+    px, py, pz = q[0] * x + q[1] * y + q[2] * z, q[3] * x + q[4] * y + q[5] * z, q[6] * x + q[7] * y + q[8] * z
+    mx, my, mz = q[0] * nx + q[1] * ny + q[2] * nz, q[3] * nx + q[4] * ny + q[5] * nz, q[6] * nx + q[7] * ny + q[8] * nz
+    inner = min(max(pz, nil), L)
+    over = pz - inner
+    u, v, a, b = px - slope_x * inner, py - slope_y * inner, a0 + slope_a * inner, b0 + slope_b * inner
+    ia, ib = one / a, one / b
+    su, sv = u * ia, v * ib
+    square = su * su + sv * sv
+    height = h0 if over < nil else h1
+    domed = height > half
+    ih = one / height if domed else nil
+    side = over == nil
+    w = over * ih
+    rho2 = square + w * w + LEAST
+    # the gradient of rho, times rho
+    gx, gy = su * ia, sv * ib
+    along = -(su * su * slope_a * ia + sv * sv * slope_b * ib + gx * slope_x + gy * slope_y)
+    gz = along if side else w * ih
+    irho, steep = one / np.sqrt(rho2), one / np.sqrt(gx * gx + gy * gy + gz * gz + LEAST)
+    d = (rho2 - np.sqrt(rho2)) * steep
+    ux, uy, uz = gx * steep, gy * steep, gz * steep
+    fx, fy, fz = px - d * ux, py - d * uy, pz - d * uz
+    # beyond a flat end: the nearest point of a disc; inside, near a flat end: the end
+    inside = side & (rho2 < one)
+    low = inside & (h0 <= half) & (pz < -d) & ((h1 > half) | (pz <= L - pz))
+    high = inside & (h1 <= half) & (L - pz < -d) & ((h0 > half) | (L - pz < pz))
+    flat = ((not side) & (not domed)) | low | high
+    up = (over > nil) | high
+    level = L if up else nil
+    shrink = irho if rho2 > one else one
+    ex, ey = px - u + u * shrink, py - v + v * shrink
+    dx, dy, dz = px - ex, py - ey, pz - level
+    reach = np.sqrt(dx * dx + dy * dy + dz * dz) + LEAST
+    outside = not side
+    end = one if up else -one
+    edge = outside & (rho2 > one)
+    d = (reach if outside else -reach) if flat else d
+    ux = ((dx / reach) if edge else nil) if flat else ux
+    uy = ((dy / reach) if edge else nil) if flat else uy
+    uz = ((dz / reach) if edge else end) if flat else uz
+    fx, fy, fz = ex if flat else fx, ey if flat else fy, level if flat else fz
+    return d, ux * mx + uy * my + uz * mz, fx, fy, fz, ux, uy, uz
