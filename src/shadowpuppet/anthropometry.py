@@ -61,7 +61,7 @@ CYLINDERS: Mapping[str, tuple[float, float]] = {
 ANATOMICAL: Mapping[str, tuple[float, float]] = {
     **BONES, "lumbar_height": (0.1355, 0.010), "thorax_height": (0.1725, 0.010), "foot_length": (0.153, 0.006),
     "pelvis_width": (0.196, 0.015), "pelvis_depth": (0.143, 0.015), "waist_width": (0.180, 0.018), "waist_depth": (0.135, 0.018),
-    "chest_width": (0.198, 0.014), "chest_depth": (0.125, 0.014), "neck_width": (0.0685, 0.006),
+    "chest_width": (0.168, 0.014), "chest_depth": (0.145, 0.014), "neck_width": (0.0685, 0.006),
     "head_width": (0.0893, 0.004), "head_depth": (0.115, 0.005), "upper_arm_width": (0.0593, 0.007), "elbow_width": (0.0480, 0.005),
     "forearm_width": (0.0500, 0.005), "wrist_width": (0.0312, 0.003), "hand_width": (0.0496, 0.004), "thigh_width": (0.1130, 0.010),
     "knee_width": (0.0690, 0.006), "calf_width": (0.0700, 0.006), "ankle_width": (0.0419, 0.004), "foot_width": (0.0577, 0.004),

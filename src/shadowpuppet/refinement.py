@@ -50,7 +50,7 @@ class Refiner:
         _costs(poses, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers, self._which(cloud), self._room, out)
         return out / max(cloud.total, 1e-9)
 
-    def gauss_newton(self, poses: Array, clouds: tuple[tuple[Cloud, int], ...], centre: Array, pull: Array) -> tuple[Array, Array]:
+    def gauss_newton(self, poses: Array, clouds: tuple[tuple[Cloud, int, float], ...], centre: Array, pull: Array) -> tuple[Array, Array]:
         """Better poses (N, D) and their costs (N,), those of `costs` on the last cloud: damped (Levenberg-Marquardt), robust, within limits.
 
         `clouds`: surface points and how many iterations to take on them, a few points first. `pull` (D,): weight of the squared distance
@@ -58,9 +58,9 @@ class Refiner:
         """
         poses = self.body.skeleton.checked(poses).copy()
         costs, centre = np.zeros(len(poses)), np.ascontiguousarray(np.atleast_2d(centre), float)
-        for cloud, iterations in clouds:
+        for cloud, iterations, tau in clouds:
             _gauss_newton(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
-                          max(cloud.total, 1e-9), self._numbers, self.settings.damping, iterations, self._which(cloud), self._room,
+                          max(cloud.total, 1e-9), (np.float32(self.settings.epsilon), np.float32(tau)), self.settings.damping, iterations, self._which(cloud), self._room,
                           self._system, costs)
         return poses, costs
 

@@ -18,7 +18,7 @@ from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
 from shadowpuppet.whole_skeleton import SIDES, anatomical_skeleton, cylinder_skeleton
 
-ALONG = {"down": ("x", "-y", "-z"), "up": ("x", "y", "z"), "forward": ("y", "z", "x")}
+ALONG = {"down": ("x", "-y", "-z"), "up": ("x", "y", "z"), "forward": ("y", "z", "x"), "left": ("z", "x", "y")}
 """Axes of a limb's own frame, x, y, z, in its joint's."""
 FLAT = 0.02
 """A flat end is drawn as an ellipsoid of so little height, as a share of its radii."""
@@ -109,11 +109,14 @@ def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
 
 def _trunk(s: AnatomicalSizes) -> list[_Limb]:
     waist, chest, high = (s.waist_depth / 2, s.waist_width / 2), (s.chest_depth / 2, s.chest_width / 2), s.thorax_height - s.shoulder_drop
+    armpit, yoke, level = 0.65 * high, _round(s.upper_arm_width, 0.9, 1.0), (high, s.shoulder_forward)
     jaw, skull = s.neck_length - 0.15 * s.head_height, s.neck_length + 0.45 * s.head_height
     return [
         _Limb("pelvis", "pelvis", "up", (-s.hip_drop, s.lumbar_height), ((s.pelvis_depth / 2, s.pelvis_width / 2), waist),
               caps=(0.4 * s.pelvis_depth, 0.2 * s.waist_depth)),
-        _Limb("chest", "chest", "up", (0.0, high), (waist, chest), ((0.0, 0.0), (0.5 * s.shoulder_forward, 0.0)), (0.2 * s.waist_depth, s.shoulder_drop)),
+        _Limb("chest", "chest", "up", (0.0, armpit), (waist, chest), caps=(0.2 * s.waist_depth, s.thorax_height - armpit)),
+        _Limb("shoulders", "chest", "left", (-0.5 * s.shoulder_distance, 0.5 * s.shoulder_distance), (yoke, yoke), (level, level),
+              (0.3 * s.upper_arm_width, 0.3 * s.upper_arm_width)),
         _Limb("neck", "head", "up", (-0.1 * s.neck_length, s.neck_length), (_round(s.neck_width), _round(s.neck_width)),
               ((0.0, 0.0), (s.head_forward, 0.0)), (0.2 * s.neck_width, 0.2 * s.neck_width)),
         _Limb("head", "head", "up", (jaw, skull), ((0.36 * s.head_depth, 0.40 * s.head_width), (0.5 * s.head_depth, 0.5 * s.head_width)),

@@ -82,7 +82,7 @@ class AnatomicalSizes(BoneSizes):
     """At the chest's joint."""
     waist_depth: float
     chest_width: float
-    """At the shoulders' joints, arms left out."""
+    """Under the armpits, arms left out."""
     chest_depth: float
     neck_width: float
     head_width: float
