@@ -59,9 +59,9 @@ CYLINDERS: Mapping[str, tuple[float, float]] = {
 }  # fmt: skip
 """The sizes of `cylinders`; each width is about the mean of those along the part in `ANATOMICAL`."""
 ANATOMICAL: Mapping[str, tuple[float, float]] = {
-    **BONES, "lumbar_height": (0.1355, 0.010), "thorax_height": (0.1725, 0.010), "foot_length": (0.153, 0.006),
+    **BONES, "lumbar_height": (0.1355, 0.010), "thorax_height": (0.1725, 0.010), "foot_length": (0.153, 0.006), "toe_out": (0.018, 0.012),
     "pelvis_width": (0.196, 0.015), "pelvis_depth": (0.143, 0.015), "waist_width": (0.180, 0.018), "waist_depth": (0.135, 0.018),
-    "chest_width": (0.168, 0.014), "chest_depth": (0.145, 0.014), "neck_width": (0.0685, 0.006),
+    "chest_width": (0.168, 0.014), "chest_depth": (0.145, 0.014), "shoulder_thickness": (0.062, 0.008), "neck_width": (0.0685, 0.006),
     "head_width": (0.0893, 0.004), "head_depth": (0.115, 0.005), "upper_arm_width": (0.0593, 0.007), "elbow_width": (0.0480, 0.005),
     "forearm_width": (0.0500, 0.005), "wrist_width": (0.0312, 0.003), "hand_width": (0.0496, 0.004), "thigh_width": (0.1130, 0.010),
     "knee_width": (0.0690, 0.006), "calf_width": (0.0700, 0.006), "ankle_width": (0.0419, 0.004), "foot_width": (0.0577, 0.004),
@@ -69,10 +69,26 @@ ANATOMICAL: Mapping[str, tuple[float, float]] = {
 """The sizes of `anatomical`; breadths, depths, girths over pi and the foot rounded from ANSUR II (Gordon et al. 2014)."""
 
 
+def shares_of(kind: type[BoneSizes]) -> Mapping[str, tuple[float, float]]:
+    """The sizes of a whole body as fractions of the stature, and their deviations."""
+    return ANATOMICAL if issubclass(kind, AnatomicalSizes) else CYLINDERS
+
+
 def whole_sizes_from_height(kind: type[Whole], height: float) -> Whole:
     """Sizes of a whole body, `AnatomicalSizes` or `CylinderSizes`, of the average person of a height (m, shoes on)."""
-    shares = ANATOMICAL if issubclass(kind, AnatomicalSizes) else CYLINDERS
-    return kind(**{name: shares[name][0] * (height - SOLE) for name in kind.names()})
+    return whole_sizes_from_bones(kind, {}, height - SOLE)
+
+
+def whole_sizes_from_bones(kind: type[Whole], lengths: Mapping[str, float], stature: float | None = None) -> Whole:
+    """Sizes of a whole body where some are known (m); the others as the average person of the stature, which is by default theirs."""
+    stature = stature_of(lengths) if stature is None else stature
+    return kind(**{name: lengths.get(name, share * stature) for name, (share, _) in shares_of(kind).items()})
+
+
+def stature_of(lengths: Mapping[str, float]) -> float:
+    """The likeliest stature (m, no shoes) of who has bones of these lengths (m), named as in `BONES`; some must be given."""
+    known = [(length, *BONES[name]) for name, length in lengths.items() if name in BONES]
+    return sum(length * share / deviation**2 for length, share, deviation in known) / sum((s / deviation) ** 2 for _, s, deviation in known)
 
 
 def sizes_from_height(height: float) -> CardboxSizes:

@@ -75,6 +75,8 @@ class AnatomicalSizes(BoneSizes):
     """From the joint of the chest up to the base of the neck."""
     foot_length: float
     """From heel to toes."""
+    toe_out: float
+    """How far out the toes lie of what is straight ahead of the ankle."""
     pelvis_width: float
     """At the hips."""
     pelvis_depth: float
@@ -84,6 +86,8 @@ class AnatomicalSizes(BoneSizes):
     chest_width: float
     """Under the armpits, arms left out."""
     chest_depth: float
+    shoulder_thickness: float
+    """Of the trunk at the shoulders' joints, up and down and to front and back."""
     neck_width: float
     head_width: float
     head_depth: float
@@ -101,3 +105,8 @@ class AnatomicalSizes(BoneSizes):
     calf_width: float
     ankle_width: float
     foot_width: float
+
+    @classmethod
+    def offsets(cls) -> tuple[str, ...]:
+        """As of the bones; toes may point inward."""
+        return *super().offsets(), "toe_out"
