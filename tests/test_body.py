@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from people import SIZES, random_poses
+from shadowpuppet.bodies import make_body
 from shadowpuppet.body import (
     BODIES,
     FOREARM,
@@ -21,7 +22,6 @@ from shadowpuppet.body import (
     Quads,
     boxes,
     cardbox,
-    make_body,
     rounded,
 )  # fmt: skip
 from shadowpuppet.errors import ShadowPuppetError
@@ -247,7 +247,7 @@ def test_a_mirrored_pose_has_mirrored_points(name, rng):
 
 
 @pytest.mark.parametrize(("call", "said"), [
-    (lambda: make_body("ball", SIZES), "unknown body 'ball'; there are: boxes, cardbox, rounded"),
+    (lambda: make_body("ball", SIZES), "unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"),
     (lambda: cardbox(SIZES).shapes_of("head", "left_hand"), "body 'cardbox': unknown part left_hand; there are: head, left_forearm"),
 ])
 def test_unknown_names_are_said_with_what_there_is(call, said):

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet import overlay
-from shadowpuppet.body import BODIES, CardboxSizes, make_body
+from shadowpuppet.bodies import make_body
+from shadowpuppet.body import BODIES, CardboxSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, VideoError
 from shadowpuppet.geometry import Array, rigid

@@ -293,10 +293,4 @@ def rounded(sizes: CardboxSizes) -> Body:
 
 
 BODIES = {"cardbox": cardbox, "boxes": boxes, "rounded": rounded}
-
-
-def make_body(name: str, sizes: CardboxSizes) -> Body:
-    """A body by name. Raises `ShadowPuppetError` with the names there are."""
-    if name not in BODIES:
-        raise ShadowPuppetError(f"unknown body {name!r}; there are: {choices(BODIES)}")
-    return BODIES[name](sizes)
+"""Upper bodies, from 18 sizes."""

@@ -13,7 +13,10 @@ from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
 
 SIDES = ("left", "right")
 Bounds = tuple[float, float]
+Three = tuple[float, float, float]
 FREE = (-np.inf, np.inf)
+SWING = {"left": ("-y", "x", "z"), "right": ("-y", "-x", "-z")}
+"""Axes about which a hanging limb swings forward, swings outward, and twists outward."""
 
 
 def _dof(name: str, joint: str, axis: str, limits: Bounds, rest: float = 0.0, spread: Bounds = FREE, kind: str = "rotation") -> Dof:
@@ -23,20 +26,20 @@ def _dof(name: str, joint: str, axis: str, limits: Bounds, rest: float = 0.0, sp
                rest=float(np.radians(rest)), spread=(below, above))  # fmt: skip
 
 
-def _ball(joint: str, limits: tuple[Bounds, Bounds, Bounds], rest: tuple[float, float, float], spread: tuple[float, float, float]) -> list[Dof]:
+def _ball(joint: str, limits: tuple[Bounds, Bounds, Bounds], rest: Three, spread: Three) -> list[Dof]:
     """The rotation vector of a ball joint, degrees."""
     return [_dof(f"{joint}_{axis}", joint, axis, within, usual, (-wide, wide), "vector")
             for axis, within, usual, wide in zip("xyz", limits, rest, spread)]
 
 
-def _sided(side: str, limits: tuple[Bounds, Bounds, Bounds], rest: tuple[float, float, float], spread: tuple[float, float, float]) -> tuple:
+def _sided(side: str, limits: tuple[Bounds, Bounds, Bounds], rest: Three, spread: Three) -> tuple:
     """What `_ball` wants, for a side, from what the left one has: about x and z the right one's is its mirror's."""
     (x, y, z), (a, b, c) = limits, rest
     return (limits, rest, spread) if side == "left" else (((-x[1], -x[0]), y, (-z[1], -z[0])), (-a, b, -c), spread)
 
 
 def _angles(joint: str, axes: tuple[str, str, str], names: tuple[str, str, str], limits: tuple[Bounds, Bounds, Bounds],
-            rest: tuple[float, float, float], spread: tuple[float, float, float]) -> list[Dof]:
+            rest: Three, spread: Three) -> list[Dof]:
     """Three turns one after another, degrees: about Y, then X, then Z."""
     return [_dof(f"{joint}_{name}", joint, axis, within, usual, (-wide, wide))
             for axis, name, within, usual, wide in zip(axes, names, limits, rest, spread)]
@@ -49,7 +52,7 @@ def _root() -> list[Dof]:
             _dof("root_tilt", "pelvis", "x", (-80, 80), spread=(15, 15))]  # fmt: skip
 
 
-def _places(side: str, s: BoneSizes) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def _places(side: str, s: BoneSizes) -> tuple[Three, Three]:
     """Where a side's shoulder lies from the base of the neck, and its hip from the pelvis."""
     out = 0.5 if side == "left" else -0.5
     return (s.shoulder_forward, out * s.shoulder_distance, -s.shoulder_drop), (s.hip_forward, out * s.hip_distance, -s.hip_drop)
@@ -58,11 +61,12 @@ def _places(side: str, s: BoneSizes) -> tuple[tuple[float, float, float], tuple[
 def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
     """32 DOF: the pelvis 6; chest, head, shoulders, hips 3 each as rotation vectors; elbows, knees 1 each; ankles 2 each."""
     s = sizes
-    joints = [Joint("pelvis", None), Joint("chest", "pelvis", (0.0, 0.0, s.lumbar_height)), Joint("head", "chest", (0.0, 0.0, s.thorax_height))]
+    joints = [Joint("pelvis", None), Joint("chest", "pelvis", (0.0, 0.0, s.lumbar_height)),
+              Joint("head", "chest", (0.0, 0.0, s.thorax_height))]  # fmt: skip
     dofs = [*_root(), *_ball("chest", ((-50, 50), (-45, 80), (-65, 65)), (0, 0, 0), (12, 15, 15)),
             *_ball("head", ((-55, 55), (-70, 75), (-90, 90)), (0, 0, 0), (15, 20, 25))]  # fmt: skip
     for side in SIDES:
-        (x, y, z), hip = _places(side, s)
+        x, y, z = _places(side, s)[0]
         joints += [Joint(f"{side}_shoulder", "chest", (x, y, z + s.thorax_height)),
                    Joint(f"{side}_elbow", f"{side}_shoulder", (0.0, 0.0, -s.upper_arm_length))]
         dofs += _ball(f"{side}_shoulder", *_sided(side, ((-100, 210), (-215, 100), (-150, 150)), (12, -5, 0), (40, 50, 40)))
@@ -89,14 +93,14 @@ def cylinder_skeleton(sizes: CylinderSizes) -> Skeleton:
                                (20, 15, 25))]  # fmt: skip
     swing = ("flexion", "abduction", "twist")
     for side in SIDES:
-        (x, y, z), axes = _places(side, s)[0], ("-y", *(("x", "z") if side == "left" else ("-x", "-z")))
+        (x, y, z), _ = _places(side, s)
         shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
         joints += [Joint(shoulder, "pelvis", (x, y, z + s.trunk_height)), Joint(elbow, shoulder, (0.0, 0.0, -s.upper_arm_length))]
-        dofs += _angles(shoulder, axes, swing, ((-100, 215), (-60, 200), (-150, 150)), (5, 12, 0), (50, 40, 40))
+        dofs += _angles(shoulder, SWING[side], swing, ((-100, 215), (-60, 200), (-150, 150)), (5, 12, 0), (50, 40, 40))
         dofs += [_dof(f"{elbow}_flexion", elbow, "-y", (0, 135), 20, (25, 60))]
     for side in SIDES:
-        axes, hip, knee = ("-y", *(("x", "z") if side == "left" else ("-x", "-z"))), f"{side}_hip", f"{side}_knee"
+        hip, knee = f"{side}_hip", f"{side}_knee"
         joints += [Joint(hip, "pelvis", _places(side, s)[1]), Joint(knee, hip, (0.0, 0.0, -s.thigh_length))]
-        dofs += _angles(hip, axes, swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (35, 15, 20))
+        dofs += _angles(hip, SWING[side], swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (35, 15, 20))
         dofs += [_dof(f"{knee}_flexion", knee, "y", (0, 155), 10, (15, 50))]
     return Skeleton(tuple(joints), tuple(dofs))
