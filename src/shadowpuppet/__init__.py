@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from shadowpuppet.camera import Camera
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.initialization import find_person, fit_references
+    from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.io.calibration import read_calibration, write_calibration
     from shadowpuppet.io.joints import read_joints, write_joints
     from shadowpuppet.io.person import Person, read_person, write_person
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from shadowpuppet.video import open_frames, write_frames
     from shadowpuppet.visual_hull import SurfacePoints, VisualHull
     from shadowpuppet.vqpca import choose_regions, fit_prior
+    from shadowpuppet.whole_sizes import AnatomicalSizes, CylinderSizes
 
     __version__: str
 
@@ -47,7 +49,8 @@ _HOMES = {
     "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video",
     "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
     "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull",
-    "VisualHull": "visual_hull",
+    "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
+    "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -58,7 +61,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "read_calibration", "read_joints", "read_person", "read_recording", "read_run", "synthesize", "track_recording",
     "write_calibration", "write_frames", "write_joints", "write_person",
     "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
-    "VisualHull",
+    "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
 ]  # fmt: skip
 
 

@@ -69,10 +69,26 @@ ANATOMICAL: Mapping[str, tuple[float, float]] = {
 """The sizes of `anatomical`; breadths, depths, girths over pi and the foot rounded from ANSUR II (Gordon et al. 2014)."""
 
 
+def shares_of(kind: type[BoneSizes]) -> Mapping[str, tuple[float, float]]:
+    """The sizes of a whole body as fractions of the stature, and their deviations."""
+    return ANATOMICAL if issubclass(kind, AnatomicalSizes) else CYLINDERS
+
+
 def whole_sizes_from_height(kind: type[Whole], height: float) -> Whole:
     """Sizes of a whole body, `AnatomicalSizes` or `CylinderSizes`, of the average person of a height (m, shoes on)."""
-    shares = ANATOMICAL if issubclass(kind, AnatomicalSizes) else CYLINDERS
-    return kind(**{name: shares[name][0] * (height - SOLE) for name in kind.names()})
+    return whole_sizes_from_bones(kind, {}, height - SOLE)
+
+
+def whole_sizes_from_bones(kind: type[Whole], lengths: Mapping[str, float], stature: float | None = None) -> Whole:
+    """Sizes of a whole body where some are known (m); the others as the average person of the stature, which is by default theirs."""
+    stature = stature_of(lengths) if stature is None else stature
+    return kind(**{name: lengths.get(name, share * stature) for name, (share, _) in shares_of(kind).items()})
+
+
+def stature_of(lengths: Mapping[str, float]) -> float:
+    """The likeliest stature (m, no shoes) of who has bones of these lengths (m), named as in `BONES`; some must be given."""
+    known = [(length, *BONES[name]) for name, length in lengths.items() if name in BONES]
+    return sum(length * share / deviation**2 for length, share, deviation in known) / sum((s / deviation) ** 2 for _, s, deviation in known)
 
 
 def sizes_from_height(height: float) -> CardboxSizes:

@@ -1,0 +1,268 @@
+"""Joints over time to poses of a body, and to the sizes of who moved: inverse kinematics of all frames at once.
+
+Damped Gauss-Newton. Frames hang together by the sizes, which all share, and by a weak pull of each angle to its neighbours in time; so the
+equations are a band with a margin, and time grows with the number of frames only. What joints do not show (how a straight limb is turned
+about itself, where the feet point) follows the neighbours and the body's usual posture: angles are smooth, and a motion prior that learns
+from them learns motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.anthropometry import shares_of, stature_of, whole_sizes_from_bones
+from shadowpuppet.bodies import WHOLE, make_body, sizes_kind
+from shadowpuppet.body import Body
+from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.geometry import Array
+from shadowpuppet.joint_frames import guess
+from shadowpuppet.motion import JointTable
+from shadowpuppet.plausibility import SIDES, check_person, of
+from shadowpuppet.sizes import LEAST
+from shadowpuppet.whole_sizes import BoneSizes
+
+REACH = 0.1
+"""A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""
+SMOOTH, REST, TWIST, NOD = 1e-4, 1e-5, 2e-4, 1e-2
+"""Pulls (m^2 / rad^2, beside the squared distances of joints, m^2): of an angle to the next frame's, to its rest, of a limb's turn about
+itself to none, of the head's."""
+KNOWN = 0.005
+"""By so many metres joints may stray in a frame before the proportions of the average person speak as loudly."""
+HAND = 0.02
+"""Weight of the base of the fingers beside other joints: bodies have a rigid wrist, people do not."""
+STEP, CHUNK = 1e-6, 500
+"""Step of finite differences; frames that are differentiated at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPoses:
+    """Poses of a body that stand for measured joints, the sizes that go with them, and how well they do."""
+
+    body_name: str
+    sizes: BoneSizes
+    """Of the person: bones as measured; what joints do not show as people of that stature have it."""
+    times: Array
+    """Seconds, of shape (T,)."""
+    poses: Array
+    """In the world, of shape (T, D), rad or m; not a number in frames without any joint."""
+    joints: JointTable
+    """Where the body has the joints that were fitted, J of them."""
+    distances: Array
+    """From the body's joints to those measured, of shape (T, J), metres; not a number where unknown."""
+
+    @property
+    def body(self) -> Body:
+        """The body."""
+        return make_body(self.body_name, self.sizes)
+
+    @property
+    def residual(self) -> float:
+        """Root mean square of all distances, metres."""
+        return _rms(self.distances.ravel())
+
+    @property
+    def by_joint(self) -> dict[str, float]:
+        """The same for each joint."""
+        return {name: _rms(column) for name, column in zip(self.joints.names, self.distances.T)}
+
+    @property
+    def by_frame(self) -> Array:
+        """The same for each frame, of shape (T,)."""
+        return np.array([_rms(row) for row in self.distances])
+
+
+def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | None = None, source: str = "joints") -> FittedPoses:
+    """Poses of a whole body, and the person's sizes where none are given, from joints over time.
+
+    joints: in the world, metres, Z up; any of the 17 joints of a body, among them shoulders, elbows, knees, and the pelvis or both hips.
+    Frames may lack joints. `source` is what messages call them.
+    Raises `ShadowPuppetError` where joints are missing, not in metres, upside down or mirrored, or the body is not a whole one.
+    """
+    if body not in WHOLE:
+        raise ShadowPuppetError(f"body {body!r}: found a body without legs or none, expected one of {choices(WHOLE)}")
+    check_person(joints, source)
+    someone = sizes or whole_sizes_from_bones(sizes_kind(body), _bones(joints))  # pyright: ignore[reportArgumentType]
+    start = make_body(body, someone)
+    table = joints.select([name for name in start.landmark_names if name in joints.names])
+    problem = _Problem(body, table, someone, _shown(start, someone, table.names) if sizes is None else ())
+    return problem.told(*problem.solve(guess(start, table), someone.to_array()))
+
+
+class _Linear(NamedTuple):
+    """The equations of a step: blocks of the poses (T, D, D), their margin (T, D, S), corner (S, S), and right-hand sides (T, D), (S,)."""
+
+    A: Array
+    B: Array
+    C: Array
+    g: Array
+    h: Array
+
+
+class _Problem:
+    """Joints, and what a pose and sizes cost."""
+
+    def __init__(self, body: str, table: JointTable, sizes: BoneSizes, free: tuple[str, ...]) -> None:
+        self.name, self.table, self.kind = body, table, type(sizes)
+        self.free = np.array([self.kind.names().index(name) for name in free], np.int64)
+        self.known: NDArray[np.bool_] = np.asarray(np.isfinite(table.positions).all(2))
+        self.wanted = np.where(self.known[..., None], table.positions, 0.0)
+        self.weight = np.array([HAND if name.endswith("_hand") else 1.0 for name in table.names])
+        dofs = make_body(body, sizes).skeleton.dofs
+        self.rest = np.array([dof.rest for dof in dofs])
+        self.pull = np.array([_pull(dof.name, dof.kind) for dof in dofs])
+        steps = np.diff(table.times)
+        self.smooth = SMOOTH * np.median(steps) / steps if len(steps) else steps
+        self.mean, deviation = sizes.to_array()[self.free], np.array([shares_of(self.kind)[name][1] for name in free])
+        self.hold = (KNOWN / (deviation * stature_of(dict(zip(sizes.names(), sizes.to_array()))))) ** 2 if len(free) else np.zeros(0)
+
+    def body(self, values: Array) -> Body:
+        """The body of sizes (all of them)."""
+        return make_body(self.name, self.kind.from_array(values))
+
+    def cost(self, poses: Array, values: Array) -> float:
+        """What poses (T, D) and sizes cost, m^2."""
+        squared = ((self._places(self.body(values), poses) - self.wanted) ** 2).sum(2)
+        joints = (self.weight * squared / (1 + squared / REACH**2))[self.known].sum()
+        smooth = (self.smooth[:, None] * np.diff(poses, axis=0) ** 2).sum()
+        sizes = (self.hold * (values[self.free] - self.mean) ** 2).sum()
+        return float(joints + smooth + sizes + (self.pull * (poses - self.rest) ** 2).sum())
+
+    def solve(self, poses: Array, values: Array, rounds: int = 60) -> tuple[Array, Array]:
+        """Poses (T, D) and sizes of least cost near those given."""
+        low, high = self.body(values).skeleton.limits
+        least = np.where(np.isin(self.kind.names(), self.kind.offsets()), -0.2, LEAST)
+        damping, best = 1e-4, self.cost(poses, values)
+        equations = self._equations(poses, values)
+        for _ in range(rounds):
+            step, change = _solved(equations, self.smooth, damping, _held(poses, equations.g, low, high))
+            new_poses, new_values = np.clip(poses + step, low, high), values.copy()
+            new_values[self.free] += change
+            new_values = np.clip(new_values, least, 1.9)
+            cost = self.cost(new_poses, new_values)
+            if cost > best:
+                damping *= 10
+                if damping > 1e3:
+                    break
+                continue
+            gain, poses, values, best, damping = best - cost, new_poses, new_values, cost, max(damping / 5, 1e-9)
+            if gain < 1e-5 * best + 1e-12:
+                break
+            equations = self._equations(poses, values)
+        return poses, values
+
+    def told(self, poses: Array, values: Array) -> FittedPoses:
+        """What was found, without what nothing was known of."""
+        body, seen = self.body(values), self.known.sum(1) > 0
+        places = np.where(seen[:, None, None], self._places(body, poses), np.nan)
+        distances = np.where(self.known, np.linalg.norm(places - self.table.positions, axis=2), np.nan)
+        return FittedPoses(self.name, self.kind.from_array(values), self.table.times, np.where(seen[:, None], poses, np.nan),
+                           JointTable(self.table.times, self.table.names, places), distances)  # fmt: skip
+
+    def _places(self, body: Body, poses: Array) -> Array:
+        return body.points(poses, names=self.table.names)
+
+    def _equations(self, poses: Array, values: Array) -> _Linear:
+        """The normal equations where poses and sizes are: J' W J and J' W r of joints, and of the pulls."""
+        T, D, S = *poses.shape, len(self.free)
+        A, B, C = np.zeros((T, D, D)), np.zeros((T, D, S)), np.diag(self.hold)
+        g, h = np.zeros((T, D)), self.hold * (self.mean - values[self.free])
+        body, others = self.body(values), [self.body(values + STEP * (np.arange(len(values)) == k)) for k in self.free]
+        for begin in range(0, T, CHUNK):
+            rows = slice(begin, begin + CHUNK)
+            at = self._places(body, poses[rows])
+            J = self._slopes(body, poses[rows], at)
+            K = np.stack([(self._places(other, poses[rows]) - at) / STEP for other in others], -1) if S else np.zeros((*at.shape, 0))
+            r = (self.wanted[rows] - at) * self.known[rows, :, None]
+            w = self.weight * self.known[rows] / (1 + (r**2).sum(2) / REACH**2) ** 2
+            J, K, r = (each.reshape(len(at), -1, each.shape[-1]) for each in (J, K, r[..., None]))
+            weighted = np.swapaxes(J * np.repeat(w, 3, axis=1)[..., None], 1, 2)
+            A[rows], B[rows], g[rows] = weighted @ J, weighted @ K, (weighted @ r)[..., 0]
+            flat = np.swapaxes(K * np.repeat(w, 3, axis=1)[..., None], 1, 2)
+            C, h = C + (flat @ K).sum(0), h + (flat @ r).sum(0)[:, 0]
+        A[:, np.arange(D), np.arange(D)] += self.pull
+        g += self.pull * (self.rest - poses)
+        moved = self.smooth[:, None] * np.diff(poses, axis=0)
+        g[:-1] += moved
+        g[1:] -= moved
+        return _Linear(A, B, C, g, h)
+
+    def _slopes(self, body: Body, poses: Array, at: Array) -> Array:
+        """Derivatives (T, J, 3, D) of the joints' places `at` (T, J, 3)."""
+        T, D = poses.shape
+        moved = (poses[:, None] + STEP * np.eye(D)).reshape(T * D, D)
+        return np.moveaxis(self._places(body, moved).reshape(T, D, -1, 3) - at[:, None], 1, -1) / STEP
+
+
+def _pull(name: str, kind: str) -> float:
+    """The pull of a DOF to its rest."""
+    if kind == "translation" or name == "root_heading":
+        return 0.0
+    if name.startswith("head") and name.endswith(("_z", "_twist")):
+        return NOD
+    return TWIST if name.endswith(("shoulder_z", "hip_z", "_twist")) else REST
+
+
+def _held(poses: Array, downhill: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """DOF (T, D) that stand at a limit and would go beyond it."""
+    return ((poses <= low) & (downhill < 0)) | ((poses >= high) & (downhill > 0))
+
+
+def _solved(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """The step of poses (T, D) and sizes (S,): the band is solved for the poses, then what is left for the sizes (Schur complement)."""
+    (T, D), S, free = equations.g.shape, len(equations.h), ~held
+    A = equations.A * free[:, :, None] * free[:, None, :]
+    chain = np.zeros(T)
+    chain[:-1] += smooth
+    chain[1:] += smooth
+    A[:, np.arange(D), np.arange(D)] += np.where(held, 1.0, damping + chain[:, None])
+    right = np.concatenate([equations.g[..., None], equations.B], 2) * free[..., None]
+    solved = _along(A, smooth[:, None] * (free[1:] & free[:-1]), right)
+    margin = (equations.B * free[..., None]).reshape(T * D, S)
+    steps = solved.reshape(T * D, 1 + S)
+    corner = equations.C + damping * np.eye(S) - margin.T @ steps[:, 1:]
+    change = np.asarray(np.linalg.solve(corner, equations.h - margin.T @ steps[:, 0]), float)
+    return solved[..., 0] - solved[..., 1:] @ change, change
+
+
+def _along(A: Array, links: Array, right: Array) -> Array:
+    """Solutions (T, D, R) of a chain of blocks A (T, D, D), neighbours linked by -diag(links), links (T - 1, D): Thomas' algorithm."""
+    T, D, _ = right.shape
+    pivot, rest, carried, out = A[0], right[0], [], np.empty_like(right)
+    for t in range(T):
+        link = np.diag(links[t]) if t < T - 1 else np.zeros((D, 0))
+        both = np.linalg.solve(pivot, np.concatenate([link, rest], 1))
+        out[t] = both[:, link.shape[1] :]
+        if t < T - 1:
+            carried.append(both[:, :D])
+            pivot, rest = A[t + 1] - links[t][:, None] * both[:, :D], right[t + 1] + links[t][:, None] * out[t]
+    for t in range(T - 2, -1, -1):
+        out[t] += carried[t] @ out[t + 1]
+    return out
+
+
+def _shown(body: Body, sizes: BoneSizes, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Sizes on which the places of these joints depend."""
+    pose, values = np.zeros((1, len(body.skeleton.dofs))), sizes.to_array()
+    moved = [make_body(body.name, type(sizes).from_array(values + 0.01 * row)).points(pose, names=names) for row in np.eye(len(values))]
+    at = body.points(pose, names=names)
+    return tuple(name for name, place in zip(sizes.names(), moved) if np.abs(place - at).max() > 1e-6)
+
+
+def _bones(table: JointTable) -> dict[str, float]:
+    """Median lengths of bones that joints show by their distance, metres."""
+    pairs = {"hip_distance": [("left_hip", "right_hip")], "shoulder_distance": [("left_shoulder", "right_shoulder")]}
+    for bone, ends in {"upper_arm_length": ("shoulder", "elbow"), "forearm_length": ("elbow", "wrist"), "hand_point": ("wrist", "hand"),
+                       "thigh_length": ("hip", "knee"), "shank_length": ("knee", "ankle")}.items():  # fmt: skip
+        pairs[bone] = [(f"{side}_{ends[0]}", f"{side}_{ends[1]}") for side in SIDES]
+    lengths = {bone: np.concatenate([np.linalg.norm(of(table, a) - of(table, b), axis=1) for a, b in both]) for bone, both in pairs.items()}
+    return {bone: float(np.nanmedian(each)) for bone, each in lengths.items() if np.isfinite(each).any()}
+
+
+def _rms(values: Array) -> float:
+    """Root mean square of what is known; not a number where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt((known**2).mean())) if len(known) else float("nan")

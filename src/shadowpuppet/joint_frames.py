@@ -1,0 +1,141 @@
+"""Joints to frames of the body's parts, and frames to angles: where a fit of poses begins.
+
+A limb's frame follows from two directions: its own, and that of the limb below it, which bends about one axis only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body import Body
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion import JointTable
+from shadowpuppet.plausibility import SIDES, across, middle, of, unit
+from shadowpuppet.skeleton import AXES, Dof
+
+STRAIGHT = 0.15
+"""Where the sine of a bend is under this, a limb's turn about itself is rather what it would be without any."""
+
+
+def guess(body: Body, table: JointTable) -> Array:
+    """Poses (T, D) near the joints of a table, each angle on the branch that its limits and the frames before and after it want.
+
+    What a frame does not show is taken over from frames near it.
+    """
+    skeleton, frames = body.skeleton, _frames(body, table)
+    poses = np.repeat(np.array([[dof.rest for dof in skeleton.dofs]]), len(table.times), axis=0)
+    pelvis = of(table, "pelvis") if "pelvis" in table.names else middle(table, "hip")
+    poses[:, skeleton.dof_indices(["root_x", "root_y", "root_z"])] = _filled(pelvis)
+    for joint in skeleton.joints:
+        dofs = [d for d, dof in enumerate(skeleton.dofs) if dof.joint == joint.name and dof.kind != "translation"]
+        if len(dofs) == 3 and joint.name in frames and _known(frames[joint.name]).any():
+            parent = np.eye(3) if joint.parent is None else frames[joint.parent]
+            relative = np.swapaxes(_filled(parent * np.ones((len(poses), 3, 3))), 1, 2) @ _filled(frames[joint.name])
+            poses[:, dofs] = _angles(relative, [skeleton.dofs[d] for d in dofs])
+    for side in SIDES:
+        for names in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
+            a, b, c = (of(table, f"{side}_{name}") for name in names)
+            bend = np.arccos(np.clip((unit(b - a) * unit(c - b)).sum(1), -1, 1))
+            if np.isfinite(bend).any():
+                poses[:, skeleton.dof_indices([f"{side}_{names[1]}_flexion"])[0]] = _filled(bend)
+    return skeleton.clamp(poses)
+
+
+def _frames(body: Body, table: JointTable) -> dict[str, Array]:
+    """Frames (T, 3, 3) of parts in the world: columns forward, left and up of a person who stands at zero."""
+    up = middle(table, "shoulder") - middle(table, "hip")
+    shoulders = unit(of(table, "left_shoulder") - of(table, "right_shoulder"))
+    frames = {"pelvis": _upright(across(table), up), "chest": _upright(shoulders, up)}
+    trunk = "chest" if "chest" in body.skeleton.joint_names else "pelvis"
+    if {"neck", "head"} <= set(table.names):
+        frames["head"] = _swing(frames[trunk], unit(of(table, "head") - of(table, "neck")), up=1)
+    for side in SIDES:
+        for names, parent, sign in ((("shoulder", "elbow", "wrist"), trunk, 1), (("hip", "knee", "ankle"), "pelvis", -1)):
+            a, b, c = (of(table, f"{side}_{name}") for name in names)
+            start = a if np.isfinite(a).any() else middle(table, names[0])
+            frames[f"{side}_{names[0]}"] = _limb(frames[parent], unit(b - start), sign * unit(c - b))
+    return frames
+
+
+def _upright(left: Array, up: Array) -> Array:
+    """Frames (T, 3, 3) with y along `left` (T, 3) and z as near to `up` as can be."""
+    x = unit(np.cross(left, up))
+    return np.stack([x, left, np.cross(x, left)], 2)
+
+
+def _swing(parent: Array, along: Array, up: int) -> Array:
+    """Parents' frames (T, 3, 3) turned the shortest way so that z (`up` 1), or -z (-1), points along unit vectors (T, 3)."""
+    z = up * parent[:, :, 2]
+    axis, cosine = np.cross(z, along), (z * along).sum(1)
+    K = np.zeros((len(along), 3, 3))
+    K[:, [2, 0, 1], [1, 2, 0]], K[:, [1, 2, 0], [2, 0, 1]] = axis, -axis
+    turn = np.eye(3) + K + K @ K / np.maximum(1 + cosine, 1e-3)[:, None, None]
+    return turn @ parent
+
+
+def _limb(parent: Array, along: Array, bend: Array) -> Array:
+    """Frames (T, 3, 3) of limbs along unit vectors (T, 3), whose lower halves bend toward +x; `bend` (T, 3): where these point."""
+    calm = _swing(parent, along, up=-1)[:, :, 0]
+    toward = np.where(np.isfinite(bend), bend, 0) - (np.where(np.isfinite(bend), bend, 0) * along).sum(1)[:, None] * along
+    x = toward + STRAIGHT**2 / (STRAIGHT + np.linalg.norm(toward, axis=1, keepdims=True)) * calm
+    x = unit(x - (x * along).sum(1)[:, None] * along)
+    return np.stack([x, np.cross(-along, x), -along], 2)
+
+
+def _angles(rotations: Array, dofs: list[Dof]) -> Array:
+    """Values (T, 3) of three DOF whose rotation is known (T, 3, 3), on the branch that limits and neighbours in time want."""
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(rotations)
+    low, high = np.array([dof.low for dof in dofs]), np.array([dof.high for dof in dofs])
+    if dofs[0].kind == "vector":
+        v = turns.as_rotvec()
+        other = v - 2 * np.pi * unit(np.where(np.linalg.norm(v, axis=1, keepdims=True) > 1e-9, v, [0, 0, 1e-9]))
+        return _branch(np.stack([v, other], 1), low, high, wraps=np.zeros(3, bool))
+    order = "".join("XYZ"[AXES[dof.axis][0]] for dof in dofs)
+    signs = np.array([AXES[dof.axis][1] for dof in dofs])
+    first = turns.as_euler(order)
+    both = np.stack([first, first * [1, -1, 1] + np.pi], 1) * signs
+    free = ~np.isfinite(low)
+    centre = np.where(free, 0.0, (np.where(free, 0, low) + np.where(free, 0, high)) / 2)
+    both = centre + (both - centre + np.pi) % (2 * np.pi) - np.pi
+    values = _branch(both, low, high, wraps=free)
+    values[:, free] = np.unwrap(values[:, free], axis=0)
+    return values
+
+
+def _branch(candidates: Array, low: Array, high: Array, wraps: Array) -> Array:
+    """Of candidates (T, K, 3) the path (T, 3) of least squared steps and squared excess over the limits (Viterbi 1967)."""
+    over = np.maximum(low - candidates, 0) + np.maximum(candidates - high, 0)
+    own = (np.where(np.isfinite(over), over, 0) ** 2).sum(2) + 1e-6 * (candidates**2).sum(2)
+    steps = candidates[1:, None, :] - candidates[:-1, :, None]
+    steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
+    between = (steps**2).sum(3)
+    cost, came = own[0], np.zeros(candidates.shape[:2], np.int64)
+    for t in range(1, len(candidates)):
+        total = cost[:, None] + between[t - 1]
+        came[t] = total.argmin(0)
+        cost = total.min(0) + own[t]
+    path = np.empty(len(candidates), np.int64)
+    path[-1] = cost.argmin()
+    for t in range(len(candidates) - 1, 0, -1):
+        path[t - 1] = came[t, path[t]]
+    return candidates[np.arange(len(path)), path]
+
+
+def _filled(values: Array) -> Array:
+    """Values (T, ...) with those of frames in which some are not known taken from the nearest frame in which all are."""
+    known = np.flatnonzero(_known(values))
+    if not len(known):
+        return np.broadcast_to(np.eye(3), values.shape) if values.shape[1:] == (3, 3) else np.zeros_like(values)
+    frames = np.arange(len(values))
+    at = np.clip(np.searchsorted(known, frames), 1, len(known) - 1) if len(known) > 1 else np.zeros(len(values), np.int64)
+    if len(known) > 1:
+        at = np.where(np.abs(known[at - 1] - frames) <= np.abs(known[at] - frames), at - 1, at)
+    return values[known[at]]
+
+
+def _known(values: Array) -> NDArray[np.bool_]:
+    """Frames (T,) of which all values (T, ...) are known."""
+    return np.asarray(np.isfinite(values).reshape(len(values), -1).all(1))

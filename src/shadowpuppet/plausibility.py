@@ -1,0 +1,113 @@
+"""Whether joints are a person's who stands in a world of metres with Z up: what is wrong is told before anything is fitted."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion import JointTable
+
+SIDES = ("left", "right")
+NEEDED = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "knee") for side in SIDES)
+"""Joints without which a pose of the whole body says little; and the pelvis or both hips."""
+TRUNK = (0.2, 0.8)
+"""What the distance from the hips to the shoulders can be, metres."""
+UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
+BENT = np.radians(25)
+"""A knee or elbow bent more than this shows which way it bends."""
+
+
+def check_person(table: JointTable, source: str = "joints") -> None:
+    """Raise a `ShadowPuppetError` where joints are missing, not in metres, upside down, or left and right have changed places.
+
+    Warns where the trunk lies level most of the time, as it seems to where Y is up.
+    """
+    missing = [name for name in NEEDED if name not in table.names]
+    if "pelvis" not in table.names and not {"left_hip", "right_hip"} <= set(table.names):
+        missing = ["pelvis (or left_hip and right_hip)", *missing]
+    if missing:
+        raise ShadowPuppetError(f"{source}: no joint {missing[0]}; needed are {choices(NEEDED)}, and pelvis or both hips; found: "
+                                f"{choices(table.names)}")
+    trunk = middle(table, "shoulder") - middle(table, "hip")
+    length = float(_median(np.linalg.norm(trunk, axis=1)))
+    if not np.isfinite(length):
+        raise ShadowPuppetError(f"{source}: found no frame in which hips and shoulders are known")
+    if not TRUNK[0] <= length <= TRUNK[1]:
+        units = [name for name, metres in UNITS.items() if TRUNK[0] <= length * metres <= TRUNK[1]]
+        raise ShadowPuppetError(f"{source}: found {length:.4g} from hips to shoulders, expected {TRUNK[0]:g} to {TRUNK[1]:g} metres" + (
+            f" (are these {' or '.join(units)}?)" if units else ""))
+    _check_upright(trunk, source)
+    _check_sides(table, trunk, source)
+
+
+def middle(table: JointTable, joint: str) -> Array:
+    """The middle of both sides' joints (T, 3), metres; of the hips, where a table has none, the pelvis."""
+    if joint == "hip" and not {"left_hip", "right_hip"} <= set(table.names):
+        return of(table, "pelvis")
+    return (of(table, f"left_{joint}") + of(table, f"right_{joint}")) / 2
+
+
+def of(table: JointTable, joint: str) -> Array:
+    """Places (T, 3) of a joint; not a number throughout where the table lacks it."""
+    return table.positions[:, table.names.index(joint)] if joint in table.names else np.full((len(table.times), 3), np.nan)
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) of length one; not a number for those of none."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def across(table: JointTable) -> Array:
+    """From right to left (T, 3), unit: along the hips, and along the shoulders where a table has none."""
+    hips = unit(of(table, "left_hip") - of(table, "right_hip"))
+    return np.where(np.isfinite(hips), hips, unit(of(table, "left_shoulder") - of(table, "right_shoulder")))
+
+
+def _check_upright(trunk: Array, source: str) -> None:
+    lean = float(_median(unit(trunk)[:, 2]))
+    if lean < -0.5:
+        raise ShadowPuppetError(f"{source}: found the shoulders under the hips most of the time, expected the world's Z up")
+    if lean < 0.3:
+        warnings.warn(f"{source}: the trunk lies level most of the time: is the world's Z up?", ShadowPuppetWarning, stacklevel=4)
+
+
+def _check_sides(table: JointTable, trunk: Array, source: str) -> None:
+    """Knees bend backward and elbows forward; both the other way round only in a mirror."""
+    shoulders = of(table, "left_shoulder") - of(table, "right_shoulder")
+    if {"left_hip", "right_hip"} <= set(table.names) and _median((across(table) * unit(shoulders)).sum(1)) < -0.3:
+        raise ShadowPuppetError(f"{source}: found the left shoulder over the right hip most of the time: have left and right changed "
+                                "places?")
+    ahead = np.cross(across(table), unit(trunk))
+    wrong, seen = _bends(table, ahead, ("hip", "knee", "ankle"), -1)
+    what = "knees bend forward"
+    if seen < 20:
+        wrong, seen = _bends(table, ahead, ("shoulder", "elbow", "wrist"), 1, hanging=-unit(trunk))
+        what = "the elbows of hanging arms bend backward"
+    if seen >= 20 and wrong > 0.7 * seen:
+        raise ShadowPuppetError(f"{source}: {what} in {wrong} of {seen} places where they are bent: have left and right changed places, "
+                                "or is the motion mirrored (an axis with the wrong sign)?")
+
+
+def _bends(table: JointTable, ahead: Array, chain: tuple[str, str, str], sign: int, hanging: Array | None = None) -> tuple[int, int]:
+    """In how many frames and sides a chain's middle joint is bent against its sign along `ahead` (T, 3), and in how many it is bent."""
+    wrong = seen = 0
+    for side in SIDES:
+        a, b, c = (of(table, f"{side}_{name}") for name in chain)
+        upper, lower = unit(b - a), unit(c - b)
+        along = (upper * lower).sum(1)
+        bent = along < np.cos(BENT)
+        if hanging is not None:
+            bent &= (upper * hanging).sum(1) > 0.7
+        beside = ((lower - along[:, None] * upper) * ahead).sum(1)
+        bent &= np.abs(beside) > 0.3 * np.sin(BENT)
+        wrong, seen = wrong + int((bent & (beside * sign < 0)).sum()), seen + int(bent.sum())
+    return wrong, seen
+
+
+def _median(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan
