@@ -47,7 +47,7 @@ def mirrored(skeleton: Skeleton, poses: np.ndarray) -> np.ndarray:
 # Counts and sizes -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "dofs", "parts"), [("anatomical", 32, 16), ("cylinders", 25, 10)])
+@pytest.mark.parametrize(("name", "dofs", "parts"), [("anatomical", 32, 17), ("cylinders", 25, 10)])
 def test_as_many_dof_and_parts_as_said_and_the_17_joints(name, dofs, parts):
     body = BODY[name]
     assert (len(body.skeleton.dofs), len(body.parts), limbs_of(body).parts) == (dofs, parts, body.parts)

@@ -59,7 +59,7 @@ CYLINDERS: Mapping[str, tuple[float, float]] = {
 }  # fmt: skip
 """The sizes of `cylinders`; each width is about the mean of those along the part in `ANATOMICAL`."""
 ANATOMICAL: Mapping[str, tuple[float, float]] = {
-    **BONES, "lumbar_height": (0.1355, 0.010), "thorax_height": (0.1725, 0.010), "foot_length": (0.153, 0.006), "toe_out": (0.018, 0.012),
+    **BONES, "lumbar_height": (0.152, 0.012), "thorax_height": (0.156, 0.012), "foot_length": (0.153, 0.006), "toe_out": (0.018, 0.012),
     "pelvis_width": (0.196, 0.015), "pelvis_depth": (0.143, 0.015), "waist_width": (0.180, 0.018), "waist_depth": (0.135, 0.018),
     "chest_width": (0.168, 0.014), "chest_depth": (0.145, 0.014), "shoulder_thickness": (0.062, 0.008), "neck_width": (0.0685, 0.006),
     "head_width": (0.0893, 0.004), "head_depth": (0.115, 0.005), "upper_arm_width": (0.0593, 0.007), "elbow_width": (0.0480, 0.005),

@@ -27,13 +27,15 @@ from shadowpuppet.whole_sizes import BoneSizes
 
 REACH = 0.1
 """A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""
-SMOOTH, REST, TWIST, NOD = 1e-4, 1e-5, 2e-4, 1e-2
-"""Pulls (m^2 / rad^2, beside the squared distances of joints, m^2): of an angle to the next frame's, to its rest, of a limb's turn about
-itself to none, of the head's."""
-KNOWN = 0.005
-"""By so many metres joints may stray in a frame before the proportions of the average person speak as loudly."""
+SMOOTH, TRUNK, REST, TWIST, CHEST, NOD = 3e-4, 1e-2, 1e-6, 1e-5, 1e-4, 1e-2
+"""Pulls (m^2 / rad^2, beside the squared distances of joints, m^2): of an angle to the next frame's, of the trunk's, which carry so much
+that it cannot turn suddenly; to its rest, of a limb's turn about itself to none, of the chest, of the head's turn."""
+KNOWN = 0.0015
+"""Joints may stray by so much (m) before the proportions of the average person are to be doubted."""
 HAND = 0.02
-"""Weight of the base of the fingers beside other joints: bodies have a rigid wrist, people do not."""
+"""Weight of the base of the fingers beside other joints."""
+RATE = 60.0
+"""The frame rate (frames/s) at which neighbours pull as said; less at a lower one, so that quick motion is slowed alike at any."""
 STEP, CHUNK = 1e-6, 500
 """Step of finite differences; frames that are differentiated at once."""
 
@@ -61,18 +63,22 @@ class FittedPoses:
 
     @property
     def residual(self) -> float:
-        """Root mean square of all distances, metres."""
-        return _rms(self.distances.ravel())
+        """Root mean square of all distances but the hands', metres: bodies have a rigid wrist, people do not."""
+        return _rms(self._counted.ravel())
 
     @property
     def by_joint(self) -> dict[str, float]:
-        """The same for each joint."""
+        """The same for each joint, the hands too."""
         return {name: _rms(column) for name, column in zip(self.joints.names, self.distances.T)}
 
     @property
     def by_frame(self) -> Array:
         """The same for each frame, of shape (T,)."""
-        return np.array([_rms(row) for row in self.distances])
+        return np.array([_rms(row) for row in self._counted])
+
+    @property
+    def _counted(self) -> Array:
+        return self.distances[:, [not name.endswith("_hand") for name in self.joints.names]]
 
 
 def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | None = None, source: str = "joints") -> FittedPoses:
@@ -114,10 +120,11 @@ class _Problem:
         dofs = make_body(body, sizes).skeleton.dofs
         self.rest = np.array([dof.rest for dof in dofs])
         self.pull = np.array([_pull(dof.name, dof.kind) for dof in dofs])
-        steps = np.diff(table.times)
-        self.smooth = SMOOTH * np.median(steps) / steps if len(steps) else steps
+        steps, slow = np.diff(table.times), [dof.name.startswith(("chest", "root_bow", "root_tilt")) for dof in dofs]
+        self.smooth = np.outer(1 / (RATE * steps) ** 2, np.where(slow, TRUNK, SMOOTH))
         self.mean, deviation = sizes.to_array()[self.free], np.array([shares_of(self.kind)[name][1] for name in free])
-        self.hold = (KNOWN / (deviation * stature_of(dict(zip(sizes.names(), sizes.to_array()))))) ** 2 if len(free) else np.zeros(0)
+        stature = stature_of(dict(zip(sizes.names(), sizes.to_array())))
+        self.hold = len(table.times) * (KNOWN / (deviation * stature)) ** 2 if len(free) else np.zeros(0)
 
     def body(self, values: Array) -> Body:
         """The body of sizes (all of them)."""
@@ -127,11 +134,11 @@ class _Problem:
         """What poses (T, D) and sizes cost, m^2."""
         squared = ((self._places(self.body(values), poses) - self.wanted) ** 2).sum(2)
         joints = (self.weight * squared / (1 + squared / REACH**2))[self.known].sum()
-        smooth = (self.smooth[:, None] * np.diff(poses, axis=0) ** 2).sum()
+        smooth = (self.smooth * np.diff(poses, axis=0) ** 2).sum()
         sizes = (self.hold * (values[self.free] - self.mean) ** 2).sum()
         return float(joints + smooth + sizes + (self.pull * (poses - self.rest) ** 2).sum())
 
-    def solve(self, poses: Array, values: Array, rounds: int = 60) -> tuple[Array, Array]:
+    def solve(self, poses: Array, values: Array, rounds: int = 40) -> tuple[Array, Array]:
         """Poses (T, D) and sizes of least cost near those given."""
         low, high = self.body(values).skeleton.limits
         least = np.where(np.isin(self.kind.names(), self.kind.offsets()), -0.2, LEAST)
@@ -149,7 +156,7 @@ class _Problem:
                     break
                 continue
             gain, poses, values, best, damping = best - cost, new_poses, new_values, cost, max(damping / 5, 1e-9)
-            if gain < 1e-5 * best + 1e-12:
+            if gain < 5e-5 * best + 1e-12:
                 break
             equations = self._equations(poses, values)
         return poses, values
@@ -178,14 +185,14 @@ class _Problem:
             K = np.stack([(self._places(other, poses[rows]) - at) / STEP for other in others], -1) if S else np.zeros((*at.shape, 0))
             r = (self.wanted[rows] - at) * self.known[rows, :, None]
             w = self.weight * self.known[rows] / (1 + (r**2).sum(2) / REACH**2) ** 2
-            J, K, r = (each.reshape(len(at), -1, each.shape[-1]) for each in (J, K, r[..., None]))
+            J, K, r = (each.reshape(len(at), 3 * at.shape[1], each.shape[-1]) for each in (J, K, r[..., None]))
             weighted = np.swapaxes(J * np.repeat(w, 3, axis=1)[..., None], 1, 2)
             A[rows], B[rows], g[rows] = weighted @ J, weighted @ K, (weighted @ r)[..., 0]
             flat = np.swapaxes(K * np.repeat(w, 3, axis=1)[..., None], 1, 2)
             C, h = C + (flat @ K).sum(0), h + (flat @ r).sum(0)[:, 0]
         A[:, np.arange(D), np.arange(D)] += self.pull
         g += self.pull * (self.rest - poses)
-        moved = self.smooth[:, None] * np.diff(poses, axis=0)
+        moved = self.smooth * np.diff(poses, axis=0)
         g[:-1] += moved
         g[1:] -= moved
         return _Linear(A, B, C, g, h)
@@ -203,6 +210,8 @@ def _pull(name: str, kind: str) -> float:
         return 0.0
     if name.startswith("head") and name.endswith(("_z", "_twist")):
         return NOD
+    if name.startswith("chest"):
+        return CHEST
     return TWIST if name.endswith(("shoulder_z", "hip_z", "_twist")) else REST
 
 
@@ -215,12 +224,12 @@ def _solved(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.
     """The step of poses (T, D) and sizes (S,): the band is solved for the poses, then what is left for the sizes (Schur complement)."""
     (T, D), S, free = equations.g.shape, len(equations.h), ~held
     A = equations.A * free[:, :, None] * free[:, None, :]
-    chain = np.zeros(T)
+    chain = np.zeros((T, D))
     chain[:-1] += smooth
     chain[1:] += smooth
-    A[:, np.arange(D), np.arange(D)] += np.where(held, 1.0, damping + chain[:, None])
+    A[:, np.arange(D), np.arange(D)] += np.where(held, 1.0, damping + chain)
     right = np.concatenate([equations.g[..., None], equations.B], 2) * free[..., None]
-    solved = _along(A, smooth[:, None] * (free[1:] & free[:-1]), right)
+    solved = _along(A, smooth * (free[1:] & free[:-1]), right)
     margin = (equations.B * free[..., None]).reshape(T * D, S)
     steps = solved.reshape(T * D, 1 + S)
     corner = equations.C + damping * np.eye(S) - margin.T @ steps[:, 1:]

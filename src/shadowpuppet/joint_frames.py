@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import SIDES, across, middle, of, unit
 from shadowpuppet.skeleton import AXES, Dof
 
 STRAIGHT = 0.15
 """Where the sine of a bend is under this, a limb's turn about itself is rather what it would be without any."""
+RETURN = 0.05
+"""How fast a straight limb turns back, a frame."""
+STOOP = 0.2
+"""Bend of the chest at first, rad."""
 
 
 def guess(body: Body, table: JointTable) -> Array:
@@ -47,7 +51,9 @@ def _frames(body: Body, table: JointTable) -> dict[str, Array]:
     up = middle(table, "shoulder") - middle(table, "hip")
     shoulders = unit(of(table, "left_shoulder") - of(table, "right_shoulder"))
     frames = {"pelvis": _upright(across(table), up), "chest": _upright(shoulders, up)}
-    trunk = "chest" if "chest" in body.skeleton.joint_names else "pelvis"
+    trunk = "pelvis"
+    if "chest" in body.skeleton.joint_names:  # a trunk that is short for its bones bends forward, not backward
+        trunk, frames["pelvis"] = "chest", frames["pelvis"] @ rotation_about([0, 1, 0], -STOOP)
     if {"neck", "head"} <= set(table.names):
         frames["head"] = _swing(frames[trunk], unit(of(table, "head") - of(table, "neck")), up=1)
     for side in SIDES:
@@ -75,11 +81,22 @@ def _swing(parent: Array, along: Array, up: int) -> Array:
 
 
 def _limb(parent: Array, along: Array, bend: Array) -> Array:
-    """Frames (T, 3, 3) of limbs along unit vectors (T, 3), whose lower halves bend toward +x; `bend` (T, 3): where these point."""
-    calm = _swing(parent, along, up=-1)[:, :, 0]
-    toward = np.where(np.isfinite(bend), bend, 0) - (np.where(np.isfinite(bend), bend, 0) * along).sum(1)[:, None] * along
-    x = toward + STRAIGHT**2 / (STRAIGHT + np.linalg.norm(toward, axis=1, keepdims=True)) * calm
-    x = unit(x - (x * along).sum(1)[:, None] * along)
+    """Frames (T, 3, 3) of limbs along unit vectors (T, 3), whose lower halves bend toward +x; `bend` (T, 3): where these point.
+
+    Where a limb is straight its frame goes with it from the frame before without turning about it, and slowly back to what the shortest way
+    from hanging gives: which that is changes suddenly where a limb points straight up.
+    """
+    bend = np.where(np.isfinite(bend), bend, 0)
+    across = bend - (bend * along).sum(1)[:, None] * along
+    calm = _swing(parent, along, up=-1)[:, :, 0] * (1 - (parent[:, :, 2] * along).sum(1)).clip(0, 1)[:, None]
+    x, local = np.empty_like(along), np.array([1.0, 0, 0])
+    for t in range(len(x)):
+        kept = parent[t] @ local
+        toward = across[t] + STRAIGHT**2 / (STRAIGHT + np.linalg.norm(across[t])) * (kept + RETURN * calm[t])
+        toward = toward - (toward @ along[t]) * along[t]
+        x[t] = toward / max(np.linalg.norm(toward), 1e-9)
+        if np.isfinite(x[t]).all():
+            local = parent[t].T @ x[t]
     return np.stack([x, np.cross(-along, x), -along], 2)
 
 
