@@ -42,19 +42,16 @@ def contenders(case: Around) -> dict[str, Contender]:
         "hull": Contender(case.run_hull),
         "forces": Contender(lambda: case.run_forces(FORCE_ITERATIONS), forces),
         "gauss_newton": Contender(lambda: case.run_gauss_newton(SOLVE_ITERATIONS), solved),
-        "naive_forces": Contender(_plain(case, _force)),
+        "naive_forces": Contender(_plain(case, naive_multi.move_by_forces)),
         "naive_gauss_newton": Contender(_plain(case, naive_multi.move_by_gauss_newton)),
     }
-
-
-def _force(*told: Any) -> Array:
-    return naive_multi.move_by_forces(*told, ForceSettings())
 
 
 def _plain(case: Around, move: Callable[..., Array]) -> Callable[[], Array]:
     """One particle and iteration of the plain version, on the same points."""
     surface, known = case.refiner.settings, case.surface
-    return lambda: move(case.body, case.poses[0], known.points, known.normals, known.weights, surface)
+    told = (ForceSettings(),) if move is naive_multi.move_by_forces else ()
+    return lambda: move(case.body, case.poses[0], known.points, known.normals, known.weights, surface, *told)
 
 
 def figures(raw: dict[str, Times]) -> dict[str, float]:

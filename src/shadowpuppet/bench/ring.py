@@ -80,7 +80,7 @@ class Around:
         """As many of the hull's points as there are to be, evenly taken; points there are too few of are taken again."""
         found = self.hull.points(self.seen)
         chosen = np.linspace(0, len(found.points), self.points, endpoint=False).astype(int)
-        return SurfacePoints(*(values[chosen] for values in found))
+        return SurfacePoints(found.points[chosen], found.normals[chosen], found.weights[chosen], found.cameras[chosen])
 
     @cached_property
     def cloud(self) -> Cloud:
