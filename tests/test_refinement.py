@@ -54,7 +54,7 @@ def test_gauss_newton_moves_a_pose_as_in_the_plain_version(seen):
     body, pose, *cloud = seen
     plain = naive.move_by_gauss_newton(body, pose, *cloud, replace(SURFACE, damping=0.3 * SURFACE.damping))
     assert naive.cost(body, plain, *cloud, SURFACE) < naive.cost(body, pose, *cloud, SURFACE)
-    found, costs = Refiner(body).gauss_newton(pose[None], ((make_cloud(*cloud), 1),), pose, np.full(len(pose), 1e-6))
+    found, costs = Refiner(body).gauss_newton(pose[None], ((make_cloud(*cloud), 1, SURFACE.tau),), pose, np.full(len(pose), 1e-6))
     np.testing.assert_allclose(found[0], plain, atol=2e-3)
     np.testing.assert_allclose(costs, naive.cost(body, found[0], *cloud, SURFACE), rtol=2e-4)
 
@@ -74,8 +74,8 @@ def test_the_order_of_points_and_poses_does_not_matter(seen, rng):
     order = rng.permutation(len(cloud[0]))
     refiner, held = Refiner(body), np.full(len(pose), 1e-6)
     poses = body.skeleton.clamp(pose + rng.normal(0, 0.05, (3, len(pose))))
-    together = refiner.gauss_newton(poses, ((make_cloud(*cloud), 3),), poses, held)[0]
-    shuffled = refiner.gauss_newton(poses[::-1], ((make_cloud(*(part[order] for part in cloud)), 3),), poses[::-1], held)[0]
+    together = refiner.gauss_newton(poses, ((make_cloud(*cloud), 3, SURFACE.tau),), poses, held)[0]
+    shuffled = refiner.gauss_newton(poses[::-1], ((make_cloud(*(part[order] for part in cloud)), 3, SURFACE.tau),), poses[::-1], held)[0]
     np.testing.assert_allclose(shuffled[::-1], together, atol=5e-3)
-    alone = [refiner.gauss_newton(one[None], ((make_cloud(*cloud), 3),), one, held)[0][0] for one in poses]
+    alone = [refiner.gauss_newton(one[None], ((make_cloud(*cloud), 3, SURFACE.tau),), one, held)[0][0] for one in poses]
     np.testing.assert_array_equal(together, alone)  # a pose does not know of the others
