@@ -8,29 +8,39 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.bench.mono import run_bench
+from shadowpuppet.bench.whole import run_bench
 from shadowpuppet.plots import plot_curves
-from shadowpuppet.tables import BENCHED
+from shadowpuppet.tables import BENCHED, BENCHED_SEVERAL
 
 PAGE = Path(__file__).parent / "speed.md"
 PICTURE = PAGE.parent / "assets" / "speed.png"
 PLACE = re.compile(r"(<!-- figures -->\n).*?(<!-- end of figures -->)", re.DOTALL)
 KEYS = {
-    "ratio_opencv_full": ("OpenCV's time over ours, all cards", ".1f"),
-    "ratio_opencv_arm": ("OpenCV's time over ours, an arm's stage", ".1f"),
-    "ratio_naive_frame": ("the naive filter's time over ours, a frame", ".0f"),
-    "ratio_boxes": ("boxes' time over cardbox's", ".2f"),
-    "step_fps": ("frames/s of the filter, Table I", ".0f"),
-    "default_fps": ("frames/s of the filter, default preset", ".0f"),
-    "chain_fps": ("frames/s from film to pose, default preset, one core", ".0f"),
-    "decode_ms": ("of which decoding, ms a frame", ".2f"),
-    "segment_ms": ("segmentation, ms a frame", ".2f"),
-    "track_ms": ("filter, ms a frame", ".2f"),
-    "write_ms": ("writing, ms a frame", ".2f"),
-    "peak_mb": ("memory at most, MB", ".0f"),
-    "growth_mb": ("memory's growth over the film, MB", ".1f"),
-    "compile_s": ("start to first pose, all kernels compiled anew, s", ".1f"),
-    "start_s": ("start to first pose, kernels there, s", ".1f"),
+    "mono.ratio_opencv_full": ("OpenCV's time over ours, all cards", ".1f"),
+    "mono.ratio_opencv_arm": ("OpenCV's time over ours, an arm's stage", ".1f"),
+    "mono.ratio_naive_frame": ("the naive filter's time over ours, a frame", ".0f"),
+    "mono.ratio_boxes": ("boxes' time over cardbox's", ".2f"),
+    "mono.step_fps": ("frames/s of the filter, Table I", ".0f"),
+    "mono.default_fps": ("frames/s of the filter, default preset", ".0f"),
+    "mono.chain_fps": ("frames/s from film to pose, default preset, one core", ".0f"),
+    "mono.decode_ms": ("of which decoding, ms a frame", ".2f"),
+    "mono.segment_ms": ("segmentation, ms a frame", ".2f"),
+    "mono.track_ms": ("filter, ms a frame", ".2f"),
+    "mono.write_ms": ("writing, ms a frame", ".2f"),
+    "mono.peak_mb": ("memory at most, MB", ".0f"),
+    "mono.growth_mb": ("memory's growth over the film, MB", ".1f"),
+    "mono.compile_s": ("start to first pose, all kernels compiled anew, s", ".1f"),
+    "mono.start_s": ("start to first pose, kernels there, s", ".1f"),
+    "multi.points": ("seven cameras: surface points of a frame", ".0f"),
+    "multi.hull_ms": ("visual hull, ms a frame", ".1f"),
+    "multi.force_us": ("forces, us a particle and iteration", ".1f"),
+    "multi.gauss_newton_us": ("Gauss-Newton, us a particle and iteration", ".1f"),
+    "multi.ratio_naive": ("plain NumPy's time over ours, forces", ".0f"),
+    "multi.ratio_naive_gauss_newton": ("the same, Gauss-Newton", ".0f"),
+    "multi.forces_fps": ("frames/s from masks, `hybrid` with forces, one core", ".0f"),
+    "multi.fps": ("frames/s from masks, default preset, one core", ".0f"),
+    "multi.chain_fps": ("frames/s from film to pose, default preset, two cores", ".0f"),
+    "multi.peak_mb": ("memory at most, MB", ".0f"),
 }
 
 
@@ -40,12 +50,12 @@ def tables(found: dict[str, Any]) -> str:
     lines = [f"{here['cpu']} ({here['llvm_cpu']}), {here['cores']} cores, {here['vectors']}; Python {here['python']}, "
              f"NumPy {here['numpy']}, Numba {here['numba']}, OpenCV {here['opencv-python-headless']}.",
              "", "| | median | least | |", "|---|---:|---:|---|"]
-    for key, name, scale, unit, _ in BENCHED:
+    for key, name, scale, unit, _ in (*BENCHED, *BENCHED_SEVERAL):
         lines.append(f"| {name.strip()} | {scale * raw[key]['median']:.3g} | {scale * raw[key]['least']:.3g} | {unit} |")
     lines += ["", "| key | what | |", "|---|---|---:|"]
     for key, (what, form) in KEYS.items():
-        if (value := found.get(f"mono.{key}")) is not None:
-            lines.append(f"| `mono.{key}` | {what} | {value:{form}} |")
+        if (value := found.get(key)) is not None:
+            lines.append(f"| `{key}` | {what} | {value:{form}} |")
     return "\n".join(lines) + "\n"
 
 

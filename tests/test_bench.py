@@ -12,9 +12,10 @@ import pytest
 import made
 from people import random_poses
 from shadowpuppet import cli, rasterize
-from shadowpuppet.bench import chain, curves, mono, naive
+from shadowpuppet.bench import chain, curves, mono, multi, naive, whole
 from shadowpuppet.bench.cases import Case, Follower
 from shadowpuppet.bench.files import check_plans, write_figures
+from shadowpuppet.bench.ring import Around
 from shadowpuppet.bench.rivals import OpenCV, one_thread
 from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.errors import ShadowPuppetError
@@ -25,6 +26,7 @@ from shadowpuppet.settings import make_settings
 
 ISSUED = ("particle_us", "arm_us", "ratio_opencv_full", "ratio_opencv_arm", "ratio_naive_frame", "ratio_boxes", "step_fps", "default_fps",
           "chain_fps", "peak_mb", "growth_mb")
+ISSUED_MULTI = ("hull_ms", "points", "force_us", "gauss_newton_us", "ratio_naive")
 compiled = pytest.mark.skipif(not hasattr(rasterize._compare, "signatures"), reason="kernels are not compiled")
 
 
@@ -119,7 +121,9 @@ def test_a_frame_is_hundreds_of_times_faster_than_the_naive_one():
 @pytest.fixture
 def tiny(monkeypatch):
     """All that `bench` does, in small."""
-    monkeypatch.setattr(mono, "FEW", 1)
+    for module in (mono, multi):
+        monkeypatch.setattr(module, "FEW", 1)
+    monkeypatch.setattr(multi, "Around", lambda **said: Around(**{"points": 100, "particles": 3} | said, size=(160, 120)))
     monkeypatch.setattr(chain, "long_recording", lambda folder, frames: made.make(folder))
 
 
@@ -130,7 +134,7 @@ def forbidden(monkeypatch):
     def begun(*_):
         raise AssertionError("the work has begun")
 
-    monkeypatch.setattr(mono, "run_bench", begun)
+    monkeypatch.setattr(whole, "run_bench", begun)
 
 
 def test_the_command_writes_all_figures(tiny, tmp_path, capsys):
@@ -139,13 +143,16 @@ def test_the_command_writes_all_figures(tiny, tmp_path, capsys):
     found = json.loads(file.read_text())
     for key in ISSUED:
         assert math.isfinite(found[f"mono.{key}"]), key
+    for key in ISSUED_MULTI:
+        assert math.isfinite(found[f"multi.{key}"]), key
     assert found["mono.chain_frames"] == made.FRAMES
     assert 20 < found["mono.peak_mb"] < 3000
     assert found["raw"]["particle"]["rounds"] == 1
     assert {"cpu", "cores", "vectors", "numba"} <= set(found["environment"])
     assert picture.read_bytes()[:4] == b"\x89PNG"
     out = capsys.readouterr().out
-    for said in ("OpenCV, its polygons ready-made", "frames/s at Table I", "film to pose", "grown by"):
+    for said in ("OpenCV, its polygons ready-made", "frames/s at Table I", "film to pose", "grown by", "seven cameras",
+                 "Gauss-Newton, a particle and iteration"):
         assert said in out
 
 

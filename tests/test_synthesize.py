@@ -30,6 +30,7 @@ from shadowpuppet.synthetic import (
     motions,
     named_specs,
     proving_ground,
+    proving_rings,
     read_spec,
     spec_from,
     spec_text,
@@ -86,6 +87,7 @@ specs = st.builds(
     body=st.builds(Mannequin.draw, st.integers(0, 999).map(np.random.default_rng)),
     motion=st.lists(gestures, min_size=1, max_size=3).map(tuple),
     cameras=st.lists(views, min_size=1, max_size=2).map(lambda some: tuple(replace(v, name=f"c{n}") for n, v in enumerate(some))),
+    training=st.one_of(st.none(), st.lists(gestures, max_size=2).map(tuple)),
     scene=scenes, rate=st.floats(1, 240), turn_deg=st.floats(-180, 180), still=st.floats(0, 3),
     seed=st.one_of(st.integers(0, 2**63 - 1), st.lists(st.integers(0, 2**40), min_size=1, max_size=3).map(tuple)),
 )  # fmt: skip
@@ -108,7 +110,7 @@ def test_a_spec_with_a_ring_comes_back(ring):
 def test_named_specs_are_theirs_by_name_and_can_be_written():
     named = named_specs()
     assert {"demo", "ring_walking", "man_reach"} <= set(named)
-    assert len(named) == 1 + len(proving_ground()) + len(around())
+    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(proving_rings())
     for name, spec in named.items():
         assert spec.name == name
         assert spec_from(tomllib.loads(spec_text(spec))) == spec
@@ -294,6 +296,22 @@ def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
     assert upper[0] == pytest.approx(upper[1], abs=1e-4)  # by the same body
     code, out, _ = shell("ring", "--camera", "cam2", "--initialization.rounds", 5, "--initialization.sweeps", 1, command="info")
     assert "cam2, 64 x 48" in out
+
+
+def test_training_motion_is_another_or_none_where_the_spec_says_so(tmp_path):
+    spec = replace(SMALL, cameras=(Viewpoint(),), ring=Ring(count=2, size=(48, 32)), rate=4, motion=gestures_from("squat 2"))
+    made = {}
+    for name, training in (("same", None), ("other", gestures_from("overhead 2.5")), ("none", ())):
+        wanted = replace(spec, training=training)
+        assert spec_from(tomllib.loads(spec_text(wanted))) == wanted
+        made[name] = make_recording(wanted, tmp_path / name)
+    assert made["none"].training is None
+    low = {name: read_joints(made[name].training).select(["pelvis"]).positions[..., 2].min() for name in ("same", "other")}
+    assert low["other"] - low["same"] > 0.1  # nobody squats
+    assert len(read_joints(made["other"].training).times) == len(read_joints(made["same"].training).times) + 2  # half a second more
+    truths = [one.truth.read_bytes() for one in made.values()]
+    assert truths[0] == truths[1] == truths[2]
+    assert make_recording(replace(spec, training=()), tmp_path / "same").training is None  # the old one is not taken for it
 
 
 def test_the_spec_shown_is_the_spec_made(shell, tmp_path):

@@ -23,6 +23,7 @@ from shadowpuppet.synthetic import (
     demo_spec,
     motions,
     proving_ground,
+    proving_rings,
     spec_from,
     synthesize,
 )
@@ -30,6 +31,7 @@ from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.kinematics import CHANNELS, SEGMENTS, pose
 from shadowpuppet.synthetic.mannequin import FRACTIONS, JOINTS, MEASURES
 from shadowpuppet.synthetic.parts import dressed
+from shadowpuppet.synthetic.performance import seconds_of
 from shadowpuppet.synthetic.recording import Studio, perform
 from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.synthetic.surface import GROUPS, Surface, ball
@@ -516,6 +518,20 @@ def test_the_proving_ground_is_varied_and_fixed():
     assert {c.fov_deg for c in cameras} >= {45, 75}
     assert min(c.pitch_deg for c in cameras) < 0 < max(c.pitch_deg for c in cameras)
     assert min(spec.body.stature for spec in specs) < 1.4 < 1.8 < max(spec.body.stature for spec in specs)
+
+
+def test_the_rings_of_the_proving_ground_are_varied_and_fixed():
+    specs = proving_rings()
+    assert len(specs) >= 10
+    assert len({spec.name for spec in specs}) == len(specs) == len({spec.seed for spec in specs})
+    assert specs == proving_rings()
+    assert {len(spec.views()) for spec in specs} == {3, 4, 5, 6, 7, 8}
+    used = {gesture.motion for spec in specs for gesture in spec.motion}
+    assert used >= {"walk", "jog", "box", "squat", "lift", "sit", "march", "jump", "bow_forward", "bend_aside", "wave_hands", "reach"}
+    assert {spec.training == () for spec in specs} == {spec.training is None for spec in specs} == {True, False}
+    assert all(spec.rate <= 60 and 4 <= seconds_of(spec.motion) <= 7 for spec in specs)
+    assert min(spec.body.stature for spec in specs) < 1.35 < 1.8 < max(spec.body.stature for spec in specs)
+    assert min(spec.body.girth for spec in specs) < 0.9 < 1.1 < max(spec.body.girth for spec in specs)
 
 
 def test_the_demo_shows_the_papers_motions_and_a_reach():

@@ -229,19 +229,19 @@ def settings(*, preset: str = "default") -> None:
 
 @app.command
 def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool = False, quiet: Quiet = False) -> None:
-    """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. About a minute.
+    """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
     Parameters
     ----------
     json
         File that gets all figures, by flat keys such as "mono.particle_us".
     picture
-        File that gets cost against particles, picture size and cards (.png, .pdf or .svg; needs matplotlib).
+        File that gets cost against particles, picture size, points and cameras (.png, .pdf or .svg; needs matplotlib).
     quick
         Fewer rounds, a shorter film, nothing compiled anew.
     """
     from shadowpuppet.bench.files import check_plans, write_figures
-    from shadowpuppet.bench.mono import run_bench
+    from shadowpuppet.bench.whole import run_bench
     from shadowpuppet.tables import bench_tables
     from shadowpuppet.terminal import show, terminal
 

@@ -56,7 +56,7 @@ def make_cloud(points: Array, normals: Array, weights: Array, origin: Array | No
     low, high = rows[:, :3].min(2), rows[:, :3].max(2)
     middle = (low + high) / 2
     radius = np.sqrt(((rows[:, :3] - middle[..., None]) ** 2).sum(1).max(1))
-    return Cloud(rows.reshape(groups, -1), np.concatenate([middle, radius[:, None]], 1), np.asarray(origin, float), weight)
+    return Cloud(rows.reshape(groups, 7 * LANES), np.concatenate([middle, radius[:, None]], 1), np.asarray(origin, float), weight)
 
 
 def _along_a_curve(points: Array, bits: int = 6, reach: float = 1.5) -> NDArray[np.int64]:

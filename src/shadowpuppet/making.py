@@ -23,7 +23,7 @@ def make_recording(spec: Spec, folder: str | Path, listener: Listener | None = N
     where a file of motion cannot be used.
     """
     folder, listener = Path(folder), listener or Listener()
-    for gesture in (*spec.motion, *(other.motion for other in spec.scene.bystanders)):
+    for gesture in (*spec.motion, *(spec.training or ()), *(other.motion for other in spec.scene.bystanders)):
         if gesture.file is not None:  # one that cannot be used is told before anything is removed
             perform(replace(spec, motion=(gesture,)), np.random.default_rng(0))
     clear(folder, force)

@@ -145,11 +145,13 @@ def _motions(spec: Spec) -> str:
 
 def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
     """How fast it is here."""
-    raw, here = found["raw"], found["environment"]
-    table = _table("time, at 320 x 240", ("", "median", "least", "", "times"), right=(1, 2, 4))
-    for key, name, scale, unit, ratio in BENCHED:
-        times = (f"{scale * raw[key][which]:.4g}" for which in ("median", "least"))
-        table.add_row(name, *times, unit, f"{found[ratio]:.3g}" if ratio else "")
+    here, tables = found["environment"], []
+    for title, rows_of in (("one camera, 320 x 240", BENCHED), ("seven cameras, 640 x 480", BENCHED_SEVERAL)):
+        table = _table(f"time, {title}", ("", "median", "least", "", "times"), right=(1, 2, 4))
+        for key, name, scale, unit, ratio in rows_of:
+            times = (f"{scale * found['raw'][key][which]:.4g}" for which in ("median", "least"))
+            table.add_row(name, *times, unit, f"{found[ratio]:.3g}" if ratio else "")
+        tables.append(table)
     stages = ", ".join(f"{name} {found[f'mono.{stage}_ms']:.1f}" for stage, name in CHAIN.items())
     rows = [("filter", f"{found['mono.step_fps']:.0f} frames/s at Table I, {found['mono.default_fps']:.0f} with the default preset"),
             ("film to pose", f"{found['mono.chain_fps']:.0f} frames/s, {found['mono.one_core']} (ms a frame: {stages})"),
@@ -160,7 +162,7 @@ def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
                                    "all kernels must be compiled"))
     rows.append(("machine", f"{here['cpu']}, {here['cores']} cores, {here['vectors']}, Python {here['python']}, Numba {here['numba']}, "
                             f"OpenCV {here['opencv-python-headless']}"))
-    return [table, pairs(rows)]
+    return [*tables, pairs(rows)]
 
 
 BENCHED = (
@@ -173,6 +175,13 @@ BENCHED = (
     ("step", "a frame of the filter at Table I", 1e3, "ms", ""),
     ("naive_frame", "  plain NumPy and Python", 1e3, "ms", "mono.ratio_naive_frame"),
     ("default", "a frame of the default filter", 1e3, "ms", ""),
+)
+BENCHED_SEVERAL = (
+    ("hull", "silhouettes to surface points", 1e3, "ms", ""),
+    ("forces", "simulated forces, a particle and iteration", 1e6, "us", ""),
+    ("naive_forces", "  plain NumPy", 1e6, "us", "multi.ratio_naive"),
+    ("gauss_newton", "Gauss-Newton, a particle and iteration", 1e6, "us", ""),
+    ("naive_gauss_newton", "  plain NumPy", 1e6, "us", "multi.ratio_naive_gauss_newton"),
 )
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
 

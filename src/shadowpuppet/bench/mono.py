@@ -12,7 +12,6 @@ from shadowpuppet.bench import naive
 from shadowpuppet.bench.cases import Case, Follower
 from shadowpuppet.bench.chain import measure_chain
 from shadowpuppet.bench.curves import curves
-from shadowpuppet.bench.machine import environment
 from shadowpuppet.bench.rivals import OpenCV, one_thread
 from shadowpuppet.bench.startup import start_times
 from shadowpuppet.bench.timing import Contender, Times, in_turns
@@ -27,8 +26,8 @@ NAIVE_PARTICLES = 2
 """As many of a stage's particles does the naive filter get; its time is scaled up to all, which it is proportional to."""
 
 
-def run_bench(quick: bool = False, listener: Listener | None = None, frames: int | None = None) -> dict[str, Any]:
-    """All figures by flat keys, with `environment`, `raw` (median, least and rounds of all that was timed, seconds a unit) and `curves`.
+def run_mono(quick: bool = False, listener: Listener | None = None, frames: int | None = None) -> dict[str, Any]:
+    """All `mono.*` figures by flat keys, with `raw` (median, least and rounds of all that was timed, seconds a unit) and `curves`.
 
     `quick`: fewer rounds, a shorter film, nothing compiled anew. Raises `ShadowPuppetError` where a part of it fails.
     """
@@ -45,8 +44,7 @@ def run_bench(quick: bool = False, listener: Listener | None = None, frames: int
     if not quick:
         listener.begin("compiling anew")
         out["mono.compile_s"], out["mono.start_s"] = start_times()
-    return {**out, "quick": quick, "environment": environment(), "raw": {name: times._asdict() for name, times in raw.items()},
-            "curves": drawn}
+    return {**out, "raw": {name: times._asdict() for name, times in raw.items()}, "curves": drawn}
 
 
 def contenders() -> dict[str, Contender]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shadowpuppet.synthetic.collection import around, demo_spec, named_specs, proving_ground
+from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, named_specs, proving_ground, proving_rings
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Bystander, Gesture, Scene, Spec, spec_from
@@ -27,9 +27,11 @@ __all__ = [
     "Spec",
     "Viewpoint",
     "around",
+    "demo_ring_spec",
     "demo_spec",
     "named_specs",
     "proving_ground",
+    "proving_rings",
     "read_spec",
     "spec_from",
     "spec_text",

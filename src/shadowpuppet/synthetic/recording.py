@@ -127,15 +127,16 @@ def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Calla
 def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
     """All that is no film: calibration, what is told of the subject, truth, and for several cameras motion to train with.
 
-    The training motion is a second performance of the same gestures by the same body, with another's chance.
+    The training motion is a second performance of the same gestures, or one of others, by the same body, with another's chance.
     """
     from shadowpuppet.io.calibration import write_calibration
 
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
     write_truth(folder / "truth", times, figure.joints, spec.rate)
-    if len(cameras) > 1 and not any(gesture.file for gesture in spec.motion):  # a file plays the same every time
-        again, rehearsal = perform(spec, rng)
+    own = spec.motion if spec.training is None else spec.training
+    if len(cameras) > 1 and own and not (own == spec.motion and any(gesture.file for gesture in own)):  # a file plays the same every time
+        again, rehearsal = perform(replace(spec, motion=own), rng)
         write_truth(folder / "training", again, rehearsal.joints, spec.rate)
 
 

@@ -126,6 +126,8 @@ class Spec:
     """The person."""
     motion: Annotated[tuple[Gesture, ...], Field(min_length=1)] = (Gesture(motion="wave_hands"),)
     """Gestures, one after another."""
+    training: tuple[Gesture, ...] | None = None
+    """With several cameras, gestures of the motion to learn from: left out, the same ones a second time; an empty list, there is none."""
     cameras: Annotated[tuple[Viewpoint, ...], Field(min_length=1)] = (Viewpoint(),)
     """One camera, or several."""
     ring: Ring | None = None

@@ -33,7 +33,8 @@ def _gestures(values: dict[str, Any]) -> list[dict[str, Any]]:
     """The tables of gestures in a spec's plain values, the bystanders', too; what is of another type is left to be told later."""
     scene = values.get("scene")
     others = scene.get("bystanders") if isinstance(scene, dict) else None
-    listed = [values.get("motion"), [one.get("motion") for one in others if isinstance(one, dict)] if isinstance(others, list) else None]
+    theirs = [one.get("motion") for one in others if isinstance(one, dict)] if isinstance(others, list) else None
+    listed = [values.get("motion"), values.get("training"), theirs]
     return [gesture for some in listed if isinstance(some, list) for gesture in some if isinstance(gesture, dict)]
 
 
