@@ -100,11 +100,10 @@ def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
                 if label[y + dy, x + dx]:
                     out[part, 8] += 1
                     continue
-                far, near = (y + OUTWARD * dy, x + OUTWARD * dx), (y - INWARD * dy, x - INWARD * dx)
-                if 0 <= min(far[0], near[0]) and max(far[0], near[0]) < height and 0 <= min(far[1], near[1]) and max(far[1], near[1]) < width:
+                v, u, b, a = y + OUTWARD * dy, x + OUTWARD * dx, y - INWARD * dy, x - INWARD * dx
+                if min(v, u, b, a) >= 0 and max(v, b) < height and max(u, a) < width:
                     out[part, 9] += 1
-                    out[part, 10] += planes[far[0], far[1], 0] / max(mean[far[0], far[1], 0], np.float32(1))
-                    out[part, 10] -= planes[near[0], near[1], 0] / max(mean[near[0], near[1], 0], np.float32(1))
+                    out[part, 10] += planes[v, u, 0] / max(mean[v, u, 0], np.float32(1)) - planes[b, a, 0] / max(mean[b, a, 0], np.float32(1))
             if inside == 4 and _deep(parts, row, column, part):
                 out[part, 1] += 1
                 out[part, 2] += light
