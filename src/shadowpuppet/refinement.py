@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
-from shadowpuppet.closest import LANES, Cloud, constants, measure, nearest, place_parts
+from shadowpuppet.closest import LANES, NUMBERS, Cloud, constants, measure, nearest, place_parts
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel, part, summing

@@ -48,7 +48,7 @@ def at_half_contrast(mask: Mask, contrast: Contrast, outline: Outline) -> Mask:
     """
     import cv2
 
-    inner = cv2.erode(mask, disc(outline.width), borderValue=1)
+    inner = np.asarray(cv2.erode(mask, disc(outline.width), borderValue=1), np.uint8)
     around = _around(mask, inner, contrast, outline.width)
     core = (inner > 0) & (contrast >= np.minimum(BLED * around, 2 * outline.least))
     rim = (cv2.dilate(mask, disc(REACH)) > 0) & (contrast >= np.maximum(HALF * around, outline.least))

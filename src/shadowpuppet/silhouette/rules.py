@@ -63,8 +63,9 @@ class KeyRule:
 
         within, label = cv2.inRange(planes, *self.surely_background), np.empty(planes.shape[:2], np.uint8)
         keyed, shadowed = np.array(KEYED[self.key], np.float32), np.array(SHADOWED[self.key], np.float32)
-        darkest, asked, weak, strong = map(np.float32, (self.darkest, asked, self.factor, CERTAIN * self.factor))
-        classify(planes, within, self.mean, self.inverse_sigma, keyed, shadowed, darkest, asked, weak, strong, label)
+        weak, strong = np.float32(self.factor), np.float32(CERTAIN * self.factor)
+        classify(planes, within, self.mean, self.inverse_sigma, keyed, shadowed, np.float32(self.darkest), np.float32(asked), weak, strong,
+                 label)
         return label
 
     @cached_property

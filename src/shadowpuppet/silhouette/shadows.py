@@ -43,18 +43,18 @@ def resolve(label: Mask, planes: Image, mean: Floats, inverse_sigma: Floats) -> 
     """
     import cv2
 
-    either = cv2.inRange(label, SHADED, SHADED)
-    firm = cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    either = np.asarray(cv2.inRange(label, SHADED, SHADED), np.uint8)
+    firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
     x, y, width, height = cv2.boundingRect(firm)
     label = label & ~either
     if width * height:
         window = slice(y, y + height), slice(x, x + width)
         number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-        limbs = _limbs(_sums(parts, number, label, y, x, planes, mean, inverse_sigma))
+        limbs = _limbs(_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma))
         if limbs.any():
             found = np.zeros_like(label)
-            found[window] = limbs[parts]
-            label |= cv2.dilate(found, np.ones((3, 3), np.uint8)) & (either >> 7)
+            found[window] = limbs[np.asarray(parts, np.intp)]
+            label |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
     return label
 
 
@@ -103,7 +103,8 @@ def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
                 v, u, b, a = y + OUTWARD * dy, x + OUTWARD * dx, y - INWARD * dy, x - INWARD * dx
                 if min(v, u, b, a) >= 0 and max(v, b) < height and max(u, a) < width:
                     out[part, 9] += 1
-                    out[part, 10] += planes[v, u, 0] / max(mean[v, u, 0], np.float32(1)) - planes[b, a, 0] / max(mean[b, a, 0], np.float32(1))
+                    out[part, 10] += planes[v, u, 0] / max(mean[v, u, 0], np.float32(1))
+                    out[part, 10] -= planes[b, a, 0] / max(mean[b, a, 0], np.float32(1))
             if inside == 4 and _deep(parts, row, column, part):
                 out[part, 1] += 1
                 out[part, 2] += light
