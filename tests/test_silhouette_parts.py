@@ -76,25 +76,29 @@ def test_a_single_picture_has_no_sigma(rng):
 def naive_labels(planes, mean, inverse_sigma, keyed, shadowed, darkest, weak, strong):
     centre = np.array([0, 128, 128])
     i, b = (planes - centre) * inverse_sigma, (mean - centre) * inverse_sigma
-    squared = ((i - b) ** 2 * keyed).sum(-1)
+    squared = plain = ((i - b) ** 2 * keyed).sum(-1)
     if darkest < 1:
         light = (i * b * shadowed).sum(-1) / np.maximum((b * b * shadowed).sum(-1), 1e-6)
         light = np.clip(light, darkest, 1)[..., None]
         squared = np.minimum(squared, ((i - light * b) ** 2 * shadowed).sum(-1))
-    return squared, np.uint8(squared >= weak**2) + np.uint8(squared >= strong**2)
+    return squared, plain, np.uint8(squared >= weak**2) + np.uint8(squared >= strong**2)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([(1, 0, 0), (0, 1, 1), (1, 1, 1)]), st.sampled_from([0.3, 0.5, 1.0]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(1, 0, 0), (0, 1, 1), (1, 1, 1)]), st.sampled_from([0.3, 0.5, 1.0]),
+       st.sampled_from([0.0, 0.8]))
 @settings(max_examples=20, deadline=None)
-def test_classify_is_its_naive_twin(seed, keyed, darkest):
+def test_classify_is_its_naive_twin(seed, keyed, darkest, asked):
     rng = np.random.default_rng(seed)
     planes = rng.integers(0, 256, (9, 7, 3), dtype=np.uint8)
     mean = np.clip(planes * rng.uniform(0.5, 1.5, (9, 7, 1)) + rng.normal(0, 4, planes.shape), 0, 255).astype(np.float32)
     inverse_sigma = (1 / rng.uniform(1, 4, planes.shape)).astype(np.float32)
     keyed, label = np.array(keyed, np.float32), np.empty((9, 7), np.uint8)
-    classify(planes, mean, inverse_sigma, keyed, np.ones(3, np.float32), np.float32(darkest), np.float32(2), np.float32(4), label)
-    squared, expected = naive_labels(planes, mean, inverse_sigma, keyed, np.ones(3), darkest, 2, 4)
-    clear = (np.abs(squared - 4) > 1e-2) & (np.abs(squared - 16) > 1e-2)
+    within = rng.random((9, 7)) < 0.3
+    classify(planes, within, mean, inverse_sigma, keyed, np.ones(3, np.float32), *map(np.float32, (darkest, asked, 2, 4)), label)
+    squared, plain, expected = naive_labels(planes, mean, inverse_sigma, keyed, np.ones(3), darkest, 2, 4)
+    expected[(squared < 4) & (plain >= 4) & (planes[..., 0] < asked * mean[..., 0]) & (darkest < 1)] = 3
+    expected[within] = 0
+    clear = (np.abs(squared - 4) > 1e-2) & (np.abs(squared - 16) > 1e-2) & (np.abs(plain - 4) > 1e-2)
     np.testing.assert_array_equal(label[clear], expected[clear])
 
 

@@ -23,6 +23,8 @@ LOOKED_AT = 1500
 """Frames of the film that a sample is taken from: a look must not take as long as the work."""
 RUNS, RUN = 10, 4
 """A sample's parts, spread over these frames, and the frames of each, which follow one another."""
+ROUNDING = 1e-6
+"""Seconds by which a time may be off for its last digits."""
 FIRST_SECONDS, FIRST = 8.0, 16
 """The film's first seconds, and how many of their frames are in a sample too."""
 
@@ -54,16 +56,30 @@ class Footage:
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
 
     def shots(self, ready: bool, strict: bool = True) -> Iterator[Shot]:
-        """The film's frames, with the ready silhouettes where asked for.
+        """The film's frames from the recording's time 0 on, with the ready silhouettes where asked for.
 
         Raises `SilhouetteError` where these end before it, or, if not `strict`, goes on without.
         """
         masks = iter(open_frames(self.view.masks, size=self.camera.size)) if ready and self.view.masks else None
+        start, end = self.view.start, self.recording.duration
         for n, frame in enumerate(self.film()):
-            mask = None if masks is None else next(masks, None)
+            mask, time = None if masks is None else next(masks, None), frame.time - start
             if masks is not None and mask is None and strict:
                 raise SilhouetteError(f"{self.view.masks}: found {n} silhouettes, expected one for each frame of {self.view.video}")
-            yield Shot(frame.time, frame.image, None if mask is None else mask.image)
+            if end is not None and time > end - ROUNDING:
+                return
+            if time > -ROUNDING:
+                yield Shot(max(time, 0.0), frame.image, None if mask is None else mask.image)
+
+    @property
+    def count(self) -> int | None:
+        """How many shots there are, by what the film says of itself; None where it does not."""
+        film = self.film()
+        if film.count is None or not np.isfinite(film.rate):
+            return film.count
+        first = int(np.ceil((self.view.start - ROUNDING) * film.rate))
+        last = film.count if self.recording.duration is None else int(np.ceil((self.view.start + self.recording.duration) * film.rate))
+        return max(min(last, film.count) - first, 0)
 
     def pictures(self, source: Path, what: str) -> Iterator[Image]:
         """Pictures of the same camera from another file. Raises `RecordingError` where they are not of its size."""
@@ -76,20 +92,30 @@ class Footage:
 
 def open_footage(path: str | Path, options: Options) -> Footage:
     """The film that is to be tracked. Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError`."""
+    recording = opened(path, options)
+    return footage_of(recording, _chosen(recording, options.camera), options)
+
+
+def opened(path: str | Path, options: Options) -> Recording:
+    """The recording, with what the options say of the person. Raises `RecordingError`, `CalibrationError` or `VideoError`."""
     fov = None if options.fov is None else float(np.radians(options.fov))
     recording = read_recording(path, fov=fov, calibration=options.calibration)
-    view = _chosen(recording, options.camera)
+    subject = recording.subject
+    return replace(recording, subject=replace(subject, height=options.height or subject.height,
+                                              distance=options.distance or subject.distance))
+
+
+def footage_of(recording: Recording, view: View, options: Options) -> Footage:
+    """One view of a recording, as the options want it. Raises `RecordingError` or `SettingsError` where it cannot be had."""
     if camera_number(view.video) is not None:
-        raise RecordingError(f"{path}: found a live camera, expected a film or a folder of pictures")
+        raise RecordingError(f"{recording.path}: found a live camera, expected a film or a folder of pictures")
     if options.background is not None:
         view = replace(view, background=options.background)
     if options.masks and view.masks is None:
-        raise RecordingError(f"{path}: no ready silhouettes in it, expected masks/{view.camera.name}.mkv or a folder of pictures "
+        raise RecordingError(f"{recording.path}: no ready silhouettes in it, expected masks/{view.camera.name}.mkv or a folder of pictures "
                              f"masks/{view.camera.name}/; leave --masks out to make them")
-    subject = recording.subject
-    subject = replace(subject, height=options.height or subject.height, distance=options.distance or subject.distance)
     camera = view.camera.resized(worked_size(view.camera.size, options.max_size))
-    return Footage(replace(recording, subject=subject), view, camera, region_of(options.region, view.camera, camera))
+    return Footage(recording, view, camera, region_of(options.region, view.camera, camera))
 
 
 def _chosen(recording: Recording, name: str | None) -> View:
@@ -158,7 +184,7 @@ class Sample:
 def take_sample(footage: Footage, need_masks: bool = False) -> Sample:
     """Go once through the film's first `LOOKED_AT` frames. Raises `SilhouetteError` where ready masks that are needed end before."""
     film = footage.film()
-    length = film.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
+    length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
     wanted = _spread(min(int(length), LOOKED_AT))
     runs: dict[int, list[Shot]] = {}
     first, times, next_first = list[Shot](), list[float](), 0.0

@@ -64,7 +64,7 @@ class Options:
     calibration: Path | None = None
     """Calibration in place of the recording's own."""
     camera: str | None = None
-    """The camera whose film is tracked, where the recording has several."""
+    """The camera whose film is tracked alone, where the recording has several; or some of them, with commas between, together."""
     background: Path | None = None
     """Picture or film of the empty scene in place of the recording's own."""
     masks: bool = False

@@ -46,6 +46,8 @@ class View:
     """The empty scene."""
     masks: Path | None = None
     """Ready silhouettes."""
+    start: float = 0.0
+    """Seconds of the film's own clock that are the recording's time 0; its frames before are left out."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Recording:
     training: Path | None = None
     rate: float | None = None
     """Frames/s that replace the times of the films; None: theirs count."""
+    duration: float | None = None
+    """Seconds that count, from time 0; None: to the films' ends."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:

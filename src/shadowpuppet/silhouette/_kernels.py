@@ -1,4 +1,4 @@
-"""Loops over pixels."""
+"""Loops over pixels. They let go of Python's lock: several cameras are segmented at once."""
 
 from __future__ import annotations
 
@@ -9,33 +9,39 @@ NEUTRAL = 128.0
 """Cr and Cb of a pixel without colour, 8 bit."""
 
 
-@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def classify(planes, mean, inverse_sigma, keyed, shadowed, darkest, weak, strong, label):
+@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, asked, weak, strong, label):
     """Label (H, W) pixels: 0 background, 1 differing by `weak` standard deviations, 2 by `strong`.
 
     `planes` uint8, `mean`, `inverse_sigma` float32, all of shape (H, W, 3): Y, Cr, Cb. The channels of `keyed` (3,), 0 or 1,
     are compared. Where the background, darkened to no less than `darkest` (1: not at all), explains the channels of `shadowed`
-    (3,), the pixel is background.
+    (3,), the pixel is background, and so it is where `within` (H, W) is not 0; but label 3 says that it has less than `asked` of the
+    background's brightness.
     """
     weak, strong, centre = weak * weak, strong * strong, np.float32(NEUTRAL)
     for y in range(planes.shape[0]):
         for x in range(planes.shape[1]):
+            if within[y, x]:
+                label[y, x] = 0
+                continue
             s0, s1, s2 = inverse_sigma[y, x, 0], inverse_sigma[y, x, 1], inverse_sigma[y, x, 2]
             b0, b1, b2 = mean[y, x, 0] * s0, (mean[y, x, 1] - centre) * s1, (mean[y, x, 2] - centre) * s2
             i0 = np.float32(planes[y, x, 0]) * s0
             i1, i2 = (np.float32(planes[y, x, 1]) - centre) * s1, (np.float32(planes[y, x, 2]) - centre) * s2
             d0, d1, d2 = i0 - b0, i1 - b1, i2 - b2
+            dark = False
             squared = keyed[0] * d0 * d0 + keyed[1] * d1 * d1 + keyed[2] * d2 * d2
             if squared >= weak and darkest < 1:
                 own = shadowed[0] * b0 * b0 + shadowed[1] * b1 * b1 + shadowed[2] * b2 * b2
                 shared = shadowed[0] * i0 * b0 + shadowed[1] * i1 * b1 + shadowed[2] * i2 * b2
                 light = min(max(shared / max(own, np.float32(1e-6)), darkest), np.float32(1))
                 d0, d1, d2 = i0 - light * b0, i1 - light * b1, i2 - light * b2
+                dark = np.float32(planes[y, x, 0]) < asked * mean[y, x, 0]
                 squared = min(squared, shadowed[0] * d0 * d0 + shadowed[1] * d1 * d1 + shadowed[2] * d2 * d2)
-            label[y, x] = np.uint8(squared >= weak) + np.uint8(squared >= strong)
+            label[y, x] = np.uint8(squared >= weak) + np.uint8(squared >= strong) if squared >= weak or not dark else np.uint8(3)
 
 
-@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def contrast(planes, mean, seen, out):
     """Euclidean difference (H, W), grey levels, of `planes` uint8 and `mean` float32 (H, W, 3) in the channels of `seen` (3,)."""
     for y in range(planes.shape[0]):
@@ -46,7 +52,7 @@ def contrast(planes, mean, seen, out):
             out[y, x] = np.sqrt(seen[0] * d0 * d0 + seen[1] * d1 * d1 + seen[2] * d2 * d2)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def far_from_samples(image, samples, squared_radius, needed, out):
     """Mark pixels (H, W) of an image (H, W, C) that fewer than `needed` of the samples (N, H, W, C) are near to, all uint8."""
     for y in range(image.shape[0]):

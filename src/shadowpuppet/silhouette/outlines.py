@@ -15,6 +15,8 @@ Contrast = NDArray[np.float32]
 
 HALF = 0.5
 """Share of the contrast around it that a pixel on the outline must have: one that the person covers by half has half of it."""
+AROUND = 2
+"""How much farther (pixels) than the outline is wide the contrast around a pixel is taken from."""
 BLED = 0.3
 """Share of the contrast around it below which a pixel inside is colour that compression bled over a narrow gap."""
 FULL = 0.7
@@ -46,11 +48,25 @@ def at_half_contrast(mask: Mask, contrast: Contrast, outline: Outline) -> Mask:
     """
     import cv2
 
-    around = cv2.dilate(contrast * mask, np.ones((2 * outline.width + 1, 2 * outline.width + 1), np.uint8))
-    core = (cv2.erode(mask, disc(outline.width), borderValue=1) > 0) & (contrast >= np.minimum(BLED * around, 2 * outline.least))
+    inner = np.asarray(cv2.erode(mask, disc(outline.width), borderValue=1), np.uint8)
+    around = _around(mask, inner, contrast, outline.width)
+    core = (inner > 0) & (contrast >= np.minimum(BLED * around, 2 * outline.least))
     rim = (cv2.dilate(mask, disc(REACH)) > 0) & (contrast >= np.maximum(HALF * around, outline.least))
     found = (core | rim).astype(np.uint8)
     return np.asarray(cv2.medianBlur(found, 3), np.uint8) | (found & (contrast > FULL * around))
+
+
+def _around(mask: Mask, inner: Mask, contrast: Contrast, width: int) -> Contrast:
+    """What contrast the person has near each pixel: the mean over the mask's inner part, or the greatest where there is none.
+
+    The greatest alone would take an arm for the blurred outline of a brighter shirt beside it.
+    """
+    import cv2
+
+    side = 2 * (width + AROUND) + 1
+    total, count = (cv2.boxFilter(values, cv2.CV_32F, (side, side), normalize=False) for values in (contrast * inner, inner))
+    greatest = cv2.dilate(contrast * mask, np.ones((2 * width + 1, 2 * width + 1), np.uint8))
+    return np.where(count > 0.5, np.minimum(total / np.maximum(count, 1), greatest), greatest)
 
 
 def outline_width(people: Iterable[tuple[Mask, Contrast]]) -> int:

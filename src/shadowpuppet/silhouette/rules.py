@@ -6,6 +6,7 @@ Each is called with a picture and labels its pixels: 0 background, 1 perhaps a p
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ NEAR = 20
 """Grey levels within which a pixel is near to a sample of the background (OpenCV's dist2Threshold is its square)..."""
 NEEDED = 2
 """... and how many samples it must be near to."""
+ROUNDED = 1 - 1e-4
+"""Of a threshold, what is on its safe side whatever single precision does."""
 SAMPLES = 7
 """Samples kept, to twice as many."""
 
@@ -42,17 +45,36 @@ class KeyRule:
 
     def __call__(self, image: Image) -> Mask:
         """Labels (H, W) of a picture (H, W, 3) or (H, W)."""
-        return self.labels(smoothed(to_planes(image)))
+        from shadowpuppet.silhouette.shadows import ASKED, resolve
 
-    def labels(self, planes: Image) -> Mask:
-        """Labels (H, W) of smoothed Y, Cr, Cb (H, W, 3)."""
+        planes = smoothed(to_planes(image))
+        if self.darkest < 1 and SHADOWED[self.key][0]:
+            return resolve(self.labels(planes, ASKED), planes, self.mean, self.inverse_sigma)
+        return self.labels(planes)
+
+    def labels(self, planes: Image, asked: float = 0.0) -> Mask:
+        """Labels (H, W) of smoothed Y, Cr, Cb (H, W, 3), pixel by pixel.
+
+        3 is that of pixels that may be in shadow and have less than `asked` of the background's brightness: a person's, too, have.
+        """
+        import cv2
+
         from shadowpuppet.silhouette._kernels import classify
 
-        label = np.empty(planes.shape[:2], np.uint8)
+        within, label = cv2.inRange(planes, *self.surely_background), np.empty(planes.shape[:2], np.uint8)
         keyed, shadowed = np.array(KEYED[self.key], np.float32), np.array(SHADOWED[self.key], np.float32)
         weak, strong = np.float32(self.factor), np.float32(CERTAIN * self.factor)
-        classify(planes, self.mean, self.inverse_sigma, keyed, shadowed, np.float32(self.darkest), weak, strong, label)
+        classify(planes, within, self.mean, self.inverse_sigma, keyed, shadowed, np.float32(self.darkest), np.float32(asked), weak, strong,
+                 label)
         return label
+
+    @cached_property
+    def surely_background(self) -> tuple[Image, Image]:
+        """Least and greatest Y, Cr, Cb (H, W, 3) of a box within which no pixel can be labelled: most are told at once."""
+        keyed = np.array(KEYED[self.key], np.float32)
+        reach = np.where(keyed > 0, ROUNDED * self.factor / (self.inverse_sigma * np.sqrt(keyed.sum())), np.float32(256))
+        lowest, highest = np.ceil(self.mean - reach), np.floor(self.mean + reach)
+        return np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,124 @@
+"""Dark skin or clothes before a background of the same hue, told from that background in shadow.
+
+Pixel by pixel they are alike: less light, the same colour. Part by part they are not. A limb hangs broadly together with the rest of the
+person, ends at an edge as sharp as the film shows edges, and is shaded as round things are, or slightly of another hue; a shadow fades
+out, touches the person at the feet, or lies evenly on what it falls on.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numba
+import numpy as np
+
+if TYPE_CHECKING:
+    from shadowpuppet.silhouette.background import Floats, Image
+    from shadowpuppet.silhouette.outlines import Mask
+
+SHADED = 3
+"""The label of pixels that may be either."""
+ASKED = 0.92
+"""Share of its light that a background must have lost some of for the question to be asked: shadows' faint borders have more."""
+LEAST = 12
+"""Pixels that a part must have; smaller ones are shadow, and closed or filled if they lie in a person."""
+DARK = 0.8
+"""Share of the light that a limb has at most. Soft shadows in well-lit rooms leave more."""
+NARROW, BROAD, ENCLOSED = 0.1, 0.35, 0.7
+"""Share of a limb's edge that lies along the rest of the person: as that of a head at the neck; as that of most; and from which on nothing
+is asked of the rest of the edge."""
+SHARP, SURELY_SHARP = 0.3, 0.5
+"""Share of the lost light that is there again across a sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
+EVEN, NEUTRAL, UNEVEN = 0.6, 0.4, 1.0
+"""Standard deviation of brightness, and difference of hue, both over the standard deviation assumed, under which a part is only
+background with less light; and the deviation from which on it surely is not."""
+OUTWARD, INWARD = 2, 1
+"""Pixels from an edge between which light is compared across it."""
+
+
+def resolve(label: Mask, planes: Image, mean: Floats, inverse_sigma: Floats) -> Mask:
+    """Labels (H, W) in which those that are `SHADED` have become 1, a person's perhaps, or 0, background.
+
+    `planes`, `mean` and `inverse_sigma` are (H, W, 3): smoothed Y, Cr, Cb, the background's, and one over its standard deviation.
+    """
+    import cv2
+
+    either = np.asarray(cv2.inRange(label, SHADED, SHADED), np.uint8)
+    firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
+    x, y, width, height = cv2.boundingRect(firm)
+    label = label & ~either
+    if width * height:
+        window = slice(y, y + height), slice(x, x + width)
+        number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
+        limbs = _limbs(_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma))
+        if limbs.any():
+            found = np.zeros_like(label)
+            found[window] = limbs[np.asarray(parts, np.intp)]
+            label |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
+    return label
+
+
+def _limbs(sums: np.ndarray) -> Mask:
+    """Which of the parts (K, 11) that `_sums` measured are a person's."""
+    size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
+    inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
+    light, touching = light / inner, along / edge
+    spread = np.sqrt(np.maximum(square / inner - light**2, 0)) * sigma / inner
+    sharpness = across / open_edge / np.maximum(1 - light, 1e-3)
+    shaded = (spread >= EVEN) | (np.hypot(cr, cb) / inner >= NEUTRAL)
+    joined = (touching >= ENCLOSED) | ((touching >= BROAD) & (sharpness >= SHARP))
+    alone = (touching >= NARROW) & (sharpness >= SURELY_SHARP) & (spread >= UNEVEN)
+    return ((size >= LEAST) & (light <= DARK) & ((shaded & joined) | alone)).astype(np.uint8)
+
+
+@numba.njit(cache=True, nogil=True)
+def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
+    """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 11).
+
+    Pixels; and of those well within a part: their number, light (the share of the background's brightness), its square, what colour differs
+    from the background in that light (Cr, Cb, in standard deviations), and the background's brightness in standard deviations. Sides
+    of pixels on the edge; and of those: along the person; others; and how much more light there is across these.
+    """
+    out = np.zeros((number, 11))
+    height, width = label.shape
+    for row in range(parts.shape[0]):
+        for column in range(parts.shape[1]):
+            part = parts[row, column]
+            if part == 0:
+                continue
+            y, x, inside = row + top, column + left, 0
+            light = planes[y, x, 0] / max(mean[y, x, 0], np.float32(1))
+            out[part, 0] += 1
+            for dy, dx in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                v, u = row + dy, column + dx
+                if 0 <= v < parts.shape[0] and 0 <= u < parts.shape[1] and parts[v, u] == part:
+                    inside += 1
+                    continue
+                if not (0 <= y + dy < height and 0 <= x + dx < width):
+                    continue
+                out[part, 7] += 1
+                if label[y + dy, x + dx]:
+                    out[part, 8] += 1
+                    continue
+                v, u, b, a = y + OUTWARD * dy, x + OUTWARD * dx, y - INWARD * dy, x - INWARD * dx
+                if min(v, u, b, a) >= 0 and max(v, b) < height and max(u, a) < width:
+                    out[part, 9] += 1
+                    out[part, 10] += planes[v, u, 0] / max(mean[v, u, 0], np.float32(1))
+                    out[part, 10] -= planes[b, a, 0] / max(mean[b, a, 0], np.float32(1))
+            if inside == 4 and _deep(parts, row, column, part):
+                out[part, 1] += 1
+                out[part, 2] += light
+                out[part, 3] += light * light
+                for c in range(1, 3):
+                    out[part, 3 + c] += (planes[y, x, c] - 128.0 - light * (mean[y, x, c] - 128.0)) * inverse_sigma[y, x, c]
+                out[part, 6] += mean[y, x, 0] * inverse_sigma[y, x, 0]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _deep(parts, row, column, part):
+    """Whether a pixel's neighbours but one are of its part, too: nearer to the edge its light is blurred with that beyond."""
+    if row < 2 or column < 2 or row + 2 >= parts.shape[0] or column + 2 >= parts.shape[1]:
+        return False
+    return (parts[row - 2, column] == part and parts[row + 2, column] == part and parts[row, column - 2] == part
+            and parts[row, column + 2] == part)
