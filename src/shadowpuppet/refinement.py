@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
-from shadowpuppet.closest import LANES, NUMBERS, Cloud, constants, measure, nearest, place_parts
+from shadowpuppet.closest import LANES, Cloud, constants, measure, nearest, place_parts
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel, part, summing
@@ -44,39 +44,38 @@ class Refiner:
                       np.zeros((S, SUMS * LANES), np.float32), np.zeros((J, SUMS)))
         self._system = np.zeros((D, D)), np.zeros((D, D)), np.zeros((3, max(D, 4)))
 
-    def costs(self, poses: Array, cloud: Cloud) -> Array:
-        """D of eq. 31 for poses (N, D): mean over the points of min(d^2, tau^2), m^2, of shape (N,)."""
+    def costs(self, poses: Array, cloud: Cloud, tau: float | None = None) -> Array:
+        """D of eq. 31 for poses (N, D): mean over the points of min(d^2, tau^2), m^2, of shape (N,). `tau`: another than the settings'."""
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses))
-        _costs(poses, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers, self._which(cloud), self._room, out)
+        _costs(poses, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud), self._room,
+               out)
         return out / max(cloud.total, 1e-9)
 
-    def gauss_newton(self, poses: Array, clouds: tuple[tuple[Cloud, int, float], ...], centre: Array, pull: Array) -> tuple[Array, Array]:
-        """Better poses (N, D) and their costs (N,), those of `costs` on the last cloud: damped (Levenberg-Marquardt), robust, within limits.
+    def gauss_newton(self, poses: Array, clouds: tuple[tuple[Cloud, int, float], ...], centre: Array, pull: Array,
+                     damping: float = 0.03) -> Array:
+        """Better poses (N, D): damped (Levenberg-Marquardt), robust, within limits.
 
         `clouds`: surface points and how many iterations to take on them, a few points first. `pull` (D,): weight of the squared distance
         from `centre` (N or 1, D) beside the mean squared distance of the points; it decides what these do not see.
         """
         poses = self.body.skeleton.checked(poses).copy()
-        costs, centre = np.zeros(len(poses)), np.ascontiguousarray(np.atleast_2d(centre), float)
+        centre = np.ascontiguousarray(np.atleast_2d(centre), float)
         for cloud, iterations, tau in clouds:
             _gauss_newton(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
-                          max(cloud.total, 1e-9), (np.float32(self.settings.epsilon), np.float32(tau)), self.settings.damping, iterations, self._which(cloud), self._room,
-                          self._system, costs)
-        return poses, costs
+                          max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room, self._system)
+        return poses
 
-    def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> tuple[Array, Array]:
-        """Poses (N, D) after some iterations of simulated force and moment (eqs. 32-41), within limits, and their costs (N,)."""
+    def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
+        """Poses (N, D) after some iterations of simulated force and moment (eqs. 32-41), within limits."""
         poses = self.body.skeleton.checked(poses).copy()
         mode = FORCES + ROBUST * settings.robust + MODULATED * settings.modulated
         gains = settings.translation, settings.rotation
         _forces(poses, mode, settings.hierarchical, gains, settings.iterations, self._chain, self._limbs, cloud.rows, cloud.spheres,
-                cloud.origin, self._numbers, self._which(cloud), self._room, self._system[2])
-        return poses, self.costs(poses, cloud)
+                cloud.origin, self._numbers(), self._which(cloud), self._room, self._system[2])
+        return poses
 
-    @property
-    def _numbers(self) -> tuple:
-        s = self.settings
-        return np.float32(s.epsilon), np.float32(s.tau)
+    def _numbers(self, tau: float | None = None) -> tuple[np.float32, np.float32]:
+        return np.float32(self.settings.epsilon), np.float32(self.settings.tau if tau is None else tau)
 
     @staticmethod
     def _which(cloud: Cloud) -> NDArray[np.float32]:
@@ -255,23 +254,22 @@ def _solve(A, b):  # pragma: no cover
 
 @kernel
 def _gauss_newton(poses, centre, pull, chain, limbs, rows, spheres, origin, points, numbers, damping, iterations, which, room,
-                  system, costs):  # pragma: no cover
-    """See `Refiner.gauss_newton`; `poses` and `costs` are written over."""
+                  system):  # pragma: no cover
+    """See `Refiner.gauss_newton`; `poses` is written over."""
     T, screws, work, sums = room[1], room[2], room[3], room[6]
     H, A, vectors = system
     D = pull.size
     g, best, step = vectors[0, :D], vectors[1, :D], vectors[2, :D]
     for n in range(poses.shape[0]):
         pose, about = poses[n], centre[min(n, centre.shape[0] - 1)]
-        least, known, damp = np.inf, 0.0, damping
+        least, damp = np.inf, damping
         for turn in range(iterations + 1):
             place_one(pose, chain, T, screws, work)
-            cost = _sweep(EQUATIONS if turn < iterations else COST, T, limbs, rows, spheres, origin, numbers, which, room) / points
-            held = cost
+            held = _sweep(EQUATIONS if turn < iterations else COST, T, limbs, rows, spheres, origin, numbers, which, room) / points
             for d in range(D):
                 held += pull[d] * (pose[d] - about[d]) ** 2
             if held <= least:
-                least, known = held, cost
+                least = held
                 for d in range(D):
                     best[d] = pose[d]
                 damp *= 0.3
@@ -301,7 +299,6 @@ def _gauss_newton(poses, centre, pull, chain, limbs, rows, spheres, origin, poin
                 pose[d] = min(max(best[d] + move, chain.low[d]), chain.high[d])
         for d in range(D):
             pose[d] = best[d]
-        costs[n] = known
 
 
 @summing

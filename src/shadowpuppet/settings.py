@@ -235,12 +235,30 @@ class HullSettings:
 class SurfaceSettings:
     """How far surface points are from a body (Ni 2008, eqs. 29-31). The paper gives no values."""
 
-    epsilon: Annotated[float, Field(ge=0, lt=1)] = 0.3
-    """How much more a distance counts where the normals disagree: by the factor 1 - epsilon cos."""
-    tau: Positive = 0.06
+    epsilon: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """How much less a distance counts where the normals agree: by the factor 1 - epsilon cos."""
+    tau: Positive = 0.05
     """Distance (m) beyond which a point counts no more."""
+
+
+@checked
+class GaussNewtonSettings:
+    """Refinement by damped Gauss-Newton on the distances to tangent planes."""
+
+    coarse: Annotated[int, Field(ge=0, le=100)] = 4
+    """Iterations on some of the points."""
+    fine: Annotated[int, Field(ge=0, le=100)] = 3
+    """Iterations on all of them, after that."""
+    share: Annotated[int, Field(ge=1, le=100)] = 3
+    """Every so many-th point is one of the some."""
+    coarse_tau: Positive = 0.06
+    """Distance (m) at which a point counts a quarter, in the coarse iterations."""
+    fine_tau: Positive = 0.04
+    """The same in the fine ones."""
     damping: Positive = 0.03
-    """Share of its own curvature by which each DOF is held back at first, in Gauss-Newton."""
+    """Share of its own curvature by which each DOF is held back at first."""
+    pull: NonNegative = 1e-5
+    """Pull to the last pose (m^2 of mean square distance for each rad^2 or m^2): it decides what the points do not tell."""
 
 
 @checked
@@ -259,3 +277,65 @@ class ForceSettings:
     """Whether a force is bounded."""
     hierarchical: bool = True
     """Whether a joint feels all that hangs on it, or only its own part."""
+
+
+@checked
+class MultiviewSettings:
+    """The tracker of several cameras (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
+
+    body: Literal["anatomical", "cylinders"] = "anatomical"
+    """The body's model."""
+    method: Literal["hybrid", "image_force", "particle_filter"] = "hybrid"
+    """Particles that are refined, one that is refined from the last pose, or particles alone (Table II)."""
+    refinement: Literal["gauss_newton", "forces"] = "gauss_newton"
+    """How poses are refined."""
+    particles: Annotated[int, Field(ge=1, le=1_000_000)] = 16
+    """Particles, N."""
+    resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
+    """How particles are selected by their weights."""
+    defensive: Share = 0.5
+    """Share of proposals that are the last poses with noise, beside those of the motion prior: what that does not know is found by them."""
+    keep: Share = 0.5
+    """Share of what the prior's subspace cannot hold that a proposal keeps."""
+    sigma_rotation: Positive = 0.15
+    """Noise of angles in defensive proposals (rad)."""
+    sigma_translation: Positive = 0.01
+    """Noise of the place (m)."""
+    sigma_heading: Positive = 0.05
+    """Noise of the heading (rad)."""
+    velocity: Share = 0.0
+    """Share of the last frame's motion of place and heading with which proposals move on."""
+    sigma_cost: Positive = 0.003
+    """A pose worse than the best by its square (m^2) weighs 1/e (eq. 29)."""
+    silhouettes: NonNegative = 0.002
+    """Weight of the share of pixels in which drawn body and silhouettes differ (m^2), beside the distance of the surface points."""
+    cycles: Annotated[int, Field(ge=1, le=100)] = 1
+    """Estimation cycles a frame, each with `cooling` times the noise of the last (annealing)."""
+    cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
+    """See `cycles`."""
+    estimate: Literal["best", "mean"] = "best"
+    """The particle of greatest weight, or the weighted mean."""
+    surface: SurfaceSettings = SurfaceSettings()
+    """How poses are weighed by surface points."""
+    gauss_newton: GaussNewtonSettings = GaussNewtonSettings()
+    """Refinement by Gauss-Newton."""
+    forces: ForceSettings = ForceSettings()
+    """Refinement by simulated forces."""
+    hull: HullSettings = HullSettings()
+    """How surface points are found."""
+
+
+MULTIVIEW_PRESETS: dict[str, dict] = {
+    "default": {},
+    "ni2008": {
+        "body": "cylinders",
+        "refinement": "forces",
+        "particles": 40,
+        "defensive": 0.0,
+        "keep": 0.0,
+        "velocity": 1.0,
+        "silhouettes": 0.0,
+        "surface": {"epsilon": 0.3, "tau": 0.06},
+    },
+}
+"""Named settings of the tracker of several cameras, as `PRESETS`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -9,18 +10,30 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet import first_pose
+from shadowpuppet import first_pose, postures
+from shadowpuppet.body import Body
+from shadowpuppet.camera import Camera
+from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.geometry import Array
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation
-from shadowpuppet.masks import check_mask
-from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
+from shadowpuppet.masks import Mask, check_mask
+from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.particle_filter import Particles, Refine, Weigh, diffuse, evaluate, step
+from shadowpuppet.proposals import Proposals
 from shadowpuppet.rasterize import Picture, count
-from shadowpuppet.settings import MonocularSettings
+from shadowpuppet.refinement import Refiner
+from shadowpuppet.resampling import Scheme, make_scheme, normalise
+from shadowpuppet.settings import MonocularSettings, MultiviewSettings
+from shadowpuppet.visual_hull import SurfacePoints
 
 ABSENT, LOST, UNCERTAIN = 0.2, 0.5, 0.7
 """A silhouette under this share of the drawn body's area is nobody; an overlap (intersection over union) under these is lost or
 uncertain. A cardbox that fits overlaps by 0.8 to 0.9."""
+FEW, SMALLEST = 50, 0.5
+"""Surface points, and their extent (m), from which on somebody may be there."""
+SETTLED = 5
+"""Cycles on the first frame, after the search."""
 SETTLE = 10
 """Frames' worth of cycles on the first mask, after the search."""
 
@@ -125,3 +138,134 @@ class MonocularTracker:
     def stages(self) -> tuple[FilterStage, ...]:
         """The filter's stages, in order."""
         return tuple(FilterStage(self.picture, self.settings, name) for name in self.settings.stages)
+
+
+class MultiviewState(NamedTuple):
+    """What a tracker of several cameras knows after a frame; all that the next one needs."""
+
+    pose: Array
+    """The estimate, of shape (D,)."""
+    velocity: Array
+    """How it moved since the last frame, of shape (D,)."""
+    particles: Particles
+    cost: float
+    """Of the estimate, m^2."""
+    overlap: float
+    """Intersection over union of the drawn estimate and the silhouettes, the mean of all cameras."""
+    status: str
+    """`tracked`, `uncertain`, `lost` or `absent`."""
+
+
+@dataclass(frozen=True, eq=False)
+class MultiviewTracker:
+    """Ni 2008: the posture of a whole body from surface points of its visual hull, by a particle filter whose proposals come from a motion
+    prior and are refined (V). Causal, and repeatable, as `MonocularTracker`."""
+
+    body: Body
+    cameras: tuple[Camera, ...]
+    settings: MultiviewSettings = field(default_factory=MultiviewSettings)
+    prior: MotionPrior | None = None
+    """Of poses at the film's rate; None: Gaussian proposals only."""
+    library: Array | None = None
+    """Poses (L, D) that the person may begin in, such as those of the training motion; None: a few usual ones."""
+
+    def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
+        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, or comes back, is searched for afresh."""
+        evidence = Evidence(self.stage, points, masks)
+        if not self.is_present(evidence):
+            return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
+        if state.status == "absent":
+            return self.search(rng, evidence)
+        after = self.cycle(rng, state, evidence)
+        if after.status == "lost":
+            found = self.search(rng, evidence)
+            return found if found.overlap > after.overlap else after
+        return after
+
+    def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
+        """A state from one frame: the best of many poses in all directions, refined. `absent` where nobody is there."""
+        evidence = Evidence(self.stage, points, masks)
+        if not self.is_present(evidence):
+            rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
+            return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
+        return self.search(rng, evidence)
+
+    def cycle(self, rng: np.random.Generator, state: MultiviewState, evidence: Evidence) -> MultiviewState:
+        """The loop body of V-A: select by weight, propose, refine, weigh."""
+        s, particles, pose = self.settings, state.particles, state.pose
+        weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
+        for cycle in range(s.cycles):
+            around, scale = pose, s.cooling**cycle
+            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
+                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale))  # noqa: B023
+            weights = normalise(particles.log_weights)
+            pose = particles.best if s.estimate == "best" else weights @ particles.poses
+        return self.judge(pose, pose - state.pose, particles, evidence, weigh)
+
+    def search(self, rng: np.random.Generator, evidence: Evidence) -> MultiviewState:
+        """A state from nothing but this frame."""
+        weigh = self.weigh(evidence)
+        found = postures.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
+        state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
+        for _ in range(SETTLED):
+            state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)
+        return state._replace(velocity=np.zeros_like(state.pose))
+
+    def weigh(self, evidence: Evidence) -> Weigh:
+        """Costs (N,), m^2, and log weights (eq. 29) of poses (N, D)."""
+        s = self.settings
+
+        def weigh(poses: Array) -> tuple[Array, Array]:
+            costs = self.refiner.costs(poses, evidence.full)
+            if s.silhouettes:
+                costs = costs + s.silhouettes * evidence.differing(poses)
+            return costs, -costs / s.sigma_cost**2
+
+        return weigh
+
+    def refine(self, evidence: Evidence, last: Array) -> Refine | None:
+        """What makes poses (N, D) better; they are pulled a little to the last pose (D,)."""
+        s, g = self.settings, self.settings.gauss_newton
+        if s.method == "particle_filter":
+            return None
+        if s.refinement == "forces" or s.method == "image_force":
+            return lambda poses: self.refiner.forces(poses, evidence.full, s.forces)
+        clouds = (evidence.cloud(g.share), g.coarse, g.coarse_tau), (evidence.full, g.fine, g.fine_tau)
+        pull = np.full(len(last), g.pull)
+        return lambda poses: self.refiner.gauss_newton(poses, clouds, last, pull, g.damping)
+
+    def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
+        """The state with its cost, overlap and status."""
+        overlap = evidence.overlap(pose)
+        status = "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
+        return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, status)
+
+    def is_present(self, evidence: Evidence) -> bool:
+        """Whether there is enough of a person: points on a hull of a size that a person has."""
+        points = evidence.surface.points
+        return len(points) >= FEW and float(np.linalg.norm(np.ptp(points, axis=0))) > SMALLEST
+
+    @cached_property
+    def number(self) -> int:
+        """Particles."""
+        return 1 if self.settings.method == "image_force" else self.settings.particles
+
+    @cached_property
+    def stage(self) -> Stage:
+        """The body among the cameras."""
+        return Stage(self.body, self.cameras)
+
+    @cached_property
+    def refiner(self) -> Refiner:
+        """The body's half of refinement."""
+        return Refiner(self.body, self.settings.surface)
+
+    @cached_property
+    def proposals(self) -> Proposals:
+        """Where poses may be next."""
+        return Proposals(self.body.skeleton, self.settings, self.prior)
+
+    @cached_property
+    def resample(self) -> Scheme:
+        """How particles are selected."""
+        return make_scheme(self.settings.resampling, 0.0)
