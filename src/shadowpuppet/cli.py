@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -136,7 +136,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     truth
         Joints (.csv or .trc) to compare with. [default: the recording's truth]
     joints
-        Those compared, separated by commas. [default: shoulders, elbows and hands]
+        Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
         First frame of the truth that counts.
     """
@@ -210,6 +210,37 @@ def synthesize(spec: SpecPath = None, /, *,
         recording = make_recording(made, folder, shown, force)
     if not quiet:
         show(made_table(made, recording))
+
+
+@app.command
+def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
+             folder: Annotated[Path | None, output("Folder of the recording. [default: the trial's name]")] = None,
+             subject: str = "S2", action: str = "Walking", trial: int = 1, part: Literal["validation", "training", "all"] = "validation",
+             training_frames: int = 100) -> None:  # fmt: skip
+    """Make a recording of a trial of HumanEva, which needs a licence: calibration, timing, truth and training; films stay in their place.
+
+    Parameters
+    ----------
+    subject
+        S1 to S4.
+    action
+        Walking, Jog, Box, Gestures, ThrowCatch or Combo.
+    trial
+        Its number.
+    part
+        Frames of the owners' own partition, or all; validation of S2 is what Ni 2008 tracks.
+    training_frames
+        Frames in a row that training.csv gets, of the training part of the same action; 0 for all.
+    """
+    from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
+    from shadowpuppet.tables import trial_table
+    from shadowpuppet.terminal import show, terminal
+
+    with terminal():
+        found = read_humaneva(data, subject, action, trial, part, training_frames)
+        folder = folder or Path(found.recording.name)
+        write_humaneva(found, folder)
+    show(trial_table(found, folder))
 
 
 @app.command

@@ -12,9 +12,11 @@ from rich.table import Table
 from rich.text import Text
 
 from shadowpuppet.fitting import Found
+from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import FAR, LOST
+from shadowpuppet.motion import JointTable
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.synthetic.spec import Spec
 
@@ -137,6 +139,22 @@ def made_table(spec: Spec, made: Recording) -> RenderableType:
             ("look", f"shadowpuppet info {made.path}" + (f" --camera {first.name}" if len(views) > 1 else "")),
             ("track", f"shadowpuppet track {made.path} --overlay" + (f" --camera {first.name}" if len(views) > 1 else ""))]
     return pairs(rows)
+
+
+def trial_table(found: HumanEva, folder: Path) -> RenderableType:
+    """What a trial of HumanEva has in it, and what can be done with it."""
+    recording = found.recording
+    names = ", ".join(view.camera.name for view in recording.views)
+    told = {"truth": found.truth, "training": found.training}
+    rows = [("recording", str(folder)), ("films", f"{len(recording.views)} cameras: {names}, {recording.duration:.2f} s")]
+    rows += [(what, f"{len(table.times)} frames of {len(table.names)} joints, {_known(table):.0f} % known" if table else "none there")
+             for what, table in told.items()]
+    rows += [("track", f"shadowpuppet track {folder} -o RUN --overlay"), ("measure", "shadowpuppet evaluate RUN --joints humaneva")]
+    return pairs(rows)
+
+
+def _known(table: JointTable) -> float:
+    return 100 * float(np.isfinite(table.positions).all(2).mean())
 
 
 def _motions(spec: Spec) -> str:

@@ -77,7 +77,7 @@ def read_c3d(path: str | Path) -> JointTable:
     """Named points of a C3D file in metres, axes as they stand; not a number where they were not seen.
 
     That is where the residual is less than zero, or the place exactly the origin, as some programs write it, or no place at all. Times
-    count from the file's first frame. Raises `FormatError` where the file is malformed; warns where it breaks off or does not tell its unit.
+    count from the file's first frame. Raises `FormatError` where the file is malformed; warns where it breaks off or tells no unit.
     """
     path = Path(path)
     header = read_header(path)
