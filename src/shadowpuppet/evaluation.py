@@ -19,7 +19,8 @@ def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Se
                  start: int = 0) -> dict[str, Any]:
     """`metrics.evaluate` of a run folder, against `truth` or that of its recording, where there is one.
 
-    `joints`: those compared, or names of `metrics.GROUPS`; `start`: the truth's first frame that counts. Plane and depth are those of the run's camera.
+    `joints`: those compared, or names of `metrics.GROUPS`; `start`: the truth's first frame that counts. Plane and depth are those of
+    the run's camera.
     Raises `FormatError` or `ShadowPuppetError` for files that cannot be used.
     """
     run = read_run(folder)

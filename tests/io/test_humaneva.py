@@ -88,7 +88,7 @@ def test_films_truth_and_training_are_in_step(data, tmp_path):
         sync = SYNCS[view.camera.name]
         for time, mocap in zip(truth.times, 1000 * truth.positions[:, 0, 0]):
             picture = seen[round(float(time), 6)]
-            assert mocap == pytest.approx(sync.mocap + (picture - sync.image) * sync.scale, abs=2.1)  # a picture is rounded to whole ones
+            assert mocap == pytest.approx(sync.mocap + (picture - sync.image) * sync.scale, abs=1e-3)
     assert np.diff(1000 * truth.positions[:, 0, 0]) == pytest.approx(2.0)
     assert len(training.times) == 30
     assert np.isfinite(training.positions).all()  # frame 151 of motion capture is a gap, so that later ones are taken
@@ -104,6 +104,7 @@ def test_numbers_by_hand():
     timing = timing_of(SYNCS)
     assert timing.images == {"C1": 52, "C2": 51, "BW1": 51}
     assert (timing.mocap, timing.scale) == (1.0, 2.0)
+    assert timing_of(SYNCS | {"BW1": Sync(75, 49.9, 2.0)}).images["BW1"] == 51  # 50.55 before it is made whole
     late = timing_of({"C1": Sync(3, 61, 2.0), "C2": Sync(10, 61, 2.0)})  # limited by C1's first picture
     assert (late.images, late.mocap) == ({"C1": 1, "C2": 8}, 57.0)
 
