@@ -18,6 +18,7 @@ from shadowpuppet.flags import (
     Flags,
     LiveFlags,
     LookFlags,
+    PriorFlags,
     SessionFlags,
     SpecFlags,
     given,
@@ -46,6 +47,7 @@ All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
 ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
 ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
+ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
 SpecPath = Annotated[Path | None, Parameter(help="File that describes it, TOML, as --show-spec prints it, or the spec.toml of a made "
@@ -181,6 +183,40 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
         found, look = fit_person(recording, file, options_from(flags, config))
         shown.doubt(look)
     show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
+
+
+@app.command(name="fit-prior")
+def learn_motion(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, or .amc beside its .asf.")], /, *,
+                 file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
+                 rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
+                 flags: ForPrior = None) -> None:  # fmt: skip
+    """Learn what a motion is like from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
+
+    Parameters
+    ----------
+    regions
+        Regions of poses, M; or choose, which finds the least number that is good for motion left out.
+    rate
+        Frames/s of the films that it is for.
+    body
+        The body whose poses are learnt.
+    seed
+        Seed of all chance.
+    """
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.priors import prior_from_files
+    from shadowpuppet.settings import PriorSettings, validate
+    from shadowpuppet.tables import prior_tables
+    from shadowpuppet.terminal import show, terminal
+
+    if not (regions.isdecimal() or regions == "choose"):
+        raise SettingsError(f"flags: regions: found {regions!r}, expected a number or choose")
+    values = given(flags) | ({"regions": int(regions)} if regions.isdecimal() else {})
+    with terminal() as shown:
+        shown.begin("learning")
+        trained = prior_from_files(motions, file, validate(PriorSettings, values, "flags"), seed=seed, body=body, rate=rate,
+                                   choose=regions == "choose")
+    show(*prior_tables(trained, file))
 
 
 @app.command

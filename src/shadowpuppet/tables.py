@@ -19,6 +19,7 @@ from shadowpuppet.metrics import FAR, LOST
 from shadowpuppet.motion import JointTable
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.synthetic.spec import Spec
+from shadowpuppet.training import Trained
 
 BARS = "▁▂▃▄▅▆▇█"
 
@@ -151,6 +152,26 @@ def trial_table(found: HumanEva, folder: Path) -> RenderableType:
              for what, table in told.items()]
     rows += [("track", f"shadowpuppet track {folder} -o RUN --overlay"), ("measure", "shadowpuppet evaluate RUN --joints humaneva")]
     return pairs(rows)
+
+
+def prior_tables(trained: Trained, file: Path) -> list[RenderableType]:
+    """What a motion prior was learnt from, how well it follows that, and where it lies."""
+    clips = _table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"))
+    for clip in trained.clips:
+        frames = clip.fitted.by_frame[np.isfinite(clip.fitted.by_frame)]
+        clips.add_row("/".join(Path(clip.name).parts[-2:])[-48:], str(clip.frames), str(len(clip.parts)), f"{1000 * clip.fitted.residual:.1f}",
+                      f"{1000 * frames.max():.1f}")
+    prior, parts = trained.prior, [clips]
+    if trained.choice is not None:
+        tried = _table("error in degrees of motion", ("regions", "learnt from", "left out"))
+        for number, *errors in zip(trained.choice.candidates, trained.choice.training_errors, trained.choice.held_out_errors):
+            tried.add_row(str(number), *(f"{np.degrees(error):.2f}" for error in errors))
+        parts.append(tried)
+    rows = [("prior", f"{len(prior.subspaces)} regions of {prior.subspaces.dimensions} dimensions; {len(prior.names)} degrees of freedom, "
+                      f"{prior.rate:g} frames/s"),
+            ("loses", f"{np.degrees(trained.error):.2f} degrees, {1000 * trained.joint_error:.1f} mm at the joints"),
+            ("saved", str(file)), ("track", f"shadowpuppet track RECORDING --prior {file}")]
+    return [*parts, pairs(rows)]
 
 
 def _known(table: JointTable) -> float:
