@@ -159,8 +159,8 @@ def prior_tables(trained: Trained, file: Path) -> list[RenderableType]:
     clips = _table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"))
     for clip in trained.clips:
         frames = clip.fitted.by_frame[np.isfinite(clip.fitted.by_frame)]
-        clips.add_row("/".join(Path(clip.name).parts[-2:])[-48:], str(clip.frames), str(len(clip.parts)), f"{1000 * clip.fitted.residual:.1f}",
-                      f"{1000 * frames.max():.1f}")
+        figures = (str(clip.frames), str(len(clip.parts)), f"{1000 * clip.fitted.residual:.1f}", f"{1000 * frames.max():.1f}")
+        clips.add_row("/".join(Path(clip.name).parts[-2:])[-48:], *figures)
     prior, parts = trained.prior, [clips]
     if trained.choice is not None:
         tried = _table("error in degrees of motion", ("regions", "learnt from", "left out"))

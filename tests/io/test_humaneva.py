@@ -152,6 +152,13 @@ def test_trials_without_motion_capture_or_partition(data, tmp_path):
         read_humaneva(data, "S2", "Combo", 1)
 
 
+def test_motion_capture_that_ends_too_soon_is_none(data):
+    (data / "S2" / "Mocap_Data" / "Box_1.c3d").write_bytes(c3d(list(MARKERS), places(80)))
+    found = read_humaneva(data, "S2", "Box", 1)
+    assert found.training is None
+    assert np.isfinite(found.truth.positions).all()
+
+
 def test_the_command_makes_a_recording(data, tmp_path, capsys):
     assert run(["humaneva", str(data), "--subject", "S2", "--action", "Box", "-o", str(tmp_path / "rec"), "--training-frames", "20"]) == 0
     shown = capsys.readouterr().out

@@ -220,13 +220,13 @@ def _frames(folder: Path, subject: str, action: str, trial: int, part: Part) -> 
 
 
 def _joints(folder: Path, subject: str, action: str, trial: int, timing: Timing, first: int, last: int) -> JointTable | None:
-    """Joints at frames `first` to `last` of a trial, times from 0; None where there is no motion capture."""
+    """Joints at frames `first` to `last` of a trial, times from 0; None where there is no motion capture of any of them."""
     path = folder / subject / "Mocap_Data" / f"{action}_{trial}.c3d"
     if not path.exists():
         return None
     table = renamed(read_c3d(path))
     places = _between(table.positions, timing.mocap - 1 + np.arange(first - 1, last, dtype=float) * timing.scale)
-    return JointTable(np.arange(last - first + 1) / RATE, table.names, places)
+    return JointTable(np.arange(last - first + 1) / RATE, table.names, places) if np.isfinite(places).any() else None
 
 
 def _between(places: Array, at: Array) -> Array:
