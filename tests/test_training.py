@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from motions import prior as made_prior
@@ -95,13 +95,13 @@ def test_mirror_images_are_learnt_from_too():
 
 
 def test_the_paper_s_reading_has_place_and_heading_without_whole_turns():
-    table, _ = walk(30)
-    turned, _ = walk(30, turn=2 * np.pi - 0.2)
+    table, _ = walk(30, turn=3.0)
+    turned, _ = walk(30, turn=-3.0)
     trained = train(table, turned, settings=replace(FEW, dofs="all"))
     skeleton = trained.clips[0].fitted.body.skeleton
     assert trained.prior.names == skeleton.dof_names == modelled(skeleton, "all")
     headings = trained.prior.subspaces.centres[:, skeleton.dof_names.index("root_heading")]
-    assert np.ptp(headings) < 0.5
+    assert np.ptp(headings) < 0.5  # 2 pi - 6, not 6
 
 
 def test_the_paper_s_body_is_learnt_too():
@@ -162,6 +162,9 @@ def test_who_does_not_move_is_told(rng):
 
 
 @settings(max_examples=30, deadline=None)
+@example(seed=0, rate=30.0, film=60.0)
+@example(seed=0, rate=120.0, film=60.0)
+@example(seed=0, rate=60.0, film=60.0)
 @given(seed=st.integers(0, 99), rate=st.sampled_from([30.0, 59.94, 60.0, 120.0]), film=st.sampled_from([15.0, 30.0, 60.0, 100.0]))
 def test_a_prior_for_films_of_another_rate_keeps_its_laws(seed, rate, film):
     skeleton = _skeleton(6)

@@ -6,10 +6,11 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
+from shadowpuppet import motion_commands
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.flags import (
     OTHER,
@@ -18,11 +19,11 @@ from shadowpuppet.flags import (
     Flags,
     LiveFlags,
     LookFlags,
-    PriorFlags,
     SessionFlags,
     SpecFlags,
     given,
     options_from,
+    output,
     spec_of,
 )
 
@@ -47,7 +48,6 @@ All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
 ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
 ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
-ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
 SpecPath = Annotated[Path | None, Parameter(help="File that describes it, TOML, as --show-spec prints it, or the spec.toml of a made "
@@ -59,11 +59,6 @@ Seed = Annotated[int | None, Parameter(group=RUN, help="Seed of all chance: the 
 def switch(help: str, name: str | None = None) -> Parameter:
     """A flag that is there or not."""
     return Parameter(name=name, group=RUN, negative=(), show_default=False, help=help)
-
-
-def output(help: str) -> Parameter:
-    """The flag -o."""
-    return Parameter(name=["--output", "-o"], group=RUN, help=help)
 
 
 @app.command
@@ -185,40 +180,6 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
     show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
 
 
-@app.command(name="fit-prior")
-def learn_motion(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, or .amc beside its .asf.")], /, *,
-                 file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
-                 rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
-                 flags: ForPrior = None) -> None:  # fmt: skip
-    """Learn what a motion is like from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
-
-    Parameters
-    ----------
-    regions
-        Regions of poses, M; or choose, which finds the least number that is good for motion left out.
-    rate
-        Frames/s of the films that it is for.
-    body
-        The body whose poses are learnt.
-    seed
-        Seed of all chance.
-    """
-    from shadowpuppet.errors import SettingsError
-    from shadowpuppet.priors import prior_from_files
-    from shadowpuppet.settings import PriorSettings, validate
-    from shadowpuppet.tables import prior_tables
-    from shadowpuppet.terminal import show, terminal
-
-    if not (regions.isdecimal() or regions == "choose"):
-        raise SettingsError(f"flags: regions: found {regions!r}, expected a number or choose")
-    values = given(flags) | ({"regions": int(regions)} if regions.isdecimal() else {})
-    with terminal() as shown:
-        shown.begin("learning")
-        trained = prior_from_files(motions, file, validate(PriorSettings, values, "flags"), seed=seed, body=body, rate=rate,
-                                   choose=regions == "choose")
-    show(*prior_tables(trained, file))
-
-
 @app.command
 def synthesize(spec: SpecPath = None, /, *,
                folder: Annotated[Path | None, output("Folder of the recording. [default: the spec's name]")] = None,
@@ -246,37 +207,6 @@ def synthesize(spec: SpecPath = None, /, *,
         recording = make_recording(made, folder, shown, force)
     if not quiet:
         show(made_table(made, recording))
-
-
-@app.command
-def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
-             folder: Annotated[Path | None, output("Folder of the recording. [default: the trial's name]")] = None,
-             subject: str = "S2", action: str = "Walking", trial: int = 1, part: Literal["validation", "training", "all"] = "validation",
-             training_frames: int = 100) -> None:  # fmt: skip
-    """Make a recording of a trial of HumanEva, which needs a licence: calibration, timing, truth and training; films stay in their place.
-
-    Parameters
-    ----------
-    subject
-        S1 to S4.
-    action
-        Walking, Jog, Box, Gestures, ThrowCatch or Combo.
-    trial
-        Its number.
-    part
-        Frames of the owners' own partition, or all; validation of S2 is what Ni 2008 tracks.
-    training_frames
-        Frames in a row that training.csv gets, of the training part of the same action; 0 for all.
-    """
-    from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
-    from shadowpuppet.tables import trial_table
-    from shadowpuppet.terminal import show, terminal
-
-    with terminal():
-        found = read_humaneva(data, subject, action, trial, part, training_frames)
-        folder = folder or Path(found.recording.name)
-        write_humaneva(found, folder)
-    show(trial_table(found, folder))
 
 
 @app.command
@@ -323,6 +253,10 @@ def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool 
         plot_curves(found["curves"], picture)
     if not quiet:
         show(*bench_tables(found))
+
+
+app.command(motion_commands.fit_prior, name="fit-prior")
+app.command(motion_commands.humaneva)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:

@@ -53,6 +53,11 @@ def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True, grou
     return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
 
 
+def output(help: str) -> Parameter:
+    """The flag -o."""
+    return Parameter(name=["--output", "-o"], group=RUN, help=help)
+
+
 def given(flags: Any) -> dict[str, Any]:
     """What flags said, as plain values."""
     values = {f.name: getattr(flags, f.name) for f in fields(flags)} if flags is not None else {}
