@@ -7,10 +7,13 @@ import pytest
 
 from movers import walk
 from shadowpuppet.cli import run
+from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.joints import write_joints
-from shadowpuppet.io.prior import read_prior
+from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import make_options, plain_options, read_options
+from shadowpuppet.priors import familiar
 from vicon import c3d
 
 
@@ -79,6 +82,28 @@ def test_a_run_is_told_of_a_prior_and_how_to_learn(tmp_path):
     assert options.prior == tmp_path / "walk.npz"
     assert (options.training.regions, options.training.mirrored, options.training.dofs) == (7, True, "articulation")
     assert make_options(plain_options(options)) == options
+
+
+def test_a_run_takes_the_prior_that_is_given_or_learns_one(motions, tmp_path):
+    training = read_motion(motions / "walk.csv")
+    learnt = familiar(np.random.default_rng(0), make_options({"training": {"regions": 8}}), training, "anatomical", 30.0)
+    assert learnt.prior is not None
+    assert (len(learnt.prior.subspaces), learnt.prior.rate, learnt.poses.shape) == (8, 30.0, (25, 32))
+    write_prior(tmp_path / "walk.npz", learnt.prior)
+    options = make_options({"prior": str(tmp_path / "walk.npz")})
+    given = familiar(np.random.default_rng(0), options, training, "anatomical", 60.0)
+    assert given.prior is not None
+    assert given.prior.rate == 60.0
+    assert given.poses.shape == (50, 32)
+    assert given.sizes.thigh_length == pytest.approx(learnt.sizes.thigh_length, abs=1e-3)
+    alone = familiar(np.random.default_rng(0), options, None, "anatomical", 60.0)
+    np.testing.assert_array_equal(alone.prior.transitions, given.prior.transitions)
+    assert (alone.sizes, alone.poses.shape) == (None, (0, 32))
+    assert familiar(np.random.default_rng(0), make_options({}), None, "cylinders", 60.0).prior is None
+    with pytest.raises(ShadowPuppetError, match=r"walk\.npz: prior: found 'chest_x' among what it models"):
+        familiar(np.random.default_rng(0), options, None, "cylinders", 60.0)
+    with pytest.raises(ShadowPuppetError, match=r"training\.csv: no joint left_shoulder"):
+        familiar(np.random.default_rng(0), make_options({}), training.select(["pelvis"]), "anatomical", 60.0, "training.csv")
 
 
 @pytest.mark.shared

@@ -1,17 +1,27 @@
-"""A motion prior learnt from files of motion, before any run."""
+"""Motion priors learnt from files of motion, and that of a run: given, or learnt from its training motion."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.geometry import Array
+from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.motion_files import read_motion
-from shadowpuppet.io.prior import write_prior
+from shadowpuppet.io.prior import read_prior, write_prior
+from shadowpuppet.motion import JointTable
+from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.options import Options
 from shadowpuppet.settings import PriorSettings
-from shadowpuppet.training import RATE, Trained, train_prior
+from shadowpuppet.skeleton import Skeleton
+from shadowpuppet.training import RATE, Trained, matched, train_prior
+from shadowpuppet.whole_sizes import BoneSizes
 
 CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)
 """Numbers of regions that are tried where one is to be chosen (Ni 2008, Figs. 4 and 8)."""
@@ -35,3 +45,41 @@ def prior_from_files(motions: Sequence[str | Path], file: str | Path, settings: 
     trained = train_prior(np.random.default_rng(seed), tables, settings, body=body, rate=rate, candidates=CANDIDATES if choose else ())
     write_prior(file, trained.prior)
     return trained
+
+
+class Familiar(NamedTuple):
+    """What is known of how a person moves before a run, and of the person from that."""
+
+    prior: MotionPrior | None
+    """For the film's rate; None where there is neither a file nor training motion."""
+    sizes: BoneSizes | None
+    """Of whoever moved in the training motion."""
+    poses: Array
+    """Of the training motion, of shape (T, D), all DOF, in the world: postures that a search for the first may try; none without."""
+
+
+def familiar(rng: np.random.Generator, options: Options, training: JointTable | None, body: str, rate: float,
+             source: str = "training") -> Familiar:
+    """The prior of a run at `rate` frames/s: `options.prior`, else learnt from `training` motion, by `options.training`.
+
+    `source`: what messages call that motion. Raises `FormatError` or `ShadowPuppetError` where a file is no prior, or of another body, or
+    the motion cannot be learnt from.
+    """
+    skeleton = make_body(body, average_sizes(body, AVERAGE_HEIGHT)).skeleton
+    given = None if options.prior is None else _given(options.prior, skeleton, rate)
+    if training is None:
+        return Familiar(given, None, np.zeros((0, len(skeleton.dofs))))
+    if given is not None:
+        fitted = fit_poses(training, body, source=source)
+        return Familiar(given, fitted.sizes, fitted.poses[np.isfinite(fitted.poses).all(1)])
+    trained = train_prior(rng, {source: training}, options.training, body=body, rate=rate)
+    clip = trained.clips[0]
+    return Familiar(trained.prior, clip.fitted.sizes, np.concatenate(clip.parts))
+
+
+def _given(file: Path, skeleton: Skeleton, rate: float) -> MotionPrior:
+    prior = read_prior(file)
+    try:
+        return matched(prior, skeleton, rate)
+    except ShadowPuppetError as error:
+        raise ShadowPuppetError(f"{file}: {error}") from None
