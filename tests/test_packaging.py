@@ -38,7 +38,7 @@ def test_importing_the_package_loads_nothing_heavy():
 
 def test_help_and_reading_files_load_no_compiler_codec_or_plots():
     for code in ("from shadowpuppet.cli import app; app.help_print",
-                 "from shadowpuppet import read_run, read_recording, read_joints, read_prior"):
+                 "from shadowpuppet import read_run, read_recording, read_joints, read_motion, read_prior, read_humaneva"):
         assert not loaded_after(code) & {"numba", "cv2", "av", "matplotlib"}
 
 
@@ -126,7 +126,7 @@ def test_every_setting_is_explained():
 
 def test_every_table_of_settings_is_in_the_manual():
     tables = {f"{table}{'.' + part if part else ''}" for table, parts in
-              (("tracker", ("", "torso", "arm")), ("silhouette", ("",)), ("initialization", ("",))) for part in parts}
+              (("tracker", ("", "torso", "arm")), ("silhouette", ("",)), ("initialization", ("",)), ("training", ("",))) for part in parts}
     assert tables <= set(re.findall(r"<!-- settings: (\S+) -->", docs("settings.md")))
 
 

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from shadowpuppet.initialization import find_person, fit_references
     from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.io.calibration import read_calibration, write_calibration
+    from shadowpuppet.io.humaneva import read_humaneva
     from shadowpuppet.io.joints import read_joints, write_joints
+    from shadowpuppet.io.motion_files import read_motion
     from shadowpuppet.io.person import Person, read_person, write_person
     from shadowpuppet.io.prior import read_prior, write_prior
     from shadowpuppet.io.recording import Recording, read_recording
@@ -51,6 +53,7 @@ _HOMES = {
     "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull",
     "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
     "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -62,6 +65,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "write_calibration", "write_frames", "write_joints", "write_person",
     "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
     "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
+    "read_humaneva", "read_motion",
 ]  # fmt: skip
 
 

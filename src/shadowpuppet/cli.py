@@ -10,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
+from shadowpuppet import motion_commands
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.flags import (
     OTHER,
@@ -22,6 +23,7 @@ from shadowpuppet.flags import (
     SpecFlags,
     given,
     options_from,
+    output,
     spec_of,
 )
 
@@ -57,11 +59,6 @@ Seed = Annotated[int | None, Parameter(group=RUN, help="Seed of all chance: the 
 def switch(help: str, name: str | None = None) -> Parameter:
     """A flag that is there or not."""
     return Parameter(name=name, group=RUN, negative=(), show_default=False, help=help)
-
-
-def output(help: str) -> Parameter:
-    """The flag -o."""
-    return Parameter(name=["--output", "-o"], group=RUN, help=help)
 
 
 @app.command
@@ -136,7 +133,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     truth
         Joints (.csv or .trc) to compare with. [default: the recording's truth]
     joints
-        Those compared, separated by commas. [default: shoulders, elbows and hands]
+        Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
         First frame of the truth that counts.
     """
@@ -256,6 +253,10 @@ def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool 
         plot_curves(found["curves"], picture)
     if not quiet:
         show(*bench_tables(found))
+
+
+app.command(motion_commands.fit_prior, name="fit-prior")
+app.command(motion_commands.humaneva)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:

@@ -12,14 +12,15 @@ from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import evaluate
+from shadowpuppet.metrics import GROUPS, evaluate
 
 
 def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Sequence[str] | None = None,
                  start: int = 0) -> dict[str, Any]:
     """`metrics.evaluate` of a run folder, against `truth` or that of its recording, where there is one.
 
-    `joints`: those compared; `start`: the truth's first frame that counts. Plane and depth are those of the run's camera.
+    `joints`: those compared, or names of `metrics.GROUPS`; `start`: the truth's first frame that counts. Plane and depth are those of
+    the run's camera.
     Raises `FormatError` or `ShadowPuppetError` for files that cannot be used.
     """
     run = read_run(folder)
@@ -27,7 +28,8 @@ def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Se
     reference = None if table is None else read_joints(table)
     if reference is not None and not 0 <= start < len(reference.times):
         raise ShadowPuppetError(f"start: found {start}, expected 0 to {len(reference.times) - 1}, a frame of {table}")
-    measured = evaluate(run.motion, reference, joints, camera=_camera(run.folder), start=start)
+    chosen = None if joints is None else [name for joint in joints for name in GROUPS.get(joint, (joint,))]
+    measured = evaluate(run.motion, reference, chosen, camera=_camera(run.folder), start=start)
     return {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete, **measured}
 
 

@@ -14,18 +14,18 @@ from pydantic import BeforeValidator
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.options import PATHS, Options, default_of, make_options, read_options, settings_of
-from shadowpuppet.settings import validate
+from shadowpuppet.settings import PriorSettings, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.specfile import read_spec
 
-HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other")
-RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
+HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Learning", "Other")
+RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "overlay"), RUN),
-    **dict.fromkeys(("height", "distance", "person"), PERSON),
+    **dict.fromkeys(("height", "distance", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size"), PICTURES),
 }
@@ -51,6 +51,11 @@ def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True, grou
             made.append((field.name, Annotated[_bare(hint) | None, _parameter(field, told, shown, groups)], None))
     # cyclopts takes classes of the standard library, as which it would see this one, for single values.
     return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
+
+
+def output(help: str) -> Parameter:
+    """The flag -o."""
+    return Parameter(name=["--output", "-o"], group=RUN, help=help)
 
 
 def given(flags: Any) -> dict[str, Any]:
@@ -102,7 +107,7 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = DemoFlags = SessionFlags = LiveFlags = SpecFlags = Any
+    Flags = LookFlags = DemoFlags = SessionFlags = LiveFlags = PriorFlags = SpecFlags = Any
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
@@ -110,9 +115,11 @@ else:
     """Those that matter where nothing is tracked."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
     """Those that matter where the recording is known."""
-    SessionFlags = flags_of(Options, without=("camera", "masks", "overlay"))
+    SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training"))
     """Those that matter where a camera is tracked as it happens."""
     LiveFlags = flags_of(LiveSettings)
     """What can be set about that beside."""
+    PriorFlags = flags_of(PriorSettings, without=("regions",), groups={field.name: LEARNING for field, _, _ in settings_of(PriorSettings)})
+    """How a motion prior is learnt."""
     SpecFlags = flags_of(Shorthand, groups=SPEC_GROUPS)
     """What is often wanted of a made recording."""

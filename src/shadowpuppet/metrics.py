@@ -18,6 +18,8 @@ UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_el
 """What is compared where one camera saw the upper body."""
 LIMBS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
 """What is compared where the whole body was seen."""
+GROUPS = {"upper": UPPER, "limbs": LIMBS, "humaneva": ("pelvis", "neck", "head", *LIMBS)}
+"""Joints that are compared together, by a name; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
 LOST, FAR = 0.5, 0.3
 """Metres: what a joint that is not there counts, so that leaving out bad frames never helps; and beyond which one is far off."""
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

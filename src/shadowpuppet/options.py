@@ -16,13 +16,13 @@ from pydantic_core import PydanticCustomError
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.settings import InitializationSettings, MonocularSettings, checked, make_settings, validate
+from shadowpuppet.settings import InitializationSettings, MonocularSettings, PriorSettings, checked, make_settings, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres
 
-TABLES = ("tracker", "silhouette", "initialization")
+TABLES = ("tracker", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
-PATHS = ("calibration", "background", "person")
+PATHS = ("calibration", "background", "person", "prior")
 """Options that are files; in a file of settings they are relative to it."""
 
 
@@ -59,6 +59,9 @@ class Options:
     """Distance from the camera to the middle of the body at the start, metres. Replaces what recording.toml says."""
     person: Path | None = None
     """Sizes of the person, as an earlier run or `fit-person` saved them (person.toml)."""
+    prior: Path | None = None
+    """What the motion is like, as `fit-prior` saved it (.npz), for several cameras. Left out, it is learnt from the recording's training
+    motion, where it has some."""
     fov: Annotated[float, Field(gt=0, lt=180)] | None = None
     """Horizontal field of view, degrees, of a camera without calibration."""
     calibration: Path | None = None
@@ -81,6 +84,8 @@ class Options:
     """How the person is told from the background."""
     initialization: InitializationSettings = InitializationSettings()
     """How the person's sizes are found."""
+    training: PriorSettings = PriorSettings()
+    """How a motion prior is learnt from the recording's training motion, or by `fit-prior`."""
 
 
 def make_options(values: Mapping[str, Any] | None = None, source: str = "settings") -> Options:

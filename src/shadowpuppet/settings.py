@@ -211,6 +211,10 @@ class PriorSettings:
     """Least variance in any direction, as a share of the training poses' mean variance: a region of few frames has none in most."""
     leave: Annotated[float, Field(ge=0, lt=1)] = 0.01
     """Share of the transitions from each region that goes to all alike, at least, so that the filter is never caught in one."""
+    dofs: Literal["articulation", "all"] = "articulation"
+    """What is learnt of a body's poses: all angles but the heading, so that it serves any place and direction; or all, as in the paper."""
+    mirrored: bool = False
+    """Learn from every motion's mirror image, too."""
 
 
 @checked

@@ -12,11 +12,14 @@ from rich.table import Table
 from rich.text import Text
 
 from shadowpuppet.fitting import Found
+from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import FAR, LOST
+from shadowpuppet.motion import JointTable
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.synthetic.spec import Spec
+from shadowpuppet.training import Trained
 
 BARS = "▁▂▃▄▅▆▇█"
 
@@ -137,6 +140,42 @@ def made_table(spec: Spec, made: Recording) -> RenderableType:
             ("look", f"shadowpuppet info {made.path}" + (f" --camera {first.name}" if len(views) > 1 else "")),
             ("track", f"shadowpuppet track {made.path} --overlay" + (f" --camera {first.name}" if len(views) > 1 else ""))]
     return pairs(rows)
+
+
+def trial_table(found: HumanEva, folder: Path) -> RenderableType:
+    """What a trial of HumanEva has in it, and what can be done with it."""
+    recording = found.recording
+    names = ", ".join(view.camera.name for view in recording.views)
+    told = {"truth": found.truth, "training": found.training}
+    rows = [("recording", str(folder)), ("films", f"{len(recording.views)} cameras: {names}, {recording.duration:.2f} s")]
+    rows += [(what, f"{len(table.times)} frames of {len(table.names)} joints, {_known(table):.0f} % known" if table else "none there")
+             for what, table in told.items()]
+    rows += [("track", f"shadowpuppet track {folder} -o RUN --overlay"), ("measure", "shadowpuppet evaluate RUN --joints humaneva")]
+    return pairs(rows)
+
+
+def prior_tables(trained: Trained, file: Path) -> list[RenderableType]:
+    """What a motion prior was learnt from, how well it follows that, and where it lies."""
+    clips = _table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"))
+    for clip in trained.clips:
+        frames = clip.fitted.by_frame[np.isfinite(clip.fitted.by_frame)]
+        figures = (str(clip.frames), str(len(clip.parts)), f"{1000 * clip.fitted.residual:.1f}", f"{1000 * frames.max():.1f}")
+        clips.add_row("/".join(Path(clip.name).parts[-2:])[-48:], *figures)
+    prior, parts = trained.prior, [clips]
+    if trained.choice is not None:
+        tried = _table("error in degrees of motion", ("regions", "learnt from", "left out"))
+        for number, *errors in zip(trained.choice.candidates, trained.choice.training_errors, trained.choice.held_out_errors):
+            tried.add_row(str(number), *(f"{np.degrees(error):.2f}" for error in errors))
+        parts.append(tried)
+    rows = [("prior", f"{len(prior.subspaces)} regions of {prior.subspaces.dimensions} dimensions; {len(prior.names)} degrees of freedom, "
+                      f"{prior.rate:g} frames/s"),
+            ("loses", f"{np.degrees(trained.error):.2f} degrees, {1000 * trained.joint_error:.1f} mm at the joints"),
+            ("saved", str(file)), ("track", f"shadowpuppet track RECORDING --prior {file}")]
+    return [*parts, pairs(rows)]
+
+
+def _known(table: JointTable) -> float:
+    return 100 * float(np.isfinite(table.positions).all(2).mean())
 
 
 def _motions(spec: Spec) -> str:

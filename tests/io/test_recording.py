@@ -158,7 +158,8 @@ def test_a_live_camera_is_named_in_recording_toml(one, camera):
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("hieght = 1.8", "found the key hieght; keys known there: background, calibration, masks, rate, subject, training, truth"),
+    ("hieght = 1.8",
+     "found the key hieght; keys known there: background, calibration, duration, masks, rate, start, subject, training, truth"),
     ("[subject]\nheigth = 1.8", "found the key subject.heigth; keys known there: distance, height"),
     ("[subject]\nheight = 183", "height: found 183, expected 0.5 to 2.5 metres"),
     ("[subject]\nheight = nan", "height: found nan"),
@@ -167,6 +168,10 @@ def test_a_live_camera_is_named_in_recording_toml(one, camera):
     ("subject = 1.8", "subject: found 1.8, expected a table [subject]"),
     ("video = 'cam.mp4'", "video: found 'cam.mp4', expected a table [video]"),
     ("rate = 0", "rate: found 0, expected 0.1 to 10000 frames/s"),
+    ("duration = 0", "duration: found 0, expected 0.001 to 1e+06 seconds"),
+    ("start = 1.5", "start: found 1.5, expected a table [start]"),
+    ("[start]\ncam = -0.1", "start.cam: found -0.1, expected 0 to 100000 seconds"),
+    ("[start]\nkam = 1", "found kam, but the calibration knows no such camera; cameras known: cam"),
     ("truth = 'nowhere.csv'", "truth: found 'nowhere.csv', expected the path of an existing file"),
     ("calibration = 3", "calibration: found 3"),
     ("[video]\ncam = 'nowhere.mp4'", "video.cam: found 'nowhere.mp4'"),
@@ -177,6 +182,13 @@ def test_a_live_camera_is_named_in_recording_toml(one, camera):
 ])
 def test_a_mistake_in_recording_toml_is_said(one, text, words):
     said(notes(one, text), words, str(one))
+
+
+def test_where_films_begin_and_how_much_counts_is_told(two):
+    found = read_recording(notes(two, "rate = 60\nduration = 9.75\n[start]\nright = 1.35\n"))
+    assert (found.duration, [view.start for view in found.views]) == (9.75, [0.0, 1.35])
+    notes(two, "")
+    assert (read_recording(two).duration, {view.start for view in read_recording(two).views}) == (None, {0.0})
 
 
 def test_films_of_unknown_cameras_are_said(two):

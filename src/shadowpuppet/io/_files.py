@@ -14,9 +14,15 @@ def reason(error: OSError) -> str:
     return (error.strerror or str(error) or "unknown reason").lower()
 
 
+TEXT_LIMIT = 1_000_000_000
+"""Bytes; no table or motion that fits into memory as numbers is longer."""
+
+
 def read_text(path: Path) -> str:
-    """A text file (UTF-8). Raises `FormatError` where it cannot be read, is empty or no text."""
+    """A text file (UTF-8). Raises `FormatError` where it cannot be read, is empty, too long or no text."""
     try:
+        if path.stat().st_size > TEXT_LIMIT:
+            raise FormatError(f"{path}: found {path.stat().st_size} bytes, expected a text file of at most {TEXT_LIMIT}")
         text = path.read_text("utf-8-sig")
     except OSError as error:
         raise FormatError(f"{path}: cannot be read ({reason(error)})") from None

@@ -20,10 +20,12 @@ FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2t
 """Endings of the films that are looked for; one with another ending can be named in recording.toml."""
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
-KEYS = ("subject", "rate", "calibration", "truth", "training", "video", "background", "masks")
+KEYS = ("subject", "rate", "duration", "calibration", "truth", "training", "start", "video", "background", "masks")
 """Keys of recording.toml."""
 RATES = (0.1, 10_000.0)
 """What can be true, frames/s."""
+STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
+"""What can be true, seconds."""
 
 
 @dataclass(frozen=True)
@@ -119,13 +121,16 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
     missing = [c.name for c in cameras if c.name not in films]
     if missing:
         warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}", ShadowPuppetWarning, stacklevel=3)
-    views = tuple(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name)) for c in cameras if c.name in films)
+    starts = _starts(notes, cameras)
+    views = tuple(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0))
+                  for c in cameras if c.name in films)
     _check_sizes(views)
     truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
-    training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh"])
+    training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh", "amc"])
     rate = notes.number("rate", RATES, "frames/s")
+    duration = notes.number("duration", DURATIONS, "seconds")
     references = _references(folder / "references")
-    return Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate)
+    return Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration)
 
 
 class _Notes:
@@ -154,7 +159,7 @@ class _Notes:
             return None
         if not is_within(value, limits):
             expected = expected_metres(value, limits) if unit == "metres" else f"expected {limits[0]:g} to {limits[1]:g} {unit}"
-            raise RecordingError(f"{self.path}: {key}: found {value!r}, {expected}")
+            raise RecordingError(f"{self.path}: {'start.' if table == 'start' else ''}{key}: found {value!r}, {expected}")
         return float(value)
 
     def file(self, key: str) -> Path | None:
@@ -170,6 +175,13 @@ class _Notes:
         if path is None or not path.exists():
             raise RecordingError(f"{self.path}: {key}: found {value!r}, expected the path of an existing file, from this folder")
         return path
+
+
+def _starts(notes: _Notes, cameras: Iterable[Camera]) -> dict[str, float]:
+    """Seconds by camera, those that recording.toml tells."""
+    _check_names(notes.path, notes.table("start"), cameras)
+    found = {name: notes.number(name, STARTS, "seconds", "start") for name in notes.table("start")}
+    return {name: start for name, start in found.items() if start is not None}
 
 
 def _first(folder: Path, stem: str, endings: list[str]) -> Path | None:

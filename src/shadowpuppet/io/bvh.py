@@ -1,0 +1,247 @@
+"""BVH files (Biovision): a skeleton and its motion in one text, as joints by forward kinematics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+from warnings import warn
+
+import numpy as np
+
+from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.geometry import Array, rotation_about
+from shadowpuppet.io._files import read_text
+from shadowpuppet.io._table import shorten
+from shadowpuppet.motion import JointTable
+
+CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
+"""What a channel can be; in any order, any number of them a joint."""
+END = "_end"
+"""What the name of a joint's end site is made with."""
+BLOCK = 4096
+"""Frames that are placed at once, so that memory stays small."""
+MOST_JOINTS = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A joint of the hierarchy, or an end site."""
+
+    name: str
+    parent: int
+    """Index of the one above it; -1: none."""
+    offset: Array
+    """Place against its parent, of shape (3,), the file's unit."""
+    channels: tuple[int, ...] = ()
+    """Indices into `CHANNELS`, in the order of the file: rotations are multiplied in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bvh:
+    """A file as it stands: its own unit of length, its own axes."""
+
+    path: Path
+    nodes: tuple[Node, ...]
+    """Parents before children."""
+    step: float
+    """Seconds from frame to frame."""
+    values: Array
+    """Channels of all nodes one after another, of shape (T, C); the file's unit, and degrees."""
+
+    def joints(self) -> JointTable:
+        """Every joint and end site; the file's unit and axes, times from 0. Raises `FormatError` where a name is impossible."""
+        places = np.empty((len(self.values), len(self.nodes), 3))
+        added = [self._is_added(n) for n in range(len(self.nodes))]
+        for start in range(0, len(self.values), BLOCK):
+            places[start : start + BLOCK] = self._placed(self.values[start : start + BLOCK], added)
+        try:
+            return JointTable(np.arange(len(places), dtype=float) * self.step, _different([node.name for node in self.nodes]), places)
+        except ShadowPuppetError as error:
+            raise FormatError(f"{self.path}: {error}") from None
+
+    def _placed(self, values: Array, added: list[bool]) -> Array:
+        """Places (T, J, 3) of all nodes for channel values (T, C)."""
+        places, turns = np.empty((len(values), len(self.nodes), 3)), list[Array]()
+        for n, (node, columns) in enumerate(zip(self.nodes, self._columns)):
+            own, shift = np.broadcast_to(np.eye(3), (len(values), 3, 3)), np.tile(node.offset, (len(values), 1))
+            for channel, column in zip(node.channels, columns):
+                if channel < 3:
+                    shift[:, channel] = values[:, column] + (node.offset[channel] if added[n] else 0.0)
+                else:
+                    own = own @ rotation_about(np.eye(3)[channel - 3], np.radians(values[:, column]))
+            if node.parent < 0:
+                places[:, n] = shift
+            else:
+                places[:, n] = places[:, node.parent] + (turns[node.parent] @ shift[:, :, None])[:, :, 0]
+                own = turns[node.parent] @ own
+            turns.append(own)
+        return places
+
+    @property
+    def _columns(self) -> list[list[int]]:
+        """Columns of `values` that belong to each node."""
+        ends = np.cumsum([len(node.channels) for node in self.nodes]).tolist()
+        return [list(range(end - len(node.channels), end)) for node, end in zip(self.nodes, ends)]
+
+    def _is_added(self, n: int) -> bool:
+        """Whether a node's position channels come on top of its offset.
+
+        They do for the root, after the format's first description. Where other joints have them, programs differ: most write the whole
+        shift, offset and all, which shows in values about the offset.
+        """
+        node, columns = self.nodes[n], self._columns[n]
+        shifts = [(node.offset[channel], self.values[:, column]) for channel, column in zip(node.channels, columns) if channel < 3]
+        if node.parent < 0 or not shifts:
+            return True
+        whole, zero = (sum(abs(float(np.median(values)) - share * offset) for offset, values in shifts) for share in (1.0, 0.0))
+        return zero < whole
+
+
+def read_bvh(path: str | Path) -> Bvh:
+    """The motion in a BVH file. Raises `FormatError`, naming the line, where it is malformed; warns where it breaks off."""
+    path = Path(path)
+    lines = read_text(path).splitlines()
+    motion = next((n for n, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
+    if motion is None:
+        raise FormatError(f"{path}: found no line MOTION, expected a BVH file: HIERARCHY, joints, MOTION, frames")
+    nodes = _hierarchy(_Words(path, lines[:motion]))
+    step, first = _header(path, lines, motion)
+    return Bvh(path, nodes, step, _values(path, lines, first, sum(len(node.channels) for node in nodes)))
+
+
+class _Words:
+    """The hierarchy's words one after another, with what is said where one is not what it should be."""
+
+    def __init__(self, path: Path, lines: list[str]) -> None:
+        self.path, self.last = path, len(lines)
+        spaced = (line.replace("{", " { ").replace("}", " } ") for line in lines)
+        self._words = iter([(n, word) for n, line in enumerate(spaced, 1) for word in line.split()])
+        self.line = 1
+
+    def next(self, *expected: str) -> str:
+        """The next word; one of `expected`, whose capitals do not count, or any."""
+        self.line, word = next(self._words, (self.last, ""))
+        if not word or (expected and word.upper() not in expected):
+            self.fail(word, " or ".join(expected))
+        return word.upper() if expected else word
+
+    def rest(self) -> str:
+        """The next word where there is one, or nothing."""
+        self.line, word = next(self._words, (self.last, ""))
+        return word
+
+    def numbers(self, count: int) -> Array:
+        """The next words as finite numbers (count,)."""
+        words = [self.next() for _ in range(count)]
+        values = _numbers(words)
+        if values is None:
+            self.fail(" ".join(words), f"{count} numbers")
+        return values
+
+    def fail(self, found: str, expected: str) -> NoReturn:
+        """Raise `FormatError` at the line of the last word."""
+        what = f"found {shorten([found])!r}" if found else "the hierarchy ends"
+        raise FormatError(f"{self.path}: line {self.line}: {what}{f', expected {expected}' if expected else ''}")
+
+
+def _hierarchy(words: _Words) -> tuple[Node, ...]:
+    """Joints and end sites in the order in which they stand, which is parents first."""
+    words.next("HIERARCHY")
+    words.next("ROOT")
+    nodes, above = list[Node](), [-1]
+    nodes.append(_node(words, words.next(), -1))
+    above.append(0)
+    while len(above) > 1:
+        kind = words.next("JOINT", "END", "}")
+        if kind == "}":
+            above.pop()
+            continue
+        if len(nodes) >= MOST_JOINTS:
+            words.fail(f"more than {MOST_JOINTS} joints", "those of a person")
+        if kind == "JOINT":
+            nodes.append(_node(words, words.next(), above[-1]))
+            above.append(len(nodes) - 1)
+        else:
+            words.next("SITE")
+            nodes.append(_node(words, nodes[above[-1]].name + END, above[-1], end=True))
+            words.next("}")
+    if more := words.rest():
+        words.fail(more, "MOTION")
+    return tuple(nodes)
+
+
+def _node(words: _Words, name: str, parent: int, end: bool = False) -> Node:
+    """What stands behind a node's name: its offset, and its channels unless it is an `end`."""
+    words.next("{")
+    words.next("OFFSET")
+    offset = words.numbers(3)
+    if end:
+        return Node(name, parent, offset)
+    words.next("CHANNELS")
+    word = words.next()
+    if word not in map(str, range(len(CHANNELS) + 1)):
+        words.fail(word, "a number of channels from 0 to 6")
+    known = [channel.upper() for channel in CHANNELS]
+    channels = tuple(known.index(words.next(*known)) for _ in range(int(word)))
+    if len(set(channels)) < len(channels):
+        words.fail(f"a channel of {name} twice", "each once at most")
+    return Node(name, parent, offset, channels)
+
+
+def _header(path: Path, lines: list[str], motion: int) -> tuple[float, int]:
+    """Seconds of a frame, and the index of the first frame's line."""
+    told: dict[str, float] = {}
+    n = motion
+    for key in ("Frames:", "Frame Time:"):
+        n += 1
+        while n < len(lines) and not lines[n].strip():
+            n += 1
+        line = lines[n].strip() if n < len(lines) else ""
+        value = _numbers([line[len(key) :].strip()]) if line.lower().startswith(key.lower()) else None
+        if value is None or value[0] <= 0:
+            raise FormatError(f"{path}: line {n + 1}: found {shorten([line])!r}, expected {key} and a number more than zero")
+        told[key] = float(value[0])
+    frames = sum(bool(line.strip()) for line in lines[n + 1 :])
+    if frames and frames != told["Frames:"]:
+        warn(f"{path}: line {n}, Frames: found {told['Frames:']:g}, but the file has {frames}; those are used", ShadowPuppetWarning,
+             stacklevel=4)
+    return told["Frame Time:"], n + 1
+
+
+def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
+    """Channel values (T, width) of the lines from index `first` on, a frame a line; a last line that breaks off is left out."""
+    rows = [(n, line.split()) for n, line in enumerate(lines[first:], first + 1) if line.strip()]
+    if len(rows) > 1 and len(rows[-1][1]) < width:
+        warn(f"{path}: line {rows[-1][0]}: the file breaks off within a frame; the {len(rows) - 1} before it are used",
+             ShadowPuppetWarning, stacklevel=4)
+        rows.pop()
+    if not rows or not width:
+        raise FormatError(f"{path}: found {len(rows)} frames of {width} channels, expected a motion")
+    for n, words in rows:
+        if len(words) != width:
+            raise FormatError(f"{path}: line {n}: found {len(words)} numbers, expected {width}, as many as there are channels")
+    values = _numbers([word for _, words in rows for word in words])
+    if values is None:
+        line, words = next(row for row in rows if _numbers(row[1]) is None)
+        raise FormatError(f"{path}: line {line}: found {shorten(word for word in words if _numbers([word]) is None)!r}, expected numbers")
+    return values.reshape(len(rows), width)
+
+
+def _numbers(words: list[str]) -> Array | None:
+    """Words as finite numbers; None where one is none."""
+    try:
+        values = np.array(words, float)
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() and len(values) else None
+
+
+def _different(names: list[str]) -> tuple[str, ...]:
+    """Names made different by numbers where they are not."""
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return tuple(out)

@@ -1,0 +1,238 @@
+"""C3D files (c3d.org): markers over time in blocks of 512 bytes, whole numbers or floats of three kinds of processors.
+
+Read here and not by ezc3d, which damaged files can crash: files come from anywhere, and nothing in one may do more than be refused.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from warnings import warn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.geometry import Array
+from shadowpuppet.io._files import reason
+from shadowpuppet.io._table import shorten
+from shadowpuppet.io.trc import METRES
+from shadowpuppet.motion import JointTable
+
+BYTES = 512
+"""Of a block."""
+KEY = 0x50
+"""The second byte of every file."""
+INTEL, DEC, MIPS = 84, 85, 86
+"""Kinds of processors, as the parameter section tells them."""
+FARTHEST = 1e6
+"""Metres; what is farther away is no place."""
+CHAR, BYTE, INT, FLOAT = -1, 1, 2, 4
+"""Kinds of parameters, by their bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class C3d:
+    """What a file says beside its data."""
+
+    path: Path
+    parameters: dict[str, Any]
+    """By GROUP:NAME: a list of words, or an array of numbers."""
+    points: int
+    """Markers, N."""
+    analog: int
+    """Analog values a frame."""
+    frames: int
+    """As many as the file says and has."""
+    start: int
+    """Byte at which the data begins."""
+    scale: float
+    """Factor of whole numbers; less than zero where the data is floats."""
+    rate: float
+    """Frames/s."""
+    processor: int
+
+    def numbers(self, name: str) -> Array:
+        """A parameter's numbers (n,); none where it is not there or is text."""
+        value = self.parameters.get(name)
+        return value.ravel().astype(float) if isinstance(value, np.ndarray) else np.zeros(0)
+
+    def words(self, name: str) -> list[str]:
+        """A parameter's words; none where it is not there or is numbers."""
+        value = self.parameters.get(name)
+        return value if isinstance(value, list) else []
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the points, N of them; empty where one has none."""
+        more = (self.words(f"POINT:LABELS{n}") for n in ("", *range(2, 200)))
+        found = [word for words in more for word in words][: self.points]
+        return found + [""] * (self.points - len(found))
+
+
+def read_c3d(path: str | Path) -> JointTable:
+    """Named points of a C3D file in metres, axes as they stand; not a number where they were not seen.
+
+    That is where the residual is less than zero, or the place exactly the origin, as some programs write it, or no place at all. Times
+    count from the file's first frame. Raises `FormatError` where the file is malformed; warns where it breaks off or tells no unit.
+    """
+    path = Path(path)
+    header = read_header(path)
+    names = header.labels
+    first = {name: n for n, name in reversed([*enumerate(names)]) if name and not name.startswith("*")}  # unnamed ones have a star
+    if not first:
+        raise FormatError(f"{path}: POINT:LABELS: found {shorten(names)!r}, expected names of points")
+    chosen = sorted(first.values())
+    places, seen = _points(header, chosen)
+    places *= _metres(header)
+    places[~seen | ~(np.abs(places) < FARTHEST).all(2)] = np.nan
+    try:
+        return JointTable(np.arange(len(places)) / header.rate, tuple(names[n] for n in chosen), places)
+    except ShadowPuppetError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def read_header(path: Path) -> C3d:
+    """All of a file but its data. Raises `FormatError`."""
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(BYTES)
+            if len(head) < BYTES or head[1] != KEY or not head[0]:
+                raise FormatError(f"{path}: found no C3D header, expected 512 bytes whose second is 0x50")
+            file.seek((head[0] - 1) * BYTES)
+            section = file.read(256 * BYTES)
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be read ({reason(error)})") from None
+    if len(section) < 4 or section[3] not in (INTEL, DEC, MIPS):
+        raise FormatError(f"{path}: found no parameters in block {head[0]}, expected those of an Intel, DEC or MIPS processor")
+    processor = section[3]
+    try:
+        parameters = _parameters(section[: (section[2] or 256) * BYTES], processor)
+    except (struct.error, IndexError, ValueError):
+        raise FormatError(f"{path}: the parameters break off or are damaged, expected groups of named values") from None
+    return _header(path, size, head, parameters, processor)
+
+
+def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], processor: int) -> C3d:
+    order = ">" if processor == MIPS else "<"
+    points, analog, first, last = struct.unpack(f"{order}4H", head[2:10])
+    block = struct.unpack(f"{order}H", head[16:18])[0]
+    known = C3d(path, parameters, points, analog, 0, 0, 0.0, 0.0, processor)
+
+    def told(name: str, otherwise: float) -> float:
+        values = known.numbers(name)
+        return float(values[0]) if len(values) else otherwise
+
+    points, block = (int(told(name, value)) & 0xFFFF for name, value in (("POINT:USED", points), ("POINT:DATA_START", block)))
+    scale = told("POINT:SCALE", _float(head[12:16], processor))
+    rate = told("POINT:RATE", _float(head[20:24], processor))
+    if not (math.isfinite(scale) and scale != 0) or not 0 < rate < 1e6 or not points or not block:
+        raise FormatError(f"{path}: found {points} points at {rate:g} frames/s, scale {scale:g}, data from block {block}, expected some, "
+                          "each more than zero (the scale less where they are floats)")
+    start, width = (block - 1) * BYTES, (4 * points + analog) * (4 if scale < 0 else 2)
+    said, there = _said(known, first, last), max(size - start, 0) // width
+    if there < said:
+        warn(f"{path}: found {there} frames, but it tells of {said}; those are used", ShadowPuppetWarning, stacklevel=5)
+    if not min(said, there):
+        raise FormatError(f"{path}: found no frame of {points} points from byte {start} on, expected a motion")
+    return C3d(path, parameters, points, analog, min(said, there), start, scale, rate, processor)
+
+
+def _said(known: C3d, first: int, last: int) -> int:
+    """Frames, where the file tells it best: the header's 16 bits do not hold long ones."""
+    ends = [known.numbers(f"TRIAL:ACTUAL_{end}_FIELD").astype(np.int64) & 0xFFFF for end in ("START", "END")]
+    if all(len(end) >= 2 for end in ends):
+        start, end = (int(each[0]) + 65536 * int(each[1]) for each in ends)
+        if end >= start > 0:
+            return end - start + 1
+    long = known.numbers("POINT:LONG_FRAMES")
+    return int(long[0]) if len(long) and 0 < long[0] < 2**31 else max(last - first + 1, 0)
+
+
+def _points(header: C3d, chosen: list[int]) -> tuple[Array, NDArray[np.bool_]]:
+    """Places (T, len(chosen), 3) in the file's unit, and whether each was seen."""
+    order, floats = ">" if header.processor == MIPS else "<", header.scale < 0
+    kind = np.dtype(f"{order}f4" if floats else f"{order}i2")
+    frame = np.dtype([("points", kind, (header.points, 4)), ("analog", kind, (header.analog,))])
+    try:
+        data = np.memmap(header.path, frame, "r", header.start, (header.frames,))["points"][:, chosen]
+    except (OSError, ValueError, OverflowError):
+        raise FormatError(f"{header.path}: the data cannot be read from byte {header.start} on") from None
+    with np.errstate(all="ignore"):  # damaged floats are told by what is no number
+        if floats and header.processor == DEC:
+            data = _from_dec(np.ascontiguousarray(data).view("<u4"))
+        values = data.astype(float)
+    places, residuals = values[..., :3], values[..., 3]
+    seen = ~(residuals < 0) & places.any(2)
+    return places if floats else places * header.scale, seen
+
+
+def _metres(header: C3d) -> float:
+    unit = "".join(header.words("POINT:UNITS")[:1]).lower()
+    if not unit:
+        warn(f"{header.path}: POINT:UNITS: found none, millimetres are taken", ShadowPuppetWarning, stacklevel=4)
+    if (unit or "mm") not in METRES:
+        raise FormatError(f"{header.path}: POINT:UNITS: found {shorten([unit])!r}, expected one of {choices(METRES)}")
+    return METRES[unit or "mm"]
+
+
+# Parameters
+
+
+def _parameters(section: bytes, processor: int) -> dict[str, Any]:
+    """Values by GROUP:NAME. Raises `struct.error`, `IndexError` or `ValueError` where the section is damaged."""
+    groups, found = dict[int, str](), list[tuple[int, str, Any]]()
+    at, order = 4, ">" if processor == MIPS else "<"
+    while at + 2 <= len(section):
+        length, group = struct.unpack("2b", section[at : at + 2])
+        length = abs(length)
+        if not length:
+            break
+        name = section[at + 2 : at + 2 + length].decode("latin-1").strip().upper()
+        at += 2 + length
+        following = struct.unpack(f"{order}H", section[at : at + 2])[0]
+        if group < 0:
+            groups[-group] = name
+        else:
+            found.append((group, name, _value(section, at + 2, processor)))
+        if not following:
+            break
+        at += following
+    return {f"{groups.get(group, '')}:{name}": value for group, name, value in found}
+
+
+def _value(section: bytes, at: int, processor: int) -> Any:
+    """The value of the parameter whose kind stands at byte `at`: words, or numbers (n,)."""
+    kind, count = struct.unpack("bB", section[at : at + 2])
+    shape = list(section[at + 2 : at + 2 + count])
+    if kind not in (CHAR, BYTE, INT, FLOAT) or len(shape) < count:
+        raise ValueError(kind)
+    start, total = at + 2 + count, math.prod(shape)
+    raw = section[start : start + total * abs(kind)]
+    if len(raw) < total * abs(kind):
+        raise ValueError(total)
+    if kind == CHAR:
+        width = shape[0] if shape else 1
+        text = raw.decode("latin-1")
+        return [text[n : n + width].strip(" \0\t") for n in range(0, len(text), width)] if width else []
+    if kind == FLOAT and processor == DEC:
+        return _from_dec(np.frombuffer(raw, "<u4"))
+    order = ">" if processor == MIPS else "<"
+    return np.frombuffer(raw, f"{order}{ {BYTE: 'u1', INT: 'i2', FLOAT: 'f4'}[kind]}").astype(float)
+
+
+def _float(raw: bytes, processor: int) -> float:
+    if processor == DEC:
+        return float(_from_dec(np.frombuffer(raw, "<u4"))[0])
+    return struct.unpack(">f" if processor == MIPS else "<f", raw)[0]
+
+
+def _from_dec(words: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Floats of a DEC processor: the 16-bit halves change places, and the exponent is greater by two."""
+    swapped = (words >> 16) | (words << 16)
+    with np.errstate(all="ignore"):
+        return swapped.astype(np.uint32).view(np.float32) / np.float32(4)

@@ -1,0 +1,89 @@
+"""Names that other programs give to joints, and ours."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from shadowpuppet.errors import FormatError
+from shadowpuppet.io._table import shorten
+from shadowpuppet.motion import BONES, JointTable
+
+JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
+"""Ours."""
+CENTRAL = {
+    "pelvis": ("pelvis", "hips", "midhip", "chip", "spinebase", "hip", "pelo"),
+    "neck": ("neck", "trxo"),
+    "head": ("head", "hedo"),
+}
+"""Joints without a side and what they are called, in the order of preference; letters and digits only, small.
+
+`pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them; `hips`, `upleg`, `forearm` are
+Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's; `midhip` OpenPose's, `chip` Pose2Sim's.
+"""
+SIDED = {
+    "shoulder": ("arm", "upperarm", "uparm", "shldr", "shoulder", "clo"),  # beside `arm`, `shoulder` is a collar bone's
+    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "huo"),
+    "wrist": ("wrist", "hand", "rao"),
+    "hand": ("handmiddle1", "hand", "fingerbase", "middle1", "hno"),
+    "hip": ("upleg", "upperleg", "thigh", "hip", "fep"),
+    "knee": ("knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo"),
+    "ankle": ("ankle", "foot", "tio"),
+}
+"""The same of those with a side. `hand` is the wrist where nothing else is called that."""
+STEMS = {stem for stems in SIDED.values() for stem in stems}
+PREFIXES = re.compile(r"^(?:.*[:|]|mixamorig\d*_|bip0*1[ _]|character1_)", re.IGNORECASE)
+"""What may stand before a joint's own name: the person's, or the program's."""
+WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+"""A name's words: LeftUpLeg, left_up_leg, L UpLeg."""
+LETTERS = {"l": "left", "r": "right", "left": "left", "right": "right"}
+
+
+def renamed(table: JointTable) -> JointTable:
+    """The joints of a table that are ours, by our names and in our order, whatever they are called there.
+
+    `pelvis` is made where it is missing and both hips are there. A head beside a nose is the crown, as 2D detectors have it, and left
+    out. Raises `FormatError` where no joint is known.
+    """
+    columns = columns_of(table.names)
+    if not columns:
+        raise FormatError(f"found no joint of a known name among {shorten(table.names)!r}, expected such as {', '.join(JOINTS[:5])}; or "
+                          "LeftArm, LeftForeArm, LeftUpLeg, ...; or LCLO, LHUO, LFEP, ... (Vicon)")
+    places = {joint: table.positions[:, column] for joint, column in columns.items()}
+    if "pelvis" not in places and {"left_hip", "right_hip"} <= set(places):
+        places["pelvis"] = (places["left_hip"] + places["right_hip"]) / 2
+    names = tuple(joint for joint in JOINTS if joint in places)
+    return JointTable(table.times, names, np.stack([places[name] for name in names], 1))
+
+
+def columns_of(names: Sequence[str]) -> dict[str, int]:
+    """For each of our joints that is among names, the index of the one that is meant."""
+    found = {name.lower(): n for n, name in enumerate(names) if name.lower() in JOINTS}
+    stems: dict[tuple[str, str], int] = {stem: n for n, stem in reversed([*enumerate(map(side_and_stem, names))])}
+    taken = set(found.values())
+    wanted = [(joint, "", others) for joint, others in CENTRAL.items()]
+    wanted += [(f"{side}_{joint}", side, others) for side in ("left", "right") for joint, others in SIDED.items()]
+    for name, side, others in wanted:
+        column = next((stems[side, stem] for stem in others if stems.get((side, stem), -1) not in {-1, *taken}), None)
+        if name not in found and column is not None:
+            found[name] = column
+            taken.add(column)
+    if ("", "nose") in stems:
+        found.pop("head", None)
+    return found
+
+
+def side_and_stem(name: str) -> tuple[str, str]:
+    """A name's side, `left`, `right` or none, and the rest, small and without signs."""
+    words = [word.lower() for word in WORDS.findall(PREFIXES.sub("", name))]
+    if len(words) > 1 and words[0] in LETTERS:
+        return LETTERS[words[0]], "".join(words[1:])
+    if len(words) > 1 and words[-1] in LETTERS:
+        return LETTERS[words[-1]], "".join(words[:-1])
+    whole = "".join(words)
+    for start, side in (("left", "left"), ("right", "right"), ("l", "left"), ("r", "right")):
+        if whole.startswith(start) and whole.removeprefix(start) in STEMS:
+            return side, whole.removeprefix(start)
+    return "", whole

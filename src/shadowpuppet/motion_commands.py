@@ -1,0 +1,75 @@
+"""The commands about motion capture: what a motion is like, learnt from files of it, and HumanEva as a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from shadowpuppet.flags import PriorFlags, given, output
+
+ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
+
+
+def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, or .amc beside its .asf.")], /, *,
+              file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
+              rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
+              flags: ForPrior = None) -> None:  # fmt: skip
+    """Learn what a motion is like from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
+
+    Parameters
+    ----------
+    regions
+        Regions of poses, M; or choose, which finds the least number that is good for motion left out.
+    rate
+        Frames/s of the films that it is for.
+    body
+        The body whose poses are learnt.
+    seed
+        Seed of all chance.
+    """
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.priors import prior_from_files
+    from shadowpuppet.settings import PriorSettings, validate
+    from shadowpuppet.tables import prior_tables
+    from shadowpuppet.terminal import show, terminal
+
+    if not (regions == "choose" or (regions.isdecimal() and len(regions) < 10)):
+        raise SettingsError(f"flags: regions: found {regions!r}, expected a number or choose")
+    values = given(flags) | ({"regions": int(regions)} if regions.isdecimal() else {})
+    with terminal() as shown:
+        shown.begin("learning")
+        trained = prior_from_files(motions, file, validate(PriorSettings, values, "flags"), seed=seed, body=body, rate=rate,
+                                   choose=regions == "choose")
+    show(*prior_tables(trained, file))
+
+
+def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
+             folder: Annotated[Path | None, output("Folder of the recording. [default: the trial's name]")] = None,
+             subject: str = "S2", action: str = "Walking", trial: int = 1, part: Literal["validation", "training", "all"] = "validation",
+             training_frames: int = 100) -> None:  # fmt: skip
+    """Make a recording of a trial of HumanEva, which needs a licence: calibration, timing, truth and training; films stay in their place.
+
+    Parameters
+    ----------
+    subject
+        S1 to S4.
+    action
+        Walking, Jog, Box, Gestures, ThrowCatch or Combo.
+    trial
+        Its number.
+    part
+        Frames of the owners' own partition, or all; validation of S2 is what Ni 2008 tracks.
+    training_frames
+        Frames in a row that training.csv gets, of the training part of the same action; 0 for all.
+    """
+    from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
+    from shadowpuppet.tables import trial_table
+    from shadowpuppet.terminal import show, terminal
+
+    with terminal():
+        found = read_humaneva(data, subject, action, trial, part, training_frames)
+        folder = folder or Path(found.recording.name)
+        write_humaneva(found, folder)
+    show(trial_table(found, folder))
