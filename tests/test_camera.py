@@ -60,6 +60,13 @@ def test_rays_undo_fisheye_projection(where):
     np.testing.assert_allclose(cam.project(cam.rays(where) * 3), where, atol=1e-6)
 
 
+@pytest.mark.parametrize("fisheye", [False, True])
+def test_rays_do_not_depend_on_how_pixels_lie_in_memory(rng, fisheye):
+    cam = camera(distortion=[-0.02, 0.01, 0.001, 0.0], fisheye=fisheye, T_camera_world=np.eye(4))
+    table = rng.uniform(5, 100, (6, 3))
+    np.testing.assert_array_equal(cam.rays(table[:, :2]), cam.rays(table[:, :2].copy()))
+
+
 def test_points_at_and_behind_the_camera_have_no_pixel():
     cam = camera(T_camera_world=np.eye(4))
     found = cam.project([[0, 0, 1.0], [0, 0, 0], [0.1, 0.1, -1]])

@@ -26,7 +26,7 @@ from shadowpuppet.footage import (
     take_sample,
 )
 from shadowpuppet.initialization import POSTURES, Fit, Guess, sizes_from_height
-from shadowpuppet.look import _quality, prepare
+from shadowpuppet.look import prepare, quality_of
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.pipeline import json_text, look_at, track_recording
 
@@ -342,7 +342,7 @@ masks = st.lists(st.integers(0, 2**16 - 1), min_size=3, max_size=9).map(
 @settings(deadline=None)
 @given(masks)
 def test_the_quality_of_one_run_is_that_of_its_masks(run):
-    ours, right = asdict(_quality([run], [0])), asdict(mask_quality(run))
+    ours, right = asdict(quality_of([run], [0])), asdict(mask_quality(run))
     assert ours.pop("border") == pytest.approx(right.pop("border"))
     assert ours == pytest.approx(right)
 
@@ -350,7 +350,7 @@ def test_the_quality_of_one_run_is_that_of_its_masks(run):
 @settings(deadline=None)
 @given(masks, masks)
 def test_the_quality_of_two_runs_lies_between(first, second):
-    both, one, two = _quality([first, second], [0, 50]), mask_quality(first), mask_quality(second)
+    both, one, two = quality_of([first, second], [0, 50]), mask_quality(first), mask_quality(second)
     assert both.frames == one.frames + two.frames
     for name in ("area", "area_change", "area_jumps", "flicker", "specks", "holes"):
         low, high = sorted([getattr(one, name), getattr(two, name)])
@@ -359,7 +359,7 @@ def test_the_quality_of_two_runs_lies_between(first, second):
 
 def test_the_first_bad_frame_is_counted_in_the_film():
     empty, person = np.zeros((12, 16), bool), np.pad(np.ones((8, 4), bool), [(2, 2), (6, 6)])
-    quality = _quality([[person, person], [person, empty]], [0, 50])
+    quality = quality_of([[person, person], [person, empty]], [0, 50])
     assert (quality.empty, quality.first_empty) == (1, 51)
 
 

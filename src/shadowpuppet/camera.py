@@ -129,7 +129,7 @@ class Camera:
         """Directions in the camera's frame (..., 3), z = 1, of pixels (..., 2): the inverse of `project` up to depth."""
         import cv2
 
-        pixels = np.asarray(pixels, float)
+        pixels = np.ascontiguousarray(pixels, float)  # OpenCV's fisheye reads others wrongly
         flat = pixels.reshape(-1, 1, 2)
         if not flat.size:
             return np.zeros((*pixels.shape[:-1], 3))

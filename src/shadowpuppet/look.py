@@ -118,15 +118,15 @@ def _first_look(footage: Footage, sample: Sample, seen: Silhouettes) -> Look:
     plain = [mask for shot in sample.shots if (mask := seen.plain(shot)) is not None]
     flat = [mask for run in masks for mask in run]
     exact = [ready_mask(shot.ready) for shot in sample.shots if shot.ready is not None and seen.segmenter is not None]
-    quality, camera = _quality(masks, sample.starts), footage.camera
+    quality, camera = quality_of(masks, sample.starts), footage.camera
     look = Look(
         recording=str(footage.recording.path), camera=camera.name, size=footage.view.camera.size, worked_size=camera.size,
         fov=float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))), calibrated=camera.oriented,
         frames=footage.film().count, looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter,
         scale=told_scale(footage), background=seen.source,
         key="none" if seen.segmenter is None else seen.segmenter.reason,
-        area=_share(flat), plain_area=_share(plain) if plain else None, exact_overlap=_agreement(flat, exact),
-        exact_overlap_plain=_agreement(plain, exact), quality=quality, refusal=quality.refusal(),
+        area=_share(flat), plain_area=_share(plain) if plain else None, exact_overlap=mean_overlap(flat, exact),
+        exact_overlap_plain=mean_overlap(plain, exact), quality=quality, refusal=quality.refusal(),
     )  # fmt: skip
     return look if look.refusal else replace(look, doubts=tuple(_doubts(look, footage)))
 
@@ -156,13 +156,13 @@ def _share(masks: Sequence[Mask]) -> float:
     return float(np.mean([mask.mean() for mask in masks]))
 
 
-def _agreement(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:
+def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:
     """Mean overlap, where there is anything."""
     overlaps = np.array([overlap(mask, right) for mask, right in zip(masks, exact)])
     return float(np.nanmean(overlaps)) if np.isfinite(overlaps).any() else None
 
 
-def _quality(runs: Sequence[Sequence[Mask]], starts: Sequence[int]) -> MaskQuality:
+def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int]) -> MaskQuality:
     """Quality of masks in several runs; what is compared with the frame before is so within a run only."""
     all_of = [mask_quality(run) for run in runs]
     frames = np.array([quality.frames for quality in all_of], float)

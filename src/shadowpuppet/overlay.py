@@ -37,7 +37,7 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
     picture with the skeleton, the time (s), the status and the overlap. A `pose` (D,) that is not numbers is not drawn.
     Raises `ShadowPuppetError` where a picture has not the camera's size.
     """
-    image, pose, mask = _colour(image), np.asarray(pose, float), np.asarray(mask, bool)
+    image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
     size = picture.camera.size
     for what, array in (("image", image), ("mask", mask), ("ignore", mask if ignore is None else np.asarray(ignore))):
         if array.shape[:2] != size[::-1]:
@@ -122,7 +122,8 @@ class OverlayWriter:
         self._film.write(overlay_frame(image, mask, self.picture, pose, status=status, time=time, overlap=overlap, ignore=ignore))
 
 
-def _colour(image: Image) -> Image:
+def in_colour(image: Image) -> Image:
+    """A picture (H, W, 3) of one (H, W, 3) or (H, W)."""
     image = np.asarray(image, np.uint8)
     return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image
 
@@ -214,17 +215,17 @@ def _point(pixel: Array) -> tuple[int, int]:
 
 def _label(out: Image, height: int, status: str, time: float, overlap: float) -> None:
     fit = "" if np.isnan(overlap) else f"  IoU {overlap:.2f}"
-    _write(out, "best estimate", 0, WHITE)
-    end = _write(out, "model only", height, MODEL_ONLY)
-    _write(out, "silhouette only", height, SILHOUETTE_ONLY, end)
-    _write(out, f"{time:.2f} s  {status}{fit}", 2 * height, WHITE)
+    write_text(out, "best estimate", 0, WHITE)
+    end = write_text(out, "model only", height, MODEL_ONLY)
+    write_text(out, "silhouette only", height, SILHOUETTE_ONLY, end)
+    write_text(out, f"{time:.2f} s  {status}{fit}", 2 * height, WHITE)
 
 
-def _write(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0) -> int:
-    """Write a line of text below `top`, with a dark rim; returns where it ends."""
+def write_text(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0, size: float | None = None) -> int:
+    """Write a line of text below `top`, with a dark rim, for a picture so many pixels high; returns where it ends."""
     import cv2
 
-    scale = max(0.35, out.shape[0] / 3 / 600)
+    scale = max(0.35, (out.shape[0] / 3 if size is None else size) / 600)
     thickness, rim = max(1, round(1.5 * scale)), max(1, round(scale))
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
     x, y = left + round(12 * scale), top + height + round(12 * scale)
