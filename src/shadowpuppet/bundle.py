@@ -42,15 +42,16 @@ class Bundle(Generic[Measured]):
 
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
-                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float = 1e-6) -> Bundle[Measured]:
+                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float = 1e-6, first: Measured | None = None) -> Bundle[Measured]:
     """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
 
     Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull` holds poses where the points say
-    nothing, and points count less the farther off they are, both as in `Refiner.gauss_newton`.
+    nothing, and points count less the farther off they are, both as in `Refiner.gauss_newton`. `first`: sizes to begin with, if not
+    those expected.
     """
     settings, start, about = settings or SurfaceSettings(), poses, expected.to_array()
     free, scale = np.flatnonzero(spread > 0), WORTH / NOISE**2
-    at, damping, best = (about, poses), 1e-2, None
+    at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
         frames = [_equations(body, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
@@ -62,6 +63,7 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
             best = _Solution(at, cost, frames, strain / spread[free], body)
         if turn < rounds:
             at = _moved(best, free, 1 / spread[free] ** 2 / scale, scale, start, pull, damping)
+    assert best is not None
     residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
     return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
 
@@ -120,27 +122,27 @@ def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float,
 def _equations(body: Body, nudged: list[Body], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
     """What a frame's points say about its pose and the sizes."""
     near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
-    T, screws, out = _measured(body, pose, cloud, settings, near, True)
+    screws, out = _measured(body, pose, cloud, settings, near, True)
     distances, weights, levers = out[0], out[1] / max(cloud.total, 1e-9), out[2:8].T
     screws[:, 3:] -= np.cross(cloud.origin, screws[:, :3])
     reach = _hangs(body)[:, body.limbs.joints[near[:, LANES:].ravel().astype(int)]]  # pyright: ignore[reportOptionalMemberAccess]
     moves = (levers @ screws.T) * reach.T
-    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[2][0]) / NUDGE for other in nudged]
+    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / NUDGE for other in nudged]
     rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), -1)], 1)
     weighed = rows * weights[:, None]
     squared = float(weights @ distances**2 / max(weights.sum(), 1e-9))
     return _Frame(float(out[8].sum()) / max(cloud.total, 1e-9), squared, rows.T @ weighed, weighed.T @ distances)
 
 
-def _measured(body: Body, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array, Array]:
-    """Transforms, screws, and of every point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
+def _measured(body: Body, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array]:
+    """Screws, and of every point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
     limbs, chain = body.limbs, make_chain(body.skeleton)
     assert limbs is not None
     T, screws, out = np.zeros((len(chain.parents), 3, 4)), np.zeros((len(pose), 6)), np.zeros((9, len(cloud.rows) * LANES))
     place_one(pose, chain, T, screws, np.zeros((3, 3, 3)))
     _tangents(T, limbs.joints, limbs.rotations, limbs.starts, constants(limbs), cloud.rows, cloud.spheres, cloud.origin,
               np.float32(settings.epsilon), np.float32(settings.tau), associate, near, np.zeros(8 * LANES, np.float32), out)
-    return T, screws, out
+    return screws, out
 
 
 def _hangs(body: Body) -> NDArray[np.bool_]:

@@ -16,11 +16,22 @@ from pydantic_core import PydanticCustomError
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.settings import InitializationSettings, MonocularSettings, PriorSettings, checked, make_settings, validate
+from shadowpuppet.settings import (
+    MULTIVIEW_PRESETS,
+    PRESETS,
+    InitializationSettings,
+    MonocularSettings,
+    MultiviewSettings,
+    PriorSettings,
+    checked,
+    make_multiview_settings,
+    make_settings,
+    validate,
+)
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres
 
-TABLES = ("tracker", "silhouette", "initialization", "training")
+TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
 PATHS = ("calibration", "background", "person", "prior")
 """Options that are files; in a file of settings they are relative to it."""
@@ -50,7 +61,7 @@ class Options:
     """What a run can be told; each is a flag of the command line and a line of TOML."""
 
     preset: str = "default"
-    """Settings of the tracker to begin with: default (the best we know) or liu2011 (the paper's)."""
+    """Settings to begin with: default (the best we know), liu2011 (the paper's, of one camera) or ni2008 (the paper's, of several)."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of all randomness: the same seed gives the same run."""
     height: Annotated[float, Field(ge=HEIGHTS[0], le=HEIGHTS[1]), _metres(HEIGHTS)] | None = None
@@ -79,7 +90,9 @@ class Options:
     overlay: bool = False
     """Write overlay.mp4 too: model, matching result and raw picture, one below the other."""
     tracker: MonocularSettings = MonocularSettings()
-    """The tracker."""
+    """The tracker of one camera."""
+    multiview: MultiviewSettings = MultiviewSettings()
+    """The tracker of several cameras."""
     silhouette: SilhouetteSettings = SilhouetteSettings()
     """How the person is told from the background."""
     initialization: InitializationSettings = InitializationSettings()
@@ -100,7 +113,12 @@ def make_options(values: Mapping[str, Any] | None = None, source: str = "setting
     preset = values.get("preset", "default")
     if not isinstance(preset, str):
         raise SettingsError(f"{source}: preset: found {preset!r}, expected a name in quotes")
-    values["tracker"] = make_settings(preset, values.get("tracker", {}), f"{source}: tracker")
+    known = {**PRESETS, **MULTIVIEW_PRESETS}
+    if preset not in known:
+        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(known)}")
+    of = {table: preset if preset in presets else "default" for table, presets in (("tracker", PRESETS), ("multiview", MULTIVIEW_PRESETS))}
+    values["tracker"] = make_settings(of["tracker"], values.get("tracker", {}), f"{source}: tracker")
+    values["multiview"] = make_multiview_settings(of["multiview"], values.get("multiview", {}), f"{source}: multiview")
     return validate(Options, values, source)
 
 

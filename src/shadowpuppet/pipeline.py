@@ -23,8 +23,9 @@ from shadowpuppet.options import Options, plain_options
 from shadowpuppet.overlay import OverlayWriter
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import chosen_views, open_rig
+from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.rig_look import RigLook, look_at_rig
-from shadowpuppet.rig_run import Prepare, track_rig
+from shadowpuppet.rig_run import track_rig
 from shadowpuppet.running import (
     FALLBACK_RATE,
     Listener,
@@ -40,10 +41,6 @@ from shadowpuppet.tracking import MonocularTracker, State
 
 __all__ = ["Listener", "Summary", "Watch", "fit_person", "json_text", "look_at", "motion_frame", "named_body", "next_state",
            "track_recording"]
-
-
-PREPARE: Prepare | None = None
-"""Measures the person and makes the tracker where there are several cameras; None: one of them has to be chosen."""
 
 
 def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
@@ -63,8 +60,8 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     the same options, film and machine give the same joints.
     """
     options, listener = options or Options(), listener or Listener()
-    if several(recording, options) and PREPARE is not None:
-        return track_rig(recording, folder, options, listener, PREPARE)
+    if several(recording, options):
+        return track_rig(recording, folder, options, listener, prepare_puppet)
     with_names, joints = named_body(options.tracker.body)
     info = {"recording": Path(recording).resolve(), "method": "Liu 2011, one camera", "settings": plain_options(options)}
     with RunWriter(folder, options.tracker.body, with_names.skeleton.dof_names, joints, info) as run:

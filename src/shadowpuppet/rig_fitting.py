@@ -1,0 +1,54 @@
+"""Who is before several cameras, and what follows them: sizes from a file, from training motion or from a height, refined on the first
+seconds; a motion prior; the tracker."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.bodies import average_sizes, make_body, sizes_kind
+from shadowpuppet.errors import SettingsError
+from shadowpuppet.io.person import Person, read_person, write_person
+from shadowpuppet.measuring import measure, seen_height, spread_of
+from shadowpuppet.motion import JointTable
+from shadowpuppet.options import Options
+from shadowpuppet.priors import familiar
+from shadowpuppet.rig import Rig
+from shadowpuppet.rig_look import Opening
+from shadowpuppet.rig_run import Puppet
+from shadowpuppet.tracking import MultiviewTracker
+from shadowpuppet.visual_hull import VisualHull
+
+
+def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options: Options, training: JointTable | None) -> Puppet:
+    """Measure the person in the first seconds, and make the tracker. Raises a `ShadowPuppetError` where nobody is found, or a file does not
+    fit."""
+    settings = options.multiview
+    kind, hull = sizes_kind(settings.body), VisualHull(rig.cameras, settings.hull)
+    known = familiar(rng, options, training, settings.body, rig.rate)
+    first = [(hull.points(masks), masks) for masks in opening.masks]
+    height = options.height or rig.recording.subject.height
+    if options.person is not None:
+        sizes, source = read_person(options.person).sizes, str(options.person)
+        if not isinstance(sizes, kind):
+            raise SettingsError(f"{options.person}: found sizes of {type(sizes).__name__}, expected {kind.__name__}, those of the body {settings.body!r}")
+        spread = np.zeros(len(sizes.names()))
+    elif known.sizes is not None:
+        sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", spread_of(known.sizes, shown=True)
+    else:
+        seen = height or seen_height(first) or AVERAGE_HEIGHT
+        sizes = average_sizes(settings.body, seen)
+        source = f"{'the height' if height else f'a height of {seen:.2f} m as seen'}, and the hulls of the first seconds"
+        spread = spread_of(sizes, shown=False)
+    library = known.poses if len(known.poses) else None
+    person = measure(rng, partial(make_body, settings.body), sizes, spread, rig.cameras, first, settings, library)
+    prior = known.prior if settings.method == "hybrid" else None
+    tracker = MultiviewTracker(person.body, rig.cameras, settings, prior, library)
+    told: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
+                            "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
+    saved = Person(person.sizes, height, source)
+    return Puppet(person.body, tracker, hull, told, (), lambda folder: write_person(Path(folder) / "person.toml", saved))
