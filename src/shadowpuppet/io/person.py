@@ -6,19 +6,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shadowpuppet.bodies import ALL, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.sizes import HEIGHTS, CardboxSizes, expected_metres, is_within
+from shadowpuppet.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
 
-KEYS = ("height", "source", "notes", "sizes")
+KEYS = ("body", "height", "source", "notes", "sizes")
+UPPER = "rounded"
+"""The body that sizes are for where a file does not say: with it, all upper bodies, which have the same sizes."""
 
 
 @dataclass(frozen=True)
 class Person:
     """A person as the model has them. Raises `ShadowPuppetError` where the height cannot be one."""
 
-    sizes: CardboxSizes
+    sizes: Sizes
+    """Of an upper body or of one of the whole ones."""
     height: float | None = None
     """Metres, shoes on; None where it is not known."""
     source: str = ""
@@ -35,27 +39,39 @@ class Person:
                 raise ShadowPuppetError(f"{key}: found {getattr(self, key)!r}, expected text in quotes")
 
 
-def read_person(path: str | Path) -> Person:
-    """A person from a file. Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible."""
-    path = Path(path)
+def read_person(path: str | Path, body: str | None = None) -> Person:
+    """A person from a file, to be made into `body`, if one is named.
+
+    Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible, or the sizes are another body's.
+    """
+    path, wanted = Path(path), body
     data = read_toml(path, FormatError)
     unknown = set(data) - set(KEYS)
     if unknown:
         raise FormatError(f"{path}: found the key {min(unknown)!r}; keys known: {choices(KEYS)}")
-    sizes = data.pop("sizes", None)
+    sizes, body = data.pop("sizes", None), data.pop("body", UPPER)
+    if not isinstance(body, str) or body not in ALL:
+        raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(ALL)}")
+    kind = sizes_kind(body)
     if not isinstance(sizes, dict):
-        raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(CardboxSizes.names())}")
+        raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")
     try:
-        return Person(CardboxSizes.from_mapping(sizes), **data)
+        person = Person(kind.from_mapping(sizes), **data)
     except ShadowPuppetError as error:
         raise FormatError(f"{path}: {error}") from None
+    if wanted is not None and kind is not sizes_kind(wanted):
+        raise FormatError(f"{path}: sizes: found those of the body {body!r}, expected those of {wanted!r}: choose that body, or measure "
+                          "the person again")
+    return person
 
 
 def write_person(path: str | Path, person: Person) -> None:
     """Write a person so that `read_person` gives them back. Raises `ShadowPuppetError` where that fails."""
     import tomli_w
 
-    known: dict[str, Any] = {} if person.height is None else {"height": float(person.height)}
+    upper = isinstance(person.sizes, CardboxSizes)
+    known: dict[str, Any] = {} if upper else {"body": kind_of(person.sizes)}
+    known |= {} if person.height is None else {"height": float(person.height)}
     sizes = dict(zip(person.sizes.names(), person.sizes.to_array().tolist()))
-    head = "# Lengths in metres; the sizes are a1..a18 of Liu 2011, Fig. 2.\n"
+    head = "# Lengths in metres" + ("; the sizes are a1..a18 of Liu 2011, Fig. 2.\n" if upper else ".\n")
     write_whole(Path(path), head + tomli_w.dumps({**known, "source": person.source, "notes": person.notes, "sizes": sizes}))
