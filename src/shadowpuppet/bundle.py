@@ -16,7 +16,7 @@ from shadowpuppet.body import Body
 from shadowpuppet.closest import LANES, Cloud, Single, constants, measure, nearest, place_parts
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel
-from shadowpuppet.screws import make_chain, place_one
+from shadowpuppet.screws import Chain, make_chain, place_one
 from shadowpuppet.settings import SurfaceSettings
 from shadowpuppet.sizes import Sizes
 
@@ -54,7 +54,8 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
-        frames = [_equations(body, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
+        model = _model(body)
+        frames = [_equations(model, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
         strain = (at[0] - about)[free] / spread[free]
         cost = scale * (sum(frame.cost for frame in frames) + pull * ((at[1] - start) ** 2).sum()) + (strain**2).sum()
         better = best is None or cost < best.cost
@@ -66,6 +67,31 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     assert best is not None
     residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
     return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
+
+
+class _Model(NamedTuple):
+    """What kernels know of a body."""
+
+    chain: Chain
+    joints: NDArray[np.int64]
+    rotations: Array
+    starts: Array
+    parts: Single
+    reach: NDArray[np.bool_]
+    """Whether a DOF moves a joint, of shape (D, J)."""
+
+
+def _model(body: Body) -> _Model:
+    skeleton, limbs = body.skeleton, body.limbs
+    assert limbs is not None
+    parents = skeleton.tree[0]
+    above = np.eye(len(parents), dtype=bool)
+    for j, parent in enumerate(parents):
+        if parent >= 0:
+            above[:, j] |= above[:, parent]
+    chain = make_chain(skeleton)
+    return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), constants(limbs),
+                  above[chain.owners])
 
 
 class _Frame(NamedTuple):
@@ -91,9 +117,9 @@ class _Solution(NamedTuple):
     body: Body
 
 
-def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[Body]:
+def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[_Model]:
     """Bodies of which one size each is larger."""
-    return [make(kind.from_array(at + NUDGE * (np.arange(len(at)) == k))) for k in free]
+    return [_model(make(kind.from_array(at + NUDGE * (np.arange(len(at)) == k)))) for k in free]
 
 
 def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: float,
@@ -119,14 +145,13 @@ def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float,
     return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -FARTHEST_TURN, FARTHEST_TURN))
 
 
-def _equations(body: Body, nudged: list[Body], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
+def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
     """What a frame's points say about its pose and the sizes."""
     near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
-    screws, out = _measured(body, pose, cloud, settings, near, True)
+    screws, out = _measured(model, pose, cloud, settings, near, True)
     distances, weights, levers = out[0], out[1] / max(cloud.total, 1e-9), out[2:8].T
     screws[:, 3:] -= np.cross(cloud.origin, screws[:, :3])
-    reach = _hangs(body)[:, body.limbs.joints[near[:, LANES:].ravel().astype(int)]]  # pyright: ignore[reportOptionalMemberAccess]
-    moves = (levers @ screws.T) * reach.T
+    moves = (levers @ screws.T) * model.reach[:, model.joints[near[:, LANES:].ravel().astype(int)]].T
     grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / NUDGE for other in nudged]
     rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), -1)], 1)
     weighed = rows * weights[:, None]
@@ -134,26 +159,13 @@ def _equations(body: Body, nudged: list[Body], pose: Array, cloud: Cloud, settin
     return _Frame(float(out[8].sum()) / max(cloud.total, 1e-9), squared, rows.T @ weighed, weighed.T @ distances)
 
 
-def _measured(body: Body, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array]:
+def _measured(model: _Model, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array]:
     """Screws, and of every point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
-    limbs, chain = body.limbs, make_chain(body.skeleton)
-    assert limbs is not None
-    T, screws, out = np.zeros((len(chain.parents), 3, 4)), np.zeros((len(pose), 6)), np.zeros((9, len(cloud.rows) * LANES))
-    place_one(pose, chain, T, screws, np.zeros((3, 3, 3)))
-    _tangents(T, limbs.joints, limbs.rotations, limbs.starts, constants(limbs), cloud.rows, cloud.spheres, cloud.origin,
+    T, screws, out = np.zeros((len(model.chain.parents), 3, 4)), np.zeros((len(pose), 6)), np.zeros((9, len(cloud.rows) * LANES))
+    place_one(pose, model.chain, T, screws, np.zeros((3, 3, 3)))
+    _tangents(T, model.joints, model.rotations, model.starts, model.parts, cloud.rows, cloud.spheres, cloud.origin,
               np.float32(settings.epsilon), np.float32(settings.tau), associate, near, np.zeros(8 * LANES, np.float32), out)
     return screws, out
-
-
-def _hangs(body: Body) -> NDArray[np.bool_]:
-    """Whether a DOF moves a joint, of shape (D, J)."""
-    skeleton = body.skeleton
-    parents = skeleton.tree[0]
-    above = np.eye(len(parents), dtype=bool)
-    for j, parent in enumerate(parents):
-        if parent >= 0:
-            above[:, j] |= above[:, parent]
-    return above[[skeleton.joint_index(dof.joint) for dof in skeleton.dofs]]
 
 
 @kernel

@@ -36,6 +36,8 @@ FRAMES, SHARE = 24, 4
 """Frames that are solved for together, at most, and every which of their points is taken."""
 SIZE_PULL = 1e-5
 """Pull of the poses to where the tracker had them."""
+WORSE = 0.06
+"""A frame whose overlap is less than the best one's by this was misunderstood."""
 ENOUGH = 4
 """Frames in which the person must be found."""
 
@@ -89,13 +91,16 @@ def measure(rng: np.random.Generator, make: Callable[[Measured], Body], expected
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
               first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> list[tuple[int, MultiviewState]]:
-    """Frames in which the person is found, and the tracker's states."""
-    state, found = None, []
+    """Frames in which the person is found, and the tracker's states: followed, or, where that goes badly, found anew if that is better."""
+    state, found, best = None, [], 0.0
     for n, (points, masks) in enumerate(first):
         state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
+        if state.overlap < best - WORSE and state.status != "absent":
+            state = min(state, tracker.start(rng, points, masks), key=lambda each: each.cost)
+        best = max(best, state.overlap)
         if state.status in ("tracked", "uncertain"):
             found.append((n, state))
-    return found
+    return [(n, state) for n, state in found if state.overlap > best - WORSE]
 
 
 def seen_height(first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> float | None:

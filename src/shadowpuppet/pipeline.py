@@ -38,12 +38,14 @@ from shadowpuppet.running import (
     timings,
     warn_of_losses,
 )
+from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking import MonocularTracker, State
 
 __all__ = ["Listener", "Summary", "Watch", "fit_person", "json_text", "look_at", "motion_frame", "named_body", "next_state",
            "track_recording"]
 
 
+@one_blas_thread()
 def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
     """What `track_recording` would begin with. Raises a `ShadowPuppetError` where something cannot be used."""
     options = options or Options()
@@ -52,6 +54,7 @@ def look_at(recording: str | Path, options: Options | None = None) -> Look | Rig
     return prepare(str(recording), options, generators(options)[0]).look
 
 
+@one_blas_thread()
 def track_recording(recording: str | Path, folder: str | Path, options: Options | None = None,
                     listener: Listener | None = None) -> Summary:
     """Track a recording (folder, or film with `Options.fov`) into a run folder; one of several cameras as `rig_run` does.
@@ -87,6 +90,7 @@ def several(recording: str | Path, options: Options) -> bool:
     return len(chosen_views(opened(recording, options), options.camera)) > 1
 
 
+@one_blas_thread()
 def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[Found, Look]:
     """Find a person's sizes and save them. Raises a `ShadowPuppetError` where nobody is found or the file cannot be written."""
     options = options or Options()

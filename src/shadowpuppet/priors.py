@@ -20,6 +20,7 @@ from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.options import Options
 from shadowpuppet.settings import PriorSettings
 from shadowpuppet.skeleton import Skeleton
+from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.training import RATE, Trained, matched, train_prior
 from shadowpuppet.whole_sizes import BoneSizes
 
@@ -27,6 +28,7 @@ CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)
 """Numbers of regions that are tried where one is to be chosen (Ni 2008, Figs. 4 and 8)."""
 
 
+@one_blas_thread()
 def prior_from_files(motions: Sequence[str | Path], file: str | Path, settings: PriorSettings | None = None, *, seed: int = 0,
                      body: str = "anatomical", rate: float = RATE, choose: bool = False) -> Trained:
     """Learn a prior from files that `read_motion` reads, at `rate` frames/s, and save it (.npz).

@@ -22,7 +22,7 @@ from shadowpuppet.options import Options
 from shadowpuppet.rig import Rig, follow, usable_cores
 from shadowpuppet.silhouette import ready_mask
 
-OPENING, OPENED = 4.0, 40
+OPENING, OPENED = 2.0, 40
 """The first seconds in which the person is measured, and at most how many sets of silhouettes of them are kept."""
 RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and of lengths (s), from which on films are said to differ."""
