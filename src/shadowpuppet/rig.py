@@ -7,7 +7,7 @@ import math
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,7 +113,7 @@ def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
     return tuple(views[name] for name in views if name in asked)
 
 
-def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = False, threads: int | None = None) -> Iterator[FrameSet]:
+def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = False, threads: int | None = None) -> Generator[FrameSet]:
     """All that the cameras saw, set by set, with the silhouettes that `seen` (one a camera) makes of it.
 
     Pictures belong to one set that are nearest to its time, within half the time from set to set. A camera whose film breaks off or
