@@ -99,8 +99,8 @@ def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]],
     if found.wrong:
         return replace(found, remedy=_remedy(scene, found, blamed, seconds))
     if height is not None and not PEOPLE[0] < height < PEOPLE[1]:
-        told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? multiply "
-                "every translation in calibration.toml by what is missing")
+        told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? "
+                "multiply every translation in calibration.toml by what is missing")
         return replace(found, remedy=told)
     return found
 
@@ -216,8 +216,8 @@ def _shifted(scene: _Scene, n: int, steps: int) -> _Scene:
 def _late(names: Sequence[str], n: int, late: float) -> str:
     later = [names[n]] if late > 0 else [name for name in names if name != names[n]]
     start = ", ".join(f"{name} = {abs(late):.2f}" for name in later)
-    return (f"camera {names[n]!r} is about {abs(late):.2f} s {'late' if late > 0 else 'early'}, it seems; add to [start] of recording.toml: "
-            f"{start}")
+    return (f"camera {names[n]!r} is about {abs(late):.2f} s {'late' if late > 0 else 'early'}, it seems; add to [start] of "
+            f"recording.toml: {start}")
 
 
 # Figures
