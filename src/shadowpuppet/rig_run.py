@@ -15,7 +15,7 @@ from shadowpuppet.body import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.masks import Mask, may_be_person
 from shadowpuppet.motion import BLANK, JointTable, MotionFrame
@@ -113,7 +113,7 @@ def track_rig(recording: str | Path, folder: str | Path, options: Options, liste
 
 def training_of(rig: Rig) -> JointTable | None:
     """The recording's training motion, where it has some. Raises `FormatError`."""
-    return None if rig.recording.training is None else read_joints(rig.recording.training)
+    return None if rig.recording.training is None else read_motion(rig.recording.training)
 
 
 def _summary(folder: Path, rig: Rig, look: RigLook) -> Summary:
