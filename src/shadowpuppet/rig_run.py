@@ -18,6 +18,7 @@ from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.masks import Mask, may_be_person
+from shadowpuppet.metrics import of_surfaces
 from shadowpuppet.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.rasterize import Picture
@@ -118,7 +119,7 @@ def training_of(rig: Rig) -> JointTable | None:
 
 def _summary(folder: Path, rig: Rig, look: RigLook) -> Summary:
     written = read_run(folder)
-    metrics = written.metrics | evaluated(rig.recording, written.motion)
+    metrics = written.metrics | of_surfaces(evaluated(rig.recording, written.motion))
     warn_of_losses(written.motion)
     write_metrics(folder, metrics)
     return Summary(folder, written.motion, metrics, look)

@@ -61,7 +61,7 @@ def error_table(errors: Mapping[str, Any]) -> RenderableType:
 
 def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     """What is known without a truth, and beside it."""
-    fit, cost = metrics["overlap"], metrics["cost_px"]
+    fit, cost = metrics["overlap"], metrics.get("cost_px", {"count": 0})
     frames = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
     rows = [("frames", f"{metrics['frames']}: {frames}" if frames else "none")]
     if fit["count"]:
