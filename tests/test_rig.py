@@ -80,6 +80,21 @@ def test_sets_do_not_depend_on_threads(tmp_path, threads):
     assert numbers(made, threads=threads) == numbers(made)
 
 
+@pytest.mark.parametrize("every", [1, 2, 3, 20])
+def test_only_every_nth_set_is_looked_at(tmp_path, every):
+    looked = []
+
+    def see(shot: Shot) -> np.ndarray:
+        looked.append(number_of(shot.image))
+        return bright(shot)
+
+    made = rig(tmp_path, steady(11), steady(11))
+    sets = list(follow(made, [see] * 2, every=every))
+    assert [number_of(each.images[0]) for each in sets] == list(range(0, 11, every))
+    assert sorted(looked) == sorted(2 * list(range(0, 11, every)))
+    assert all(mask is not None for each in sets for mask in each.masks)
+
+
 def test_a_slower_camera_is_missing_between_its_frames(tmp_path):
     made = rig(tmp_path, steady(8), steady(4, 5.0), steady(8))
     assert numbers(made) == [(n, n // 2 if n % 2 == 0 else None, n) for n in range(8)]

@@ -12,6 +12,7 @@ import made
 import made_rig
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
+from shadowpuppet.evaluation import evaluate_run
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.run import read_run
 from shadowpuppet.options import Options, make_options
@@ -90,6 +91,8 @@ def test_a_run_says_how_it_was_made(recording, run):
     assert info["body"] == "anatomical"
     assert set(run.metrics["ms_per_frame"]) == set(RIG_STAGES)
     assert run.metrics["ms_per_frame"]["segment"] > 0
+    assert "cost_px" not in run.metrics
+    assert evaluate_run(run.folder)["cost_m2"]["count"] == made_rig.FRAMES
     look = json.loads((run.folder / "look.json").read_text())
     assert look["person"] == {"height": 1.7}
     assert "the sizes are a guess" in look["doubts"]

@@ -1,43 +1,33 @@
-"""Which of several cameras disagrees with the others, by their silhouettes alone, and what would make it agree.
-
-Two cameras and their silhouettes fit together where the outermost planes through both cameras that touch the one silhouette touch the
-other too (epipolar tangency: Wong & Cipolla 2001, "Structure and motion from silhouettes"). A distance in pixels is what is left.
-"""
+"""Which of several cameras disagrees with the others, by their silhouettes alone, and what would make it agree."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet.camera import Camera
+from shadowpuppet.coverage import Coverage, meeting_place
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.masks import Mask, may_be_person
+from shadowpuppet.masks import Mask
+from shadowpuppet.tangency import Outline, Outlines, tangent_distances
 
 DISAGREES = 0.01
-"""Tangents farther apart than this, over the picture's longer side, are in doubt (6 pixels of 640); good ones are a pixel apart."""
-BETTER = 0.35
-"""A remedy is told where it leaves no more than this of the disagreement."""
-WIDE = 2.6
-"""Radians that a silhouette may cover around the line from camera to camera: beyond, that line runs through or along it."""
-EVERY = 2
-"""Pixels of a contour from one taken to the next."""
-BORDER = 2
-"""Pixels from the picture's border within which nothing can be said of an outline."""
-MOVING = 12
-"""Sets by which a camera's film is moved, to and fro, to see whether it runs late."""
-TRIED = 14
-"""Sets in which remedies are tried."""
+"""Pixels, over the picture's longer side, from which on cameras are in doubt (6 of 640); good ones are apart by one."""
+MENDED = 0.4
+"""A remedy is told where no more than this of the disagreement is left..."""
+ALIKE = 0.5
+"""... and a camera is blamed where no more than this is left without it."""
+MOVED = 12
+"""Sets by which a camera's pictures are moved, to and fro, to see whether they come late."""
+COMPARED, TRIED = 10, 4
+"""Sets in which cameras are compared, and in which each remedy is tried."""
 MILLIMETRES = 100.0
 """Height (metres by the calibration) of a person from which on it is in millimetres."""
-PEOPLE = (0.5, 2.6)
-"""Height of people, metres, with raised arms or sitting."""
-
-Outlines = list[list[Array | None]]
-"""Pixels (K, 2) of the outline, and whether each is far from the picture's border: (K, 3), by set and camera."""
+PEOPLE = (0.5, 2.8)
+"""Height of people, metres: sitting, and with raised arms."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,19 +37,22 @@ class Agreement:
     names: tuple[str, ...]
     """Of the cameras."""
     apart: tuple[float | None, ...]
-    """By how many pixels each disagrees with most others, median; None where nothing can be said."""
+    """By how many pixels each disagrees with the others (with those that agree, where one is to blame); None where it cannot be told."""
     pairs: tuple[tuple[float | None, ...], ...]
-    """The same for every pair."""
+    """By how many pixels every two cameras' tangents differ."""
     limit: float
-    """Pixels from which on this is in doubt."""
-    outside: tuple[float | None, ...]
-    """Share of each camera's silhouettes that no place in space explains which the others see silhouette at, too."""
+    """Pixels from which on cameras are in doubt."""
     height: float | None
-    """What the silhouettes measure from top to bottom at the place where they meet, metres by the calibration, median."""
+    """What the silhouettes measure at their longest, at the place where they meet, metres by the calibration, median."""
     remedy: str | None = None
     """What would make them agree, where that is known."""
     hopeless: bool = False
     """Whether nothing can be tracked as it is."""
+
+    @property
+    def wrong(self) -> tuple[str, ...]:
+        """Cameras that disagree with the others."""
+        return tuple(name for name, apart in zip(self.names, self.apart) if apart is not None and apart > self.limit)
 
     def refusal(self) -> str | None:
         """Why tracking is hopeless, and the remedy; None where it is not."""
@@ -71,251 +64,186 @@ class Agreement:
             return ()
         if self.remedy is not None:
             return (self.remedy,)
-        wrong = self.wrong
-        if not wrong:
-            return ()
-        if len(self.names) - len(wrong) < 2:
+        return tuple(self._disagreements())
+
+    def _disagreements(self) -> Iterator[str]:
+        rest = {name: apart for name, apart in zip(self.names, self.apart) if name not in self.wrong}
+        if self.wrong and len(rest) < 2:
             told = ", ".join(f"{name} {apart:.0f}" for name, apart in zip(self.names, self.apart) if apart is not None)
-            return (f"the cameras' silhouettes do not fit together (pixels apart: {told}; expected under {self.limit:.0f}): does the "
-                    "calibration belong to these films, and were they begun together? calibrate again, or say in [start] of "
-                    "recording.toml when each begins",)
-        rest = [name for name in self.names if name not in wrong]
-        good = max((apart for name, apart in zip(self.names, self.apart) if name in rest and apart is not None), default=0.0)
-        return tuple(f"camera {name!r} disagrees with the others by {self.apart[self.names.index(name)]:.0f} pixels, they with each other "
-                     f"by {good:.1f}: was it moved, or is the calibration another's? calibrate it again, or leave it out: --camera "
-                     f"{','.join(rest)}" for name in wrong)
-
-    @property
-    def wrong(self) -> tuple[str, ...]:
-        """Cameras that disagree with most others."""
-        return tuple(name for name, apart in zip(self.names, self.apart) if apart is not None and apart > self.limit)
-
-
-@dataclass(frozen=True)
-class _Scene:
-    """Cameras and what they saw."""
-
-    cameras: tuple[Camera, ...]
-    outlines: Outlines
-    rays: list[list[Array | None]] = field(init=False)
-    """Unit directions in the world of the outlines' pixels, (K, 3)."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rays", [[self._directions(n, outline) for n, outline in enumerate(row)] for row in self.outlines])
-
-    def _directions(self, n: int, outline: Array | None) -> Array | None:
-        if outline is None:
-            return None
-        rays = self.cameras[n].rays(outline[:, :2]) @ self.cameras[n].T_camera_world[:3, :3]
-        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
-
-    def focal(self, n: int) -> float:
-        """Pixels a radian."""
-        return float(np.diag(self.cameras[n].matrix)[:2].mean())
+            yield (f"the cameras' silhouettes do not fit together (pixels apart: {told}; expected under {self.limit:.0f}): does the "
+                   "calibration belong to these films, and were they begun together? calibrate again, or say in [start] of recording.toml "
+                   "when each began")
+            return
+        good = max((apart for apart in rest.values() if apart is not None), default=0.0)
+        for name in self.wrong:
+            yield (f"camera {name!r} disagrees with the others by {self.apart[self.names.index(name)]:.0f} pixels, they with each other "
+                   f"by {good:.1f}: was it moved, or is the calibration another's? calibrate it again, or leave it out: --camera "
+                   f"{','.join(rest)}")
 
 
 def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan) -> Agreement:
     """How well the cameras' silhouettes fit together: `masks` (H, W) by set and camera, None where there is none.
 
-    `seconds`: from set to set, with which a film that runs late is told in time.
+    `seconds`: from set to set, by which it is told how late a film is.
     """
-    names = tuple(camera.name for camera in cameras)
+    scene = _Scene(tuple(cameras), [list(row) for row in masks])
     limit = DISAGREES * max(max(camera.size) for camera in cameras)
-    scene = _Scene(tuple(cameras), [[_outline(mask) for mask in row] for row in masks])
-    pairs = _distances(scene)
-    apart = _of_cameras(pairs)
-    height = _height(scene)
-    found = Agreement(names=names, apart=_plain(apart), pairs=tuple(map(_plain, pairs)), limit=limit,
-                      outside=_plain(_outside(cameras, masks)), height=height)
+    apart, blamed = scene.judged(limit)
+    height = scene.height()
+    names, pairs = tuple(camera.name for camera in cameras), tuple(map(_plain, scene.tangents()))
+    found = Agreement(names=names, apart=_plain(apart), pairs=pairs, limit=limit, height=height)
     if height is not None and height > MILLIMETRES:
-        told = (f"the calibration makes the person {height:,.0f} m high and the cameras stand {_spread(cameras):,.0f} m apart: it is in "
+        told = (f"the calibration makes the person {height:,.0f} m high and the cameras up to {_spread(cameras):,.0f} m apart: it is in "
                 "millimetres, it seems; divide every translation in calibration.toml by 1000")
         return replace(found, remedy=told, hopeless=True)
     if found.wrong:
-        return _with_remedy(found, scene, seconds)
+        return replace(found, remedy=_remedy(scene, found, blamed, seconds))
     if height is not None and not PEOPLE[0] < height < PEOPLE[1]:
-        told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? multiply "
-                "every translation in calibration.toml by what is missing")
+        told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? "
+                "multiply every translation in calibration.toml by what is missing")
         return replace(found, remedy=told)
     return found
 
 
-# Tangents
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """Cameras and what they saw, by set; what is known of each mask is shared by the scenes made from one another."""
 
+    cameras: tuple[Camera, ...]
+    masks: list[list[Mask | None]]
+    outlines: Outlines = field(default_factory=Outlines)
+    coverage: Coverage = field(default_factory=Coverage)
 
-def _outline(mask: Mask | None) -> Array | None:
-    """Pixels of the outlines of a person's mask, and whether each is far from the border, (K, 3); None where nobody is."""
-    import cv2
+    def rows(self, count: int = COMPARED) -> list[list[Mask | None]]:
+        """Some of the sets, spread."""
+        return [self.masks[f] for f in np.unique(np.linspace(0, len(self.masks) - 1, count).astype(int)) if self.masks]
 
-    if mask is None or not may_be_person(mask):
-        return None
-    contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
-    largest = max(map(len, contours))
-    pixels = np.concatenate([c[::EVERY, 0] for c in contours if len(c) > 0.1 * largest]).astype(float)
-    size = np.array(mask.shape[::-1])
-    far = ((pixels >= BORDER) & (pixels < size - BORDER)).all(1)
-    return np.concatenate([pixels, far[:, None]], 1)
+    def seen(self, row: Sequence[Mask | None]) -> list[Outline | None]:
+        return [self.outlines.of(camera, mask) for camera, mask in zip(self.cameras, row)]
 
+    def tangents(self, count: int = COMPARED) -> Array:
+        """Pixels (C, C) between the tangents of every two cameras."""
+        return tangent_distances(self.cameras, [self.seen(row) for row in self.rows(count)])
 
-def _distances(scene: _Scene, only: set[int] | None = None, sets: Sequence[int] | None = None) -> Array:
-    """Median distance (C, C) of the cameras' tangents, pixels; not a number where there is none. `only`: pairs with one of these."""
-    C = len(scene.cameras)
-    out = np.full((C, C), np.nan)
-    sets = range(len(scene.outlines)) if sets is None else sets
-    for i, j in combinations(range(C), 2):
-        if only is None or i in only or j in only:
-            values = np.array([_apart(scene, f, i, j) for f in sets]).ravel()
-            values = values[np.isfinite(values)]
-            out[i, j] = out[j, i] = np.median(values) if len(values) else np.nan
-    return out
+    def beyond(self, count: int = COMPARED) -> Array:
+        """Pixels (C, C + 1) of `Coverage.beyond`, median over sets."""
+        values = np.array([self.coverage.beyond(self.cameras, row, self.seen(row)) for row in self.rows(count)])
+        return _median(values.reshape(-1, len(self.cameras), len(self.cameras) + 1))
 
+    def total(self) -> float:
+        """One figure for how badly all fit together, pixels."""
+        return _mean(self.tangents(TRIED)) + float(np.nan_to_num(_mean(self.beyond(TRIED)[:, -1])))
 
-def _apart(scene: _Scene, f: int, i: int, j: int) -> tuple[float, float]:
-    """Distances (pixels) of both pairs of outermost tangents in set `f`."""
-    a, b = scene.rays[f][i], scene.rays[f][j]
-    line = scene.cameras[j].centre - scene.cameras[i].centre
-    length = np.linalg.norm(line)
-    if a is None or b is None or length < 1e-9:
-        return np.nan, np.nan
-    line /= length
-    aside = [rays - (rays @ line)[:, None] * line for rays in (a, b)]
-    ahead = sum(part.sum(0) / max(float(np.linalg.norm(part.sum(0))), 1e-12) for part in aside)
-    if np.linalg.norm(ahead) < 1e-9:
-        ahead = aside[0].sum(0)
-    ahead = ahead / np.linalg.norm(ahead)
-    angles = [np.arctan2(part @ np.cross(line, ahead), part @ ahead) for part in aside]
-    if max(float(np.ptp(each)) for each in angles) > WIDE:
-        return np.nan, np.nan
-    ends = []
-    for pick in (np.argmin, np.argmax):
-        k = [int(pick(each)) for each in angles]
-        firm = all(scene.outlines[f][n][at, 2] for n, at in zip((i, j), k))  # type: ignore[index]
-        lever = np.mean([scene.focal(n) * np.linalg.norm(part[at]) for n, part, at in zip((i, j), aside, k)])
-        ends.append(abs(angles[0][k[0]] - angles[1][k[1]]) * lever if firm else np.nan)
-    return ends[0], ends[1]
+    def judged(self, limit: float) -> tuple[Array, int | None]:
+        """By how many pixels each camera (C,) disagrees, and which one is to blame for it, if one alone is."""
+        tangents, beyond = self.tangents(), self.beyond()
+        lowest = np.array([_lower_median(row) for row in tangents])  # so that one wrong camera blames no other
+        apart, C = np.fmax(lowest, beyond[:, -1]), len(tangents)
+        if not (apart > limit).any() or C < 3:
+            return apart, None
+        without = np.array([_mean(np.fmax(lowest, beyond[:, w])[np.arange(C) != w]) for w in range(C)])
+        if np.isnan(without).all():
+            return apart, None
+        w = int(np.nanargmin(without))
+        if without[w] > min(ALIKE * _mean(apart), limit):
+            return apart, None
+        rest = np.fmax(lowest, beyond[:, w])
+        rest[w] = apart[w]
+        return rest, w
 
-
-def _of_cameras(pairs: Array) -> Array:
-    """By how much each camera disagrees with most others (C,): the lower median over them, so that one wrong camera blames no other."""
-    out = np.full(len(pairs), np.nan)
-    for n, row in enumerate(pairs):
-        known = np.sort(row[np.isfinite(row)])
-        if len(known):
-            out[n] = known[(len(known) - 1) // 2]
-    return out
+    def height(self) -> float | None:
+        """What the silhouettes measure at their longest, at the place where they meet; the median."""
+        heights = []
+        for row in self.rows():
+            outlines = self.seen(row)
+            middle = meeting_place(self.cameras, outlines)
+            for camera, outline in zip(self.cameras, outlines):
+                if middle is not None and outline is not None:
+                    mean = outline.rays.mean(0)
+                    angle = np.arccos(np.clip((outline.rays @ mean).min() / np.linalg.norm(mean), 0.1, 1))
+                    heights.append(2 * np.tan(angle) * np.linalg.norm(middle - camera.centre))
+        return float(np.median(heights)) if heights else None
 
 
 # Remedies
 
 
-def _with_remedy(found: Agreement, scene: _Scene, seconds: float) -> Agreement:
-    """The agreement, with what would mend it, where that is found."""
-    sets = np.unique(np.linspace(0, len(scene.outlines) - 1, TRIED).astype(int)).tolist()
-    start = _total(_distances(scene, sets=sets))
-    best, told = start, ""
-    for changed, only, text in _changes(found, scene, seconds):
-        pairs = _distances(scene, sets=sets)
-        pairs_after = _distances(changed, only, sets)
-        total = _total(np.where(np.isfinite(pairs_after) | _touched(pairs, only), pairs_after, pairs))
-        if total < best:
-            best, told = total, text
-    if best > max(BETTER * start, 0.0) or not told:
-        return found
-    return replace(found, remedy=f"{told}: then all agree within {best:.1f} pixels, instead of {start:.0f}")
+def _remedy(scene: _Scene, found: Agreement, blamed: int | None, seconds: float) -> str | None:
+    """What would make the cameras agree; None where nothing of what is known to happen would."""
+    before = scene.total()
+    tried = ((changed.total(), told) for changed, told in _changes(scene, found.names, blamed, seconds))
+    after, told = min(tried, key=lambda each: each[0])
+    if after > min(MENDED * before, found.limit):
+        return None
+    return f"{told}: then all agree within {after:.1f} pixels, instead of {before:.0f}"
 
 
-def _touched(pairs: Array, only: set[int] | None) -> NDArray[np.bool_]:
-    """Pairs of which one is among `only`, (C, C)."""
-    which = np.array([only is None or n in only for n in range(len(pairs))])
-    return which[:, None] | which[None]
-
-
-def _total(pairs: Array) -> float:
-    """One figure for all pairs."""
-    upper = pairs[np.triu_indices(len(pairs), 1)]
-    return float(np.nanmean(upper)) if np.isfinite(upper).any() else np.inf
-
-
-def _changes(found: Agreement, scene: _Scene, seconds: float) -> Iterator[tuple[_Scene, set[int] | None, str]]:
-    """What may be wrong: the scene with it mended, the cameras that this concerns (None: all), and how to say it."""
-    names, C = found.names, len(found.names)
+def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: float) -> Iterator[tuple[_Scene, str]]:
+    """What may be wrong: the scene with it mended, and how to say so."""
+    C = len(names)
     for a, b in combinations(range(C), 2):
         if scene.cameras[a].size == scene.cameras[b].size:
-            yield _exchanged(scene, a, b), {a, b}, (f"cameras {names[a]!r} and {names[b]!r} are swapped, it seems; exchange their films, or "
-                                                    "their names in calibration.toml")
+            order = list(range(C))
+            order[a], order[b] = b, a
+            yield (replace(scene, masks=[[row[n] for n in order] for row in scene.masks]),
+                   f"cameras {names[a]!r} and {names[b]!r} are swapped, it seems; exchange their films, or their names in calibration.toml")
     for n in range(C):
-        yield _mirrored(scene, {n}), {n}, f"camera {names[n]!r} shows mirrored pictures, it seems; turn the mirroring off, or flip its film"
-    everything = set(range(C))
-    yield _mirrored(scene, everything), None, "all cameras show mirrored pictures, it seems; turn the mirroring off, or flip the films"
-    yield _turned(scene), None, ("the calibration says where cameras stand (camera to world), it seems, instead of how the world lies to them; "
-                                 "invert every rotation and translation in calibration.toml")
-    for n in range(C):
-        for steps in (s for s in range(-MOVING, MOVING + 1) if s):
-            late = seconds * steps
-            start = (f"{names[n]} = {late:.2f}" if late > 0 else ", ".join(f"{name} = {-late:.2f}" for name in names if name != names[n]))
-            yield _moved(scene, n, steps), {n}, (f"camera {names[n]!r} is about {abs(late):.2f} s {'early' if late < 0 else 'late'}, it seems; "
-                                                 f"add that in [start] of recording.toml: {start}")
+        yield _mirrored(scene, [n]), f"camera {names[n]!r} shows mirrored pictures, it seems; turn the mirroring off, or flip its film"
+    yield (_mirrored(scene, range(C)),
+           "all cameras show mirrored pictures, it seems; turn the mirroring off, or flip the films")
+    turned = tuple(replace(camera, T_camera_world=inverse(camera.T_camera_world)) for camera in scene.cameras)
+    yield (replace(scene, cameras=turned),
+           "the calibration says where cameras stand (camera to world), it seems, instead of how the world lies to them; invert every "
+           "rotation and translation in calibration.toml")
+    for n in range(C) if blamed is None and C < 4 else [blamed] if blamed is not None else []:
+        for steps in range(-MOVED, MOVED + 1):
+            if steps:
+                yield _shifted(scene, n, steps), _late(names, n, seconds * steps)
 
 
-def _exchanged(scene: _Scene, a: int, b: int) -> _Scene:
-    order = list(range(len(scene.cameras)))
-    order[a], order[b] = b, a
-    return replace(scene, outlines=[[row[n] for n in order] for row in scene.outlines])
+def _mirrored(scene: _Scene, which: Sequence[int]) -> _Scene:
+    return replace(scene, masks=[[np.ascontiguousarray(mask[:, ::-1]) if mask is not None and n in which else mask
+                                  for n, mask in enumerate(row)] for row in scene.masks])
 
 
-def _mirrored(scene: _Scene, which: set[int]) -> _Scene:
-    def flipped(n: int, outline: Array | None) -> Array | None:
-        return outline if outline is None or n not in which else np.array([scene.cameras[n].size[0] - 1, 0, 0]) + outline * (-1, 1, 1)
-
-    return replace(scene, outlines=[[flipped(n, outline) for n, outline in enumerate(row)] for row in scene.outlines])
-
-
-def _turned(scene: _Scene) -> _Scene:
-    return replace(scene, cameras=tuple(replace(camera, T_camera_world=inverse(camera.T_camera_world)) for camera in scene.cameras))
+def _shifted(scene: _Scene, n: int, steps: int) -> _Scene:
+    """With camera `n`'s pictures so many sets earlier; sets for which it then has none are left out."""
+    F = len(scene.masks)
+    return replace(scene, masks=[[*scene.masks[f][:n], scene.masks[f + steps][n], *scene.masks[f][n + 1 :]]
+                                 for f in range(F) if 0 <= f + steps < F])
 
 
-def _moved(scene: _Scene, n: int, steps: int) -> _Scene:
-    """With camera `n`'s pictures so many sets earlier in the row; where there is none, it says nothing."""
-    F = len(scene.outlines)
-    return replace(scene, outlines=[[scene.outlines[f + steps][n] if 0 <= f + steps < F else None if k == n else outline
-                                     for k, outline in enumerate(row)] if True else row for f, row in enumerate(scene.outlines)])
+def _late(names: Sequence[str], n: int, late: float) -> str:
+    later = [names[n]] if late > 0 else [name for name in names if name != names[n]]
+    start = ", ".join(f"{name} = {abs(late):.2f}" for name in later)
+    return (f"camera {names[n]!r} is about {abs(late):.2f} s {'late' if late > 0 else 'early'}, it seems; add to [start] of "
+            f"recording.toml: {start}")
 
 
-# Space
+# Figures
 
 
-def _middle(scene: _Scene, f: int) -> Array | None:
-    """The place nearest to the rays through the silhouettes' middles in set `f`."""
-    rays = [(camera.centre, each.mean(0)) for camera, each in zip(scene.cameras, scene.rays[f]) if each is not None]
-    if len(rays) < 2:
-        return None
-    A, b = np.zeros((3, 3)), np.zeros(3)
-    for centre, ray in rays:
-        across = np.eye(3) - np.outer(ray, ray) / (ray @ ray)
-        A, b = A + across, b + across @ centre
-    return np.linalg.solve(A, b) if np.linalg.cond(A) < 1e9 else None
+def _lower_median(values: Array) -> float:
+    known = np.sort(values[np.isfinite(values)])
+    return float(known[(len(known) - 1) // 2]) if len(known) else np.nan
 
 
-def _height(scene: _Scene) -> float | None:
-    """What the silhouettes measure at their longest, at the place where they meet, metres by the calibration; the median."""
-    heights = []
-    for f in range(0, len(scene.outlines), max(1, len(scene.outlines) // TRIED)):
-        middle = _middle(scene, f)
-        for camera, rays in zip(scene.cameras, scene.rays[f]):
-            if middle is not None and rays is not None:
-                reach = rays @ rays.mean(0)
-                angle = 2 * np.arccos(np.clip(reach.min() / np.linalg.norm(rays.mean(0)), -1, 1))
-                heights.append(2 * np.tan(min(angle, 3.0) / 2) * np.linalg.norm(middle - camera.centre))
-    return float(np.median(heights)) if heights else None
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else np.nan
+
+
+def _median(values: Array) -> Array:
+    """Over the first axis, of what is known; not a number where nothing is."""
+    known = np.isfinite(values).any(0)
+    out = np.full(values.shape[1:], np.nan)
+    out[known] = np.nanmedian(values[:, known], axis=0)
+    return out
 
 
 def _spread(cameras: Sequence[Camera]) -> float:
     """Greatest distance between two cameras, metres by the calibration."""
     return max(float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(cameras, 2))
-
-
-def _outside(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]]) -> Array:
-    return np.full(len(cameras), np.nan)
 
 
 def _plain(values: Array) -> tuple[float | None, ...]:

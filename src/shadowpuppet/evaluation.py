@@ -12,7 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import GROUPS, evaluate
+from shadowpuppet.metrics import GROUPS, evaluate, of_surfaces
 
 
 def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Sequence[str] | None = None,
@@ -30,6 +30,7 @@ def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Se
         raise ShadowPuppetError(f"start: found {start}, expected 0 to {len(reference.times) - 1}, a frame of {table}")
     chosen = None if joints is None else [name for joint in joints for name in GROUPS.get(joint, (joint,))]
     measured = evaluate(run.motion, reference, chosen, camera=_camera(run.folder), start=start)
+    measured = of_surfaces(measured) if "cameras" in run.info else measured
     return {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete, **measured}
 
 

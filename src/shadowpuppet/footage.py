@@ -181,14 +181,14 @@ class Sample:
         return float(np.std(np.diff(self.times))) if len(self.times) > 1 else np.nan
 
 
-def take_sample(footage: Footage, need_masks: bool = False) -> Sample:
-    """Go once through the film's first `LOOKED_AT` frames. Raises `SilhouetteError` where ready masks that are needed end before."""
+def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKED_AT) -> Sample:
+    """Go once through the film's first `longest` frames. Raises `SilhouetteError` where ready masks that are needed end before."""
     film = footage.film()
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
-    wanted = _spread(min(int(length), LOOKED_AT))
+    wanted = _spread(min(int(length), longest))
     runs: dict[int, list[Shot]] = {}
     first, times, next_first = list[Shot](), list[float](), 0.0
-    for n, shot in zip(range(LOOKED_AT), footage.shots(ready=True, strict=need_masks)):
+    for n, shot in zip(range(longest), footage.shots(ready=True, strict=need_masks)):
         times.append(shot.time)
         if n in wanted:
             runs.setdefault(wanted[n], []).append(shot)

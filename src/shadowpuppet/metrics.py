@@ -147,6 +147,11 @@ def bone_lengths(table: JointTable) -> dict[str, dict[str, float]]:
     return {f"{a}-{b}": statistics(np.linalg.norm(ends[a] - ends[b], axis=1)) for a, b in bones}
 
 
+def of_surfaces(measured: dict[str, Any]) -> dict[str, Any]:
+    """What `evaluate` says of a run whose cost is weighed by surface points, in square metres, not by pixels."""
+    return {("cost_m2" if key == "cost_px" else key): value for key, value in measured.items()}
+
+
 def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[str] | None = None, *,
              camera: Camera | None = None, start: int = 0) -> dict[str, Any]:
     """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments."""

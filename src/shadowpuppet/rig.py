@@ -7,7 +7,7 @@ import math
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,11 +113,13 @@ def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
     return tuple(views[name] for name in views if name in asked)
 
 
-def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = False, threads: int | None = None) -> Iterator[FrameSet]:
+def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = False, every: int = 1,
+           threads: int | None = None) -> Generator[FrameSet]:
     """All that the cameras saw, set by set, with the silhouettes that `seen` (one a camera) makes of it.
 
     Pictures belong to one set that are nearest to its time, within half the time from set to set. A camera whose film breaks off or
-    ends is missing from there on, which is said once. `ready`: the recording's ready silhouettes are read too. The cameras of a set
+    ends is missing from there on, which is said once. `ready`: the recording's ready silhouettes are read too. `every`: of so many sets
+    one is given, and only in its pictures silhouettes are made. The cameras of a set
     are worked on side by side, by `threads` (the processor's cores, if left out), while the one before is used; the sets are the
     same for any number. A set is held at a time, and the next.
     """
@@ -128,12 +130,14 @@ def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = Fa
         stack.callback(pool.shutdown, cancel_futures=True)
         for future in [pool.submit(reel.advance) for reel in reels]:
             future.result()
-        work = _begin(pool, reels, leaders, step)
+        work, n = _begin(pool, reels, leaders, step), 0
         while work is not None:
             moment, futures = work
-            taken = [future.result() for future in futures]
+            taken, n = [future.result() for future in futures], n + 1
             _tell(reels, moment, step)
-            work = _begin(pool, reels, leaders, step, moment)
+            work = _begin(pool, reels, leaders, step, moment, wanted=n % every == 0)
+            if n % every != 1 % every:
+                continue
             yield FrameSet(moment, tuple(t.image for t in taken), tuple(t.mask for t in taken), sum(t.decoding for t in taken),
                            sum(t.segmenting for t in taken))
 
@@ -169,13 +173,16 @@ class _Reel:
         except (VideoError, SilhouetteError) as error:
             self.next, self.trouble = None, str(error)
 
-    def take(self, moment: float, reach: float, leads: bool) -> _Taken:
-        """The silhouette of the shot that is nearest to a moment (s), within reach (s); the leading camera's own is the next."""
+    def take(self, moment: float, reach: float, leads: bool, wanted: bool) -> _Taken:
+        """The silhouette of the shot that is nearest to a moment (s), within reach (s); the leading camera's own is the next.
+
+        None is made where it is not wanted.
+        """
         start = time.perf_counter()
         best = self._pop() if leads else self._nearest(moment, reach)
         read = time.perf_counter()
         try:
-            mask = None if best is None else self.see(best)
+            mask = None if best is None or not wanted else self.see(best)
         except SilhouetteError as error:
             best = mask = None
             self.next, self.trouble = None, str(error)
@@ -198,7 +205,8 @@ class _Reel:
         return best
 
 
-def _begin(pool: ThreadPoolExecutor, reels: Sequence[_Reel], leaders: Sequence[int], step: float, last: float = -math.inf):
+def _begin(pool: ThreadPoolExecutor, reels: Sequence[_Reel], leaders: Sequence[int], step: float, last: float = -math.inf,
+           wanted: bool = True):
     """The set after the one at `last` (s): its time and the work on it under way; None where no camera has a picture left."""
     for leader in leaders:
         reel = reels[leader]
@@ -206,7 +214,7 @@ def _begin(pool: ThreadPoolExecutor, reels: Sequence[_Reel], leaders: Sequence[i
             reel.advance()  # between two sets of the leader before it
         if reel.next is not None:
             moment = reel.next.time
-            return moment, [pool.submit(reel.take, moment, NEAR * step, n == leader) for n, reel in enumerate(reels)]
+            return moment, [pool.submit(reel.take, moment, NEAR * step, n == leader, wanted) for n, reel in enumerate(reels)]
     return None
 
 

@@ -15,7 +15,7 @@ from shadowpuppet.agreement import Agreement, agreement
 from shadowpuppet.camera import Camera
 from shadowpuppet.diagnostics import MaskQuality
 from shadowpuppet.errors import ShadowPuppetWarning, TrackingError
-from shadowpuppet.footage import Footage, Mask, Silhouettes, silhouettes, take_sample
+from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
 from shadowpuppet.look import GOOD, mean_overlap, quality_of
 from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
@@ -24,6 +24,8 @@ from shadowpuppet.silhouette import ready_mask
 
 OPENING, OPENED = 2.0, 40
 """The first seconds in which the person is measured, and at most how many sets of silhouettes of them are kept."""
+BRIEFLY = 240
+"""Frames of each film that are looked at where its background need not be made from it."""
 RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and of lengths (s), from which on films are said to differ."""
 
@@ -99,7 +101,7 @@ class PreparedRig:
 
 
 def look_at_rig(rig: Rig, options: Options) -> PreparedRig:
-    """Look at every camera's film, and at the first seconds of all together. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Look at every camera's film, and at the first seconds of all together. Raises a `ShadowPuppetError` where that cannot be done."""
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         found = list(pool.map(lambda footage: _look_at_camera(footage, options), rig.footage))
     seen, cameras = tuple(s for s, _ in found), tuple(look for _, look in found)
@@ -122,13 +124,13 @@ def open_with(rig: Rig, seen: Sequence[Silhouettes], ready: bool) -> Opening:
     every = max(1, round(OPENING * rig.rate / OPENED))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when the run comes to it
-        sets = [(each.time, each.masks) for each in islice(follow(rig, seen, ready=ready), 0, every * OPENED, every)]
+        sets = [(each.time, each.masks) for each in islice(follow(rig, seen, ready=ready, every=every), OPENED)]
     sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
     return Opening([time for time, _ in sets], [masks for _, masks in sets])
 
 
 def _look_at_camera(footage: Footage, options: Options) -> tuple[Silhouettes, CameraLook]:
-    sample = take_sample(footage, options.masks)
+    sample = take_sample(footage, options.masks, LOOKED_AT if footage.view.background is None and not options.masks else BRIEFLY)
     seen = silhouettes(footage, sample, options)
     masks = [[seen(shot) for shot in run] for run in sample.runs]
     exact = [ready_mask(shot.ready) for shot in sample.shots if shot.ready is not None and seen.segmenter is not None]
@@ -153,7 +155,7 @@ def _refusal(look: RigLook, opening: Opening) -> str | None:
         return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
     if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in opening.masks):
         return (f"no two cameras see a person at the same time within the first {OPENING:g} s: do the films belong together, and begin "
-                "together? say in [start] of recording.toml when each begins")
+                "together? say in [start] of recording.toml when each began")
     return look.agreement.refusal()
 
 
@@ -163,11 +165,12 @@ def _doubts(look: RigLook) -> list[str]:
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
     if np.ptp(rates) > RATES * rates.min():
         told = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
-        said.append(f"the films have different rates (frames/s: {told}): they are aligned by their times, {look.rate:.4g} sets a second, and "
-                    "a camera without a picture of a moment is left out of it; film at one rate")
+        said.append(f"the films have different rates (frames/s: {told}): they are aligned by their times, {look.rate:.4g} sets a second, "
+                    "and a camera without a picture of a moment is left out of it; film at one rate")
     elif ends and max(ends.values()) - min(ends.values()) > LENGTHS:
         told = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
-        said.append(f"the films have different lengths (s: {told}): were they begun together? say in [start] of recording.toml when each begins")
+        said.append(f"the films have different lengths (s: {told}): were they begun together? say in [start] of recording.toml when each "
+                    "began")
     for camera in look.cameras:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             said.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: try "

@@ -37,7 +37,7 @@ def rig_overlay(seen: FrameSet, frame: MotionFrame, pictures: Sequence[Picture])
         image, mask = seen.images[n], seen.masks[n]
         _fit(tile, None if image is None else _tile(image, mask, picture, pose))
         write_text(tile, picture.camera.name if image is not None else f"{picture.camera.name}: no picture", 0, WHITE, size=height)
-    write_text(out, f"{seen.time:.2f} s  {frame.status}", out.shape[0] - 26, WHITE, size=max(360, height))
+    write_text(out, f"{seen.time:.2f} s  {frame.status}", out.shape[0] - 40, WHITE, size=max(360, height))
     return out
 
 

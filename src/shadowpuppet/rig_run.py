@@ -15,9 +15,10 @@ from shadowpuppet.body import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.masks import Mask, may_be_person
+from shadowpuppet.metrics import of_surfaces
 from shadowpuppet.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.rasterize import Picture
@@ -113,12 +114,12 @@ def track_rig(recording: str | Path, folder: str | Path, options: Options, liste
 
 def training_of(rig: Rig) -> JointTable | None:
     """The recording's training motion, where it has some. Raises `FormatError`."""
-    return None if rig.recording.training is None else read_joints(rig.recording.training)
+    return None if rig.recording.training is None else read_motion(rig.recording.training)
 
 
 def _summary(folder: Path, rig: Rig, look: RigLook) -> Summary:
     written = read_run(folder)
-    metrics = written.metrics | evaluated(rig.recording, written.motion)
+    metrics = written.metrics | of_surfaces(evaluated(rig.recording, written.motion))
     warn_of_losses(written.motion)
     write_metrics(folder, metrics)
     return Summary(folder, written.motion, metrics, look)

@@ -16,6 +16,8 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.look import Look
+from shadowpuppet.rig_look import RigLook
+from shadowpuppet.rig_tables import rig_look_table
 from shadowpuppet.tables import look_table
 
 REPEATED = 10.0
@@ -52,14 +54,14 @@ class Terminal(LiveListener):
             speed = f"  {task.speed:.0f} frames/s" if task.speed else ""
             self._progress.update(self._task, completed=frames, done=f"{frames}{total}{speed}")
 
-    def look(self, look: Look) -> None:
+    def look(self, look: Look | RigLook) -> None:
         """Show what was found, and what is in doubt."""
         if not self.quiet:
             self._progress.stop()
-            show(look_table(look))
+            show(rig_look_table(look) if isinstance(look, RigLook) else look_table(look))
         self.doubt(look)
 
-    def doubt(self, look: Look) -> None:
+    def doubt(self, look: Look | RigLook) -> None:
         """Say what may harm a run."""
         for doubt in look.doubts:
             self.warn(doubt)

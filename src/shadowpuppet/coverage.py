@@ -1,0 +1,93 @@
+"""How far silhouettes reach beyond what the other cameras leave room for: every place on a person's outline must be seen by all.
+
+What tangents of two cameras cannot tell, a shift along the lines on which they see each other, three cameras can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array
+from shadowpuppet.masks import Mask, may_be_person
+from shadowpuppet.tangency import Outline
+
+PIXELS, DEPTHS = 24, 32
+"""Pixels of each outline that are looked at, and places along the ray of each."""
+DEEP = 0.3
+"""How far before and behind the middle of the person places are taken, over its distance."""
+SHARE = 75
+"""Percentile over an outline: a camera that looks elsewhere is off along a side of it, a limb missing in another camera is less."""
+
+
+class Coverage:
+    """Distances to silhouettes, each made once."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self._known: dict[int, tuple[Mask, NDArray[np.float32]]] = {}
+
+    def beyond(self, cameras: Sequence[Camera], masks: Sequence[Mask | None], outlines: Sequence[Outline | None]) -> Array:
+        """By how many pixels the others' silhouettes would have to grow for each camera's outline to fit, in one set of masks (H, W).
+
+        Of shape (C, C + 1): row k, column w is camera k's without camera w; the last column without none. Not a number where nothing is
+        known: it takes two other cameras.
+        """
+        out, middle = np.full((len(cameras), len(cameras) + 1), np.nan), meeting_place(cameras, outlines)
+        for k, outline in enumerate(outlines):
+            firm = np.flatnonzero(outline.firm) if outline is not None else []
+            if outline is None or middle is None or len(firm) < PIXELS:
+                continue
+            rays = outline.rays[firm[np.linspace(0, len(firm) - 1, PIXELS).astype(int)]]
+            depth = np.linalg.norm(middle - cameras[k].centre) * np.linspace(1 - DEEP, 1 + DEEP, DEPTHS)
+            away = self._away(cameras, masks, k, cameras[k].centre + rays[:, None] * depth[:, None])
+            if away is not None:
+                out[k] = _percentiles(away)
+        return out
+
+    def _away(self, cameras: Sequence[Camera], masks: Sequence[Mask | None], k: int, places: Array) -> Array | None:
+        """Pixels (C, PIXELS, DEPTHS) of places from the other cameras' silhouettes; 0 in them, and where a camera says nothing."""
+        away, seen = np.zeros((len(cameras), *places.shape[:2])), 0
+        for n, (camera, mask) in enumerate(zip(cameras, masks)):
+            if n != k and mask is not None and may_be_person(mask):
+                away[n] = _sampled(self._distance(mask), camera.project(places))
+                seen += 1
+        return away if seen > 1 else None
+
+    def _distance(self, mask: Mask) -> NDArray[np.float32]:
+        """Pixels (H, W) to the silhouette."""
+        import cv2
+
+        if id(mask) not in self._known:
+            self._known[id(mask)] = mask, np.asarray(cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3), np.float32)
+        return self._known[id(mask)][1]
+
+
+def meeting_place(cameras: Sequence[Camera], outlines: Sequence[Outline | None]) -> Array | None:
+    """The place (3,) nearest to the rays through the outlines' middles; None where there are not two."""
+    A, b, count = np.zeros((3, 3)), np.zeros(3), 0
+    for camera, outline in zip(cameras, outlines):
+        if outline is not None:
+            ray = outline.rays.mean(0)
+            across = np.eye(3) - np.outer(ray, ray) / (ray @ ray)
+            A, b, count = A + across, b + across @ camera.centre, count + 1
+    return np.asarray(np.linalg.solve(A, b), float) if count > 1 and np.linalg.cond(A) < 1e9 else None
+
+
+def _sampled(distance: NDArray[np.float32], pixels: Array) -> Array:
+    """Values at the nearest pixels (..., 2); 0 outside the picture, of which it says nothing."""
+    height, width = distance.shape
+    x, y = np.moveaxis(np.rint(np.clip(np.nan_to_num(pixels, nan=-9), -9, 1e6)).astype(int), -1, 0)
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    return np.where(inside, distance[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)], 0.0)
+
+
+def _percentiles(away: Array) -> Array:
+    """Of the least over depths of the greatest over cameras (C, P, Z): without each camera, and without none, of shape (C + 1,)."""
+    order = np.sort(away, axis=0)
+    most, next_most, which = order[-1], order[-2], away.argmax(0)
+    without = [np.where(which == n, next_most, most) for n in range(len(away))]
+    return np.array([np.percentile(each.min(1), SHARE) for each in (*without, most)])
