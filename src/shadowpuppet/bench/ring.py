@@ -105,12 +105,12 @@ class Around:
 
     def run_forces(self, iterations: int) -> Array:
         """All poses after so many iterations of simulated force."""
-        return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations))[0]
+        return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations))
 
     def run_gauss_newton(self, iterations: int) -> Array:
         """All poses after so many of Gauss-Newton."""
         held = np.full(self.poses.shape[1], 1e-6)
-        return self.refiner.gauss_newton(self.poses, ((self.cloud, iterations, self.refiner.settings.tau),), self.poses, held)[0]
+        return self.refiner.gauss_newton(self.poses, ((self.cloud, iterations, self.refiner.settings.tau),), self.poses, held)
 
     def frames(self, count: int = 20) -> Iterator[list[Mask]]:
         """Silhouettes of the motion, to and fro without end; they are drawn before the first is given."""
