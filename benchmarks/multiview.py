@@ -128,7 +128,6 @@ def given(recording: Recording, row: Row, folder: Path) -> Path:
 def true_person(recording: Recording, body: str, file: Path) -> Path:
     """A person.toml with bone lengths from the truth; the girths that people of such bones have."""
     from shadowpuppet.inverse_kinematics import fit_poses
-
     from shadowpuppet.io.person import Person, write_person
 
     assert recording.truth is not None
