@@ -62,6 +62,8 @@ def _with(**values: Any) -> dict[str, Any]:
     return {"multiview": values}
 
 
+PLAIN = {"modulated": False, "robust": False, "hierarchical": False}
+"""Forces as those of Ni 2008's ref. [11], the first baseline of Table II."""
 FOUR, THREE = ("cam1", "cam3", "cam5", "cam7"), ("cam1", "cam3", "cam5")
 ROWS: dict[str, Row] = {
     "default": Row(),
@@ -70,8 +72,8 @@ ROWS: dict[str, Row] = {
     "default, cameras 1, 3, 5, exact masks": Row({"masks": True}, THREE),
     "ni2008": Row({"preset": "ni2008"}),
     "ni2008, defensive proposals": Row({"preset": "ni2008", **_with(defensive=0.5)}),
-    "ni2008, image_force": Row({"preset": "ni2008", **_with(method="image_force")}),
-    "ni2008, particle_filter": Row({"preset": "ni2008", **_with(method="particle_filter")}),
+    "ni2008, image_force": Row({"preset": "ni2008", **_with(method="image_force", forces=PLAIN)}),
+    "ni2008, particle_filter": Row({"preset": "ni2008", **_with(method="particle_filter", particles=1000)}),
     "exact masks": Row({"masks": True}),
     "true sizes": Row(true_sizes=True),
     "exact masks, true sizes": Row({"masks": True}, true_sizes=True),
