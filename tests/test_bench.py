@@ -12,7 +12,7 @@ import pytest
 import made
 from people import random_poses
 from shadowpuppet import cli, rasterize
-from shadowpuppet.bench import chain, curves, mono, multi, naive, whole
+from shadowpuppet.bench import chain, curves, mono, multi, naive, ring_film, whole
 from shadowpuppet.bench.cases import Case, Follower
 from shadowpuppet.bench.files import check_plans, write_figures
 from shadowpuppet.bench.ring import Around
@@ -26,7 +26,7 @@ from shadowpuppet.settings import make_settings
 
 ISSUED = ("particle_us", "arm_us", "ratio_opencv_full", "ratio_opencv_arm", "ratio_naive_frame", "ratio_boxes", "step_fps", "default_fps",
           "chain_fps", "peak_mb", "growth_mb")
-ISSUED_MULTI = ("hull_ms", "points", "force_us", "gauss_newton_us", "ratio_naive")
+ISSUED_MULTI = ("hull_ms", "points", "force_us", "gauss_newton_us", "forces_fps", "fps", "chain_fps", "ratio_naive", "peak_mb")
 compiled = pytest.mark.skipif(not hasattr(rasterize._compare, "signatures"), reason="kernels are not compiled")
 
 
@@ -124,6 +124,8 @@ def tiny(monkeypatch):
     for module in (mono, multi):
         monkeypatch.setattr(module, "FEW", 1)
     monkeypatch.setattr(multi, "Around", lambda **said: Around(**{"points": 100, "particles": 3} | said, size=(160, 120)))
+    ring = ring_film.ring_spec((160, 120), 5)
+    monkeypatch.setattr(multi, "ring_recording", lambda folder, frames: ring_film.ring_recording(folder, 24, ring, drawn=12))
     monkeypatch.setattr(chain, "long_recording", lambda folder, frames: made.make(folder))
 
 
@@ -146,12 +148,14 @@ def test_the_command_writes_all_figures(tiny, tmp_path, capsys):
     for key in ISSUED_MULTI:
         assert math.isfinite(found[f"multi.{key}"]), key
     assert found["mono.chain_frames"] == made.FRAMES
+    assert found["multi.chain_frames"] == 24
     assert 20 < found["mono.peak_mb"] < 3000
+    assert 20 < found["multi.peak_mb"] < 3000
     assert found["raw"]["particle"]["rounds"] == 1
     assert {"cpu", "cores", "vectors", "numba"} <= set(found["environment"])
     assert picture.read_bytes()[:4] == b"\x89PNG"
     out = capsys.readouterr().out
-    for said in ("OpenCV, its polygons ready-made", "frames/s at Table I", "film to pose", "grown by", "seven cameras",
+    for said in ("OpenCV, its polygons ready-made", "frames/s at Table I", "film to pose", "grown by", "seven cameras", "from seven films",
                  "Gauss-Newton, a particle and iteration"):
         assert said in out
 

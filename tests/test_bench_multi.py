@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
 import made
 from shadowpuppet.bench import multi, naive_multi, ring_film
-from shadowpuppet.bench.ring import Around
-from shadowpuppet.bench.timing import Contender, Times, in_turns
+from shadowpuppet.bench.ring import Around, RingFollower
+from shadowpuppet.bench.timing import Times, in_turns
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.plots import plot_curves
 from shadowpuppet.refinement import _forces
-from shadowpuppet.settings import ForceSettings
+from shadowpuppet.settings import ForceSettings, make_multiview_settings
 from shadowpuppet.video import open_frames
 
 compiled = pytest.mark.skipif(not hasattr(_forces, "signatures"), reason="kernels are not compiled")
@@ -63,14 +65,23 @@ def test_frames_go_to_and_fro(small):
         assert all(np.array_equal(a, b) for a, b in zip(there[n], there[back]))
 
 
+@pytest.mark.parametrize("preset", ["ni2008", "default"])
+def test_what_is_followed_is_not_lost(preset):
+    follower = RingFollower(Around(cameras=5, size=(320, 240)), make_multiview_settings(preset))
+    follower.run(12)
+    assert follower.state.status == "tracked"
+    assert follower.tracker.prior is not None
+
+
 # Times ----------------------------------------------------------------------------------------------------------------
 
 
 def test_ratios_are_of_the_least_times_and_all_else_of_medians():
-    raw = {name: Times(2.0 * k, 1.0 / k, 3) for k, name in enumerate(multi.contenders(Around()), 1)}
+    raw = {name: Times(2.0 * k, 1.0 / k, 3) for k, name in enumerate(multi.contenders(Around(cameras=3, points=100, size=(160, 120))), 1)}
     found = multi.figures(raw)
     assert found["multi.hull_ms"] == 2e3
     assert found["multi.force_us"] == 4e6
+    assert found["multi.fps"] == pytest.approx(1 / 14)
     assert found["multi.ratio_naive"] == pytest.approx(2 / 4)
     assert found["multi.ratio_naive_gauss_newton"] == pytest.approx(3 / 5)
 
@@ -78,7 +89,8 @@ def test_ratios_are_of_the_least_times_and_all_else_of_medians():
 @compiled
 def test_refinement_is_many_times_faster_than_plain_numpy():
     """Some 140 times where AVX-512 is, with 2,000 points; the guard is what is promised."""
-    spent = in_turns(multi.contenders(Around(particles=4)), 3)
+    sides = {name: one for name, one in multi.contenders(Around(particles=4)).items() if not name.endswith("_frame")}
+    spent = in_turns(sides, 3)
     assert spent["naive_forces"].least > 20 * spent["forces"].least, spent
     assert spent["naive_gauss_newton"].least > 20 * spent["gauss_newton"].least, spent
 
@@ -87,10 +99,16 @@ def test_refinement_is_many_times_faster_than_plain_numpy():
 @pytest.mark.parametrize(("what", "few", "many"), [("particles", 10, 40), ("points", 1000, 4000)])
 def test_cost_grows_in_proportion(what, few, many):
     cases = {n: Around(**{"particles": 10, "points": 1000} | {what: n}) for n in (few, many)}
-    kinds = ("forces", "gauss_newton")
-    spent = in_turns({f"{n} {kind}": Contender(multi._ten(case, kind)) for n, case in cases.items() for kind in kinds}, 5)
-    for kind in kinds:
-        assert spent[f"{many} {kind}"].least < 2 * many / few * spent[f"{few} {kind}"].least, spent
+    for kind in ("forces", "gauss_newton"):
+        spent = {n: min(_thread_time(multi._ten(case, kind)) for _ in range(6)) for n, case in cases.items()}
+        assert spent[many] < 2 * many / few * spent[few], (kind, spent)
+
+
+def _thread_time(run) -> float:
+    """Seconds of this thread's own work: a short call may slip between what else the machine does, a long one does not."""
+    start = time.thread_time()
+    run()
+    return time.thread_time() - start
 
 
 def test_curves_have_a_time_for_every_value(monkeypatch, tmp_path):

@@ -1,6 +1,6 @@
 """From a film to poses: a long film tracked in a process of its own, its speed and its memory.
 
-`python -m shadowpuppet.bench.chain RECORDING RUN` does it and prints JSON.
+`python -m shadowpuppet.bench.chain RECORDING RUN [CORES]` does it and prints JSON.
 """
 
 from __future__ import annotations
@@ -43,9 +43,13 @@ def long_recording(folder: Path, frames: int, seconds: float = 2.0) -> Path:
 
 
 def measure_chain(folder: Path, frames: int) -> dict[str, Any]:
-    """What `track_long` tells, from a new process; the recording is made in `folder`. Raises `ShadowPuppetError` where it fails."""
-    recording = long_recording(folder / "recording", frames)
-    done = subprocess.run([sys.executable, "-m", "shadowpuppet.bench.chain", str(recording), str(folder / "run")], capture_output=True,
+    """What `track_long` tells of one camera's film; the recording is made in `folder`. Raises `ShadowPuppetError` where it fails."""
+    return apart(long_recording(folder / "recording", frames), folder / "run")
+
+
+def apart(recording: Path, run: Path, cores: int = 1) -> dict[str, Any]:
+    """What `track_long` tells, from a new process. Raises `ShadowPuppetError` where it fails."""
+    done = subprocess.run([sys.executable, "-m", "shadowpuppet.bench.chain", str(recording), str(run), str(cores)], capture_output=True,
                           text=True, env=os.environ | ONE_EACH)
     if done.returncode:
         raise ShadowPuppetError(f"bench: tracking the made film failed: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
@@ -64,18 +68,18 @@ class _Memory(Listener):
         self.held.append(resident_mb() or np.nan)
 
 
-def track_long(recording: str, run: str) -> dict[str, Any]:
-    """Frames/s of the whole chain with the default preset, ms a frame by stage, peak memory and its growth (10^6 bytes), and how one core
-    was kept to."""
-    from shadowpuppet.bench.machine import peak_mb, use_one_core
+def track_long(recording: str, run: str, cores: str = "1") -> dict[str, Any]:
+    """Frames/s of the whole chain with the default preset, ms a frame by stage, peak memory and its growth (10^6 bytes), and how so many
+    cores were kept to."""
+    from shadowpuppet.bench.machine import peak_mb, use_cores
 
-    how, memory = use_one_core(), _Memory()
+    how, memory = use_cores(int(cores)), _Memory()
     metrics = track_recording(recording, run, make_options({"seed": 1}), memory).metrics
     early = memory.held[round(EARLY * len(memory.held))]
     growth = memory.held[-1] - early
     return {"frames": metrics["frames"], "fps": metrics["frames_per_s"], "ms": metrics["ms_per_frame"], "status": metrics["status"],
-            "peak_mb": peak_mb(), "growth_mb": growth if np.isfinite(growth) else None, "one_core": how}
+            "peak_mb": peak_mb(), "growth_mb": growth if np.isfinite(growth) else None, "cores": how}
 
 
 if __name__ == "__main__":
-    print(json.dumps(track_long(*sys.argv[1:3])))
+    print(json.dumps(track_long(*sys.argv[1:4])))

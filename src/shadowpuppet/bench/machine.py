@@ -41,15 +41,15 @@ def peak_mb() -> float | None:
     return most * (1 if platform.system() == "Darwin" else 1024) / 1e6
 
 
-def use_one_core() -> str:
-    """Keep this process to one core where the system can; says what was done. To be called before anything counts the cores."""
+def use_cores(count: int = 1) -> str:
+    """Keep this process to so many cores where the system can; says what was done. To be called before anything counts the cores."""
     import cv2
 
     cv2.setNumThreads(1)
     if hasattr(os, "sched_setaffinity"):
-        core = max(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {core})
-        return "the process kept to one core"
+        cores = sorted(os.sched_getaffinity(0))[-count:]
+        os.sched_setaffinity(0, cores)
+        return f"the process kept to {'one core' if len(cores) == 1 else f'{len(cores)} cores'}"
     return "one thread each for OpenCV, Numba and BLAS"
 
 

@@ -88,4 +88,4 @@ def figures(raw: dict[str, Times]) -> dict[str, float]:
 def _chain_figures(chain: dict[str, Any]) -> dict[str, Any]:
     ms = {f"mono.{stage}_ms": chain["ms"][stage] for stage in chain["ms"]}
     return {"mono.chain_fps": chain["fps"], **ms, "mono.chain_frames": chain["frames"], "mono.peak_mb": chain["peak_mb"],
-            "mono.growth_mb": chain["growth_mb"], "mono.one_core": chain["one_core"]}
+            "mono.growth_mb": chain["growth_mb"], "mono.one_core": chain["cores"]}

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shadowpuppet.bench import naive_multi
-from shadowpuppet.bench.ring import Around
+from shadowpuppet.bench.chain import apart
+from shadowpuppet.bench.ring import Around, RingFollower
+from shadowpuppet.bench.ring_film import ring_recording
 from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline import Listener
-from shadowpuppet.settings import ForceSettings
+from shadowpuppet.settings import ForceSettings, make_multiview_settings
 
 ROUNDS, FEW = 21, 3
 """How often each thing is timed, and how often with `quick`."""
 FORCE_ITERATIONS, SOLVE_ITERATIONS = 20, 5
 """Iterations of a call that is timed."""
+FRAMES, SOME = 300, 60
+"""Frames of the films that are tracked, and with `quick`."""
+CORES = 2
+"""For the whole chain: films are decoded beside the tracking."""
 PARTICLES = (5, 10, 20, 40, 80, 160)
 POINTS = (250, 500, 1000, 2000, 4000, 8000)
 CAMERAS = (2, 3, 4, 5, 6, 7, 8)
@@ -32,11 +40,16 @@ def run_multi(quick: bool = False, listener: Listener | None = None) -> dict[str
     out = figures(raw) | {"multi.points": len(case.run_hull().points)}
     listener.begin("cost against particles, points and cameras")
     drawn = curves(1 if quick else 5, quick)
+    listener.begin("seven films")
+    with tempfile.TemporaryDirectory() as folder:
+        recording = ring_recording(Path(folder) / "recording", SOME if quick else FRAMES)
+        out |= _chain_figures(apart(recording, Path(folder) / "run", CORES))
     return {**out, "raw": {name: times._asdict() for name, times in raw.items()}, "curves": drawn}
 
 
 def contenders(case: Around) -> dict[str, Contender]:
-    """What is timed in turns; a unit is a frame's hull, or a particle and iteration."""
+    """What is timed in turns; a unit is a frame, or a particle and iteration."""
+    paper, default = (RingFollower(case, make_multiview_settings(preset)) for preset in ("ni2008", "default"))
     forces, solved = case.particles * FORCE_ITERATIONS, case.particles * SOLVE_ITERATIONS
     return {
         "hull": Contender(case.run_hull),
@@ -44,6 +57,8 @@ def contenders(case: Around) -> dict[str, Contender]:
         "gauss_newton": Contender(lambda: case.run_gauss_newton(SOLVE_ITERATIONS), solved),
         "naive_forces": Contender(_plain(case, naive_multi.move_by_forces)),
         "naive_gauss_newton": Contender(_plain(case, naive_multi.move_by_gauss_newton)),
+        "forces_frame": Contender(paper.run, 5),
+        "default_frame": Contender(default.run, 5),
     }
 
 
@@ -64,9 +79,17 @@ def figures(raw: dict[str, Times]) -> dict[str, float]:
         "multi.gauss_newton_us": 1e6 * t["gauss_newton"],
         "multi.naive_force_us": 1e6 * t["naive_forces"],
         "multi.naive_gauss_newton_us": 1e6 * t["naive_gauss_newton"],
+        "multi.forces_fps": 1 / t["forces_frame"],
+        "multi.fps": 1 / t["default_frame"],
         "multi.ratio_naive": least["naive_forces"] / least["forces"],
         "multi.ratio_naive_gauss_newton": least["naive_gauss_newton"] / least["gauss_newton"],
     }
+
+
+def _chain_figures(chain: dict[str, Any]) -> dict[str, Any]:
+    ms = {f"multi.{stage}_ms": spent for stage, spent in chain["ms"].items()}
+    return {"multi.chain_fps": chain["fps"], **ms, "multi.chain_frames": chain["frames"], "multi.peak_mb": chain["peak_mb"],
+            "multi.growth_mb": chain["growth_mb"], "multi.cores": chain["cores"]}
 
 
 def curves(rounds: int, quick: bool = False) -> dict[str, Any]:

@@ -221,13 +221,14 @@ def normal_equations(
 
 
 def move_by_gauss_newton(
-    body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings, pull: float = 1e-6
+    body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings, pull: float = 1e-6,
+    damping: float = 0.03,
 ) -> Array:
     """The pose (D,) after one damped step of Gauss-Newton within limits, held by `pull` where it is; a DOF that is at its limit and would
     go beyond stays there, and the others know."""
     H, g = normal_equations(body, pose, points, normals, weights, surface)
     low, high = body.skeleton.limits
     free = ~(((pose <= low) & (g < 0)) | ((pose >= high) & (g > 0)))
-    A, step = H + np.diag(surface.damping * np.diag(H) + pull), np.zeros(len(pose))
+    A, step = H + np.diag(damping * np.diag(H) + pull), np.zeros(len(pose))
     step[free] = np.linalg.solve(A[np.ix_(free, free)], g[free])
     return body.skeleton.clamp((pose + np.clip(step, -0.5, 0.5))[None])[0]

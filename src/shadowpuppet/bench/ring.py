@@ -9,19 +9,21 @@ from itertools import cycle
 
 import numpy as np
 
-from shadowpuppet.anthropometry import whole_sizes_from_height
+from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.body import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
 from shadowpuppet.masks import Mask
+from shadowpuppet.motion import JointTable
+from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.refinement import Refiner
-from shadowpuppet.settings import ForceSettings
+from shadowpuppet.settings import ForceSettings, MultiviewSettings
 from shadowpuppet.synthetic import Ring
+from shadowpuppet.tracking import MultiviewTracker
+from shadowpuppet.training import RATE, train_prior
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
-from shadowpuppet.whole_body import anatomical
-from shadowpuppet.whole_sizes import AnatomicalSizes
 
 HEIGHT = 1.75
 """Of the person, metres."""
@@ -47,7 +49,7 @@ class Around:
     @cached_property
     def body(self) -> Body:
         """The person's."""
-        return anatomical(whole_sizes_from_height(AnatomicalSizes, HEIGHT))
+        return make_body("anatomical", average_sizes("anatomical", HEIGHT))
 
     @cached_property
     def views(self) -> list[Camera]:
@@ -105,14 +107,43 @@ class Around:
 
     def run_forces(self, iterations: int) -> Array:
         """All poses after so many iterations of simulated force."""
-        return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations))[0]
+        return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations))
 
     def run_gauss_newton(self, iterations: int) -> Array:
         """All poses after so many of Gauss-Newton."""
         held = np.full(self.poses.shape[1], 1e-6)
-        return self.refiner.gauss_newton(self.poses, ((self.cloud, iterations, self.refiner.settings.tau),), self.poses, held)[0]
+        return self.refiner.gauss_newton(self.poses, ((self.cloud, iterations, self.refiner.settings.tau),), self.poses, held)
+
+    def motion(self, count: int = 20) -> Array:
+        """Poses (count, D) from one end of the motion to the other."""
+        return np.array([self.pose(share) for share in np.linspace(0, 1, count)])
+
+    def prior(self, body: str) -> MotionPrior:
+        """Of the motion, for a body by name."""
+        poses = self.motion(100)
+        joints = JointTable(np.arange(len(poses)) / RATE, self.body.landmark_names, self.body.points(poses))
+        return train_prior(np.random.default_rng(0), {"the motion": joints}, body=body, rate=RATE).prior
 
     def frames(self, count: int = 20) -> Iterator[list[Mask]]:
         """Silhouettes of the motion, to and fro without end; they are drawn before the first is given."""
-        there = [self.masks(self.pose(share)) for share in np.linspace(0, 1, count)]
+        there = [self.masks(pose) for pose in self.motion(count)]
         return cycle(there + there[::-1])
+
+
+class RingFollower:
+    """A tracker that follows the made motion to and fro, frame by frame without end: hull, proposals, refinement, weights. Masks are there
+    already, and so is a prior, learnt from the same motion."""
+
+    def __init__(self, case: Around, settings: MultiviewSettings, count: int = 20) -> None:
+        """Learns, and searches for the first pose."""
+        self.rng, self.frames, self.hull = np.random.default_rng(0), case.frames(count), VisualHull(case.views, settings.hull)
+        body = make_body(settings.body, average_sizes(settings.body, HEIGHT))
+        self.tracker = MultiviewTracker(body, tuple(case.views), settings, case.prior(settings.body))
+        first = next(self.frames)
+        self.state = self.tracker.start(self.rng, self.hull.points(first), first)
+
+    def run(self, frames: int = 5) -> None:
+        """Some more frames."""
+        for _ in range(frames):
+            masks = next(self.frames)
+            self.state = self.tracker.step(self.rng, self.state, self.hull.points(masks), masks)

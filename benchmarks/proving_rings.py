@@ -1,0 +1,180 @@
+"""The proving ground of several cameras: settings of the tracker on made recordings, bodies x motions x rings x noise, to choose them by.
+
+    python benchmarks/proving_rings.py [--rows "default;no prior"] [--seeds 1] [--masks] [--frames 180] [--markdown FILE] [--workers 2]
+
+The recordings (`synthetic.proving_rings`) are made where they are missing, in build/rings. Of each, silhouettes and surface points are
+taken once and the person is measured once for every body, as `shadowpuppet track` does it; then every row tracks the same frames. A row is
+a choice of settings; the table has means and medians of the RMSE over recordings and seeds, and `se`, the standard error of its difference
+from the first row's, in pairs of the same recording: what is within two of them is not told apart. `ms` are of one core, hull included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from multiview import BUILD, made, measures
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.io.joints import read_joints
+from shadowpuppet.masks import Mask
+from shadowpuppet.motion import JointTable
+from shadowpuppet.options import make_options
+from shadowpuppet.rig import follow, open_rig
+from shadowpuppet.rig_fitting import prepare_puppet
+from shadowpuppet.rig_look import look_at_rig
+from shadowpuppet.rig_run import Puppet, training_of
+from shadowpuppet.tracking import MultiviewTracker
+from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+
+ROWS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "no training": {"training": False},
+    "no prior": {"defensive": 1.0},
+    "prior alone": {"defensive": 0.0},
+    "8 particles": {"particles": 8},
+    "32 particles": {"particles": 32},
+    "weighted mean": {"estimate": "mean"},
+    "no silhouettes": {"silhouettes": 0.0},
+    "silhouettes x 4": {"silhouettes": 0.008},
+    "noise x 0.5": {"sigma_rotation": 0.075},
+    "noise x 2": {"sigma_rotation": 0.3},
+    "keep 0": {"keep": 0.0},
+    "keep 1": {"keep": 1.0},
+    "velocity 1": {"velocity": 1.0},
+    "pull x 10": {"gauss_newton": {"pull": 1e-4}},
+    "pull / 10": {"gauss_newton": {"pull": 1e-6}},
+    "tau x 1.5": {"gauss_newton": {"coarse_tau": 0.09, "fine_tau": 0.06}},
+    "epsilon 0.3": {"surface": {"epsilon": 0.3, "tau": 0.06}},
+    "more iterations": {"gauss_newton": {"coarse": 8, "fine": 6}},
+    "forces": {"refinement": "forces"},
+    "cylinders": {"body": "cylinders"},
+    "every camera carves": {"hull": {"tolerated": 0}},
+    "half the rays": {"hull": {"rays": 1000}},
+    "ni2008": {"preset": "ni2008"},
+}
+"""Each the default with something changed."""
+
+
+class Case:
+    """A recording read once: silhouettes as bits, surface points and measured people by the settings that they depend on."""
+
+    def __init__(self, path: Path, masks: bool, frames: int) -> None:
+        """`masks`: the exact ones; `frames`: so many at most."""
+        self.rig = open_rig(path, make_options({"masks": masks}))
+        self.prepared = look_at_rig(self.rig, make_options({"masks": masks}))
+        truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
+        self.times, self.bits = [], []
+        for seen in follow(self.rig, self.prepared.silhouettes, ready=masks):
+            self.times.append(seen.time)
+            self.bits.append([None if mask is None else (np.packbits(mask), mask.shape) for mask in seen.masks])
+            if len(self.times) == frames:
+                break
+        known = truth.times <= self.times[-1] + 1e-6
+        self.truth = JointTable(truth.times[known], truth.names, truth.positions[known])
+        self.hulls: dict[str, tuple[list[SurfacePoints], float]] = {}
+        self.puppets: dict[str, Puppet] = {}
+
+    def masks(self) -> list[list[Mask | None]]:
+        """Those of every frame, one after the other."""
+        return [[None if one is None else np.unpackbits(one[0], count=np.prod(one[1])).reshape(one[1]).astype(bool) for one in seen]
+                for seen in self.bits]
+
+    def run(self, values: Mapping[str, Any], seed: int) -> dict[str, Any]:
+        """Measures of one row and seed."""
+        values = dict(values)
+        training, preset = values.pop("training", True), values.pop("preset", "default")
+        options = make_options({"preset": preset, "multiview": values})
+        settings = options.multiview
+        key = json.dumps([settings.body, training, seed])
+        if key not in self.puppets:
+            given = training_of(self.rig) if training else None
+            self.puppets[key] = prepare_puppet(np.random.default_rng([seed, 0]), self.rig, self.prepared.opening, options, given)
+        known = self.puppets[key].tracker
+        assert isinstance(known, MultiviewTracker)
+        tracker = replace(known, settings=settings, prior=known.prior if settings.method == "hybrid" else None)
+        masks = self.masks()
+        if (at := repr(settings.hull)) not in self.hulls:
+            hull, start = VisualHull(self.rig.cameras, settings.hull), time.process_time()
+            self.hulls[at] = [hull.points(seen) for seen in masks], time.process_time() - start
+        points, spent = self.hulls[at]
+        rng, state, poses, start = np.random.default_rng([seed, 1]), None, list[Array](), time.process_time()
+        for surface, seen in zip(points, masks):
+            state = tracker.start(rng, surface, seen) if state is None else tracker.step(rng, state, surface, seen)
+            poses.append(np.where(state.status in ("lost", "absent"), np.nan, state.pose))
+        spent += time.process_time() - start
+        shown = np.array(poses)
+        joints = tracker.body.points(np.nan_to_num(shown))
+        joints[np.isnan(shown).any(1)] = np.nan
+        found = measures(JointTable(np.array(self.times), tracker.body.landmark_names, joints), self.truth)
+        return found | {"ms": 1000 * spent / len(poses)}
+
+
+def run(path: Path, rows: Mapping[str, Mapping[str, Any]], seeds: int, masks: bool, frames: int) -> dict[str, list[dict[str, Any]]]:
+    """Measures of one recording: row to seeds."""
+    case = Case(path, masks, frames)
+    out = {name: [case.run(values, seed) for seed in range(seeds)] for name, values in rows.items()}
+    print(path.name, {name: round(float(np.mean([one["rmse"] for one in runs])), 1) for name, runs in out.items()}, flush=True)
+    return out
+
+
+def table(found: Mapping[str, Mapping[str, list[dict[str, Any]]]]) -> str:
+    """One line a row of settings, as Markdown."""
+    rows = list(next(iter(found.values())))
+    errors = {row: np.array([np.mean([one["rmse"] for one in runs[row]]) for runs in found.values()]) for row in rows}
+    lines = ["| settings | mean | se | median | worst | lost % | ms |", "|---|---:|---:|---:|---:|---:|---:|"]
+    for row in rows:
+        apart, runs = errors[row] - errors[rows[0]], [one for each in found.values() for one in each[row]]
+        se = apart.std(ddof=1) / np.sqrt(len(apart)) if len(apart) > 1 else float("nan")
+        lost = 100 * np.mean([one["lost"] / one["frames"] for one in runs])
+        cells = [errors[row].mean(), se, np.median(errors[row]), errors[row].max(), lost, np.mean([one["ms"] for one in runs])]
+        lines.append(f"| {row} | " + " | ".join(f"{cell:.1f}" for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def each(found: Mapping[str, Mapping[str, list[dict[str, Any]]]]) -> str:
+    """RMSE of every recording under every row, as Markdown."""
+    rows = list(next(iter(found.values())))
+    lines = ["| recording | " + " | ".join(rows) + " |", "|---|" + "---:|" * len(rows)]
+    lines += [f"| {name} | " + " | ".join(f"{np.mean([one['rmse'] for one in runs[row]]):.1f}" for row in rows) + " |"
+              for name, runs in found.items()]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Parse, run, print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rows", default="", help="names, with ; between them: " + "; ".join(ROWS))
+    parser.add_argument("--recordings", default="", help="names, with ; between them; all without")
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--masks", action="store_true", help="exact silhouettes in place of those of the films")
+    parser.add_argument("--frames", type=int, default=10**6, help="so many of each, at most")
+    parser.add_argument("--folder", type=Path, default=BUILD / "rings", help="where the recordings are, or are made")
+    parser.add_argument("--markdown", type=Path, help="write the tables there too")
+    parser.add_argument("--workers", type=int, default=2)
+    args = parser.parse_args()
+    chosen = [row.strip() for row in args.rows.split(";") if row.strip()] or list(ROWS)
+    unknown = [row for row in chosen if row not in ROWS]
+    if unknown:
+        parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
+    paths = made(args.folder, filter(None, args.recordings.split(";")))
+    rows, n = {row: ROWS[row] for row in chosen}, len(paths)
+    with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
+        results = pool.map(run, paths, [rows] * n, [args.seeds] * n, [args.masks] * n, [args.frames] * n)
+        found = {path.name: one for path, one in zip(paths, results)}
+    text = f"{table(found)}\n\n{each(found)}"
+    print(text)
+    if args.markdown:
+        args.markdown.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
