@@ -29,6 +29,11 @@ def sizes_kind(name: str) -> type[Sizes]:
     return ALL[name][1]
 
 
+def kind_of(sizes: Sizes) -> str:
+    """Name of a body that is made from such sizes; of several the first."""
+    return next(name for name, (_, kind) in ALL.items() if isinstance(sizes, kind))
+
+
 def make_body(name: str, sizes: Sizes) -> Body:
     """A body by name. Raises `ShadowPuppetError` with the names there are, or for sizes of another kind of body."""
     kind = sizes_kind(name)

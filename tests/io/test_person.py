@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from shadowpuppet.bodies import WHOLE, average_sizes
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.person import Person, read_person, write_person
 from shadowpuppet.sizes import CardboxSizes
@@ -21,6 +22,31 @@ def test_what_is_written_is_read(tmp_path, sizes, height, source, notes):
     person = Person(CardboxSizes.from_array(sizes), height, source, notes.replace("\r", ""))
     write_person(tmp_path / "person.toml", person)
     assert read_person(tmp_path / "person.toml") == person
+
+
+@pytest.mark.parametrize("body", WHOLE)
+def test_whole_people_are_written_and_read_too(tmp_path, body):
+    person = Person(average_sizes(body, 1.81), 1.81, "training joints", "")
+    write_person(tmp_path / "person.toml", person)
+    assert f'body = "{body}"' in (tmp_path / "person.toml").read_text()
+    assert read_person(tmp_path / "person.toml") == person
+
+
+def test_upper_bodies_share_their_sizes_and_others_do_not():
+    upper, whole = Person(SIZES), Person(average_sizes("anatomical", 1.7))
+    assert upper.sizes_for("rounded") is upper.sizes_for("cardbox") is SIZES
+    assert whole.sizes_for("anatomical") is whole.sizes
+    for person, body, other in ((upper, "anatomical", "cardbox"), (whole, "cylinders", "anatomical"), (whole, "boxes", "anatomical")):
+        with pytest.raises(ShadowPuppetError, match=f"sizes are those of the body '{other}', expected those of '{body}'"):
+            person.sizes_for(body)
+
+
+def test_files_from_before_there_were_whole_bodies_are_read(tmp_path):
+    write_person(tmp_path / "person.toml", Person(SIZES, 1.8))
+    text = (tmp_path / "person.toml").read_text()
+    assert "body" not in text
+    (tmp_path / "person.toml").write_text('body = "cardbox"\n' + text)
+    assert read_person(tmp_path / "person.toml") == Person(SIZES, 1.8)
 
 
 def lines(**changes: str | None) -> str:
@@ -41,11 +67,15 @@ def test_a_file_written_by_hand_needs_the_sizes_only(tmp_path):
     ("[sizes]\n" + lines(head_width='"wide"'), "sizes: head_width: found 'wide', expected a number of metres"),
     ("[sizes]\n" + lines(head_width="230"), "size head_width: found 230.0, expected 0.005 to 2.0 metres"),
     ("[sizes]\n" + lines(head_width="nan"), "size head_width: found nan"),
-    ("weight = 70\n[sizes]\n" + lines(), "found the key 'weight'; keys known: height, notes, sizes, source"),
+    ("weight = 70\n[sizes]\n" + lines(), "found the key 'weight'; keys known: body, height, notes, sizes, source"),
     ("height = 183\n[sizes]\n" + lines(), "height: found 183, expected 0.5 to 2.5 metres"),
     ("height = true\n[sizes]\n" + lines(), "height: found True"),
     ("source = 7\n[sizes]\n" + lines(), "source: found 7, expected text in quotes"),
     ("height = \n", "not valid TOML"),
+    ('body = "ball"\n[sizes]\n' + lines(), "body: found 'ball', expected one of anatomical, boxes, cardbox, cylinders, rounded"),
+    ("body = 3\n[sizes]\n" + lines(), "body: found 3, expected one of"),
+    ('body = "anatomical"\n[sizes]\n' + lines(), "sizes: unknown .*; the sizes are: ankle_height"),
+    ('body = "cylinders"\n', "sizes: found None, expected a table \\[sizes\\] with ankle_height"),
 ])
 def test_what_cannot_be_is_said(tmp_path, content, said):
     (tmp_path / "person.toml").write_text(content)

@@ -6,19 +6,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shadowpuppet.bodies import ALL, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.sizes import HEIGHTS, CardboxSizes, expected_metres, is_within
+from shadowpuppet.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
 
-KEYS = ("height", "source", "notes", "sizes")
+KEYS = ("body", "height", "source", "notes", "sizes")
+UPPER = "rounded"
+"""The body that sizes are for where a file does not say: with it, all upper bodies, which have the same sizes."""
 
 
 @dataclass(frozen=True)
 class Person:
     """A person as the model has them. Raises `ShadowPuppetError` where the height cannot be one."""
 
-    sizes: CardboxSizes
+    sizes: Sizes
+    """Of an upper body or of one of the whole ones."""
     height: float | None = None
     """Metres, shoes on; None where it is not known."""
     source: str = ""
@@ -34,6 +38,13 @@ class Person:
             if not isinstance(getattr(self, key), str):
                 raise ShadowPuppetError(f"{key}: found {getattr(self, key)!r}, expected text in quotes")
 
+    def sizes_for(self, body: str) -> Sizes:
+        """The sizes, if a body can be made from them. Raises `ShadowPuppetError` where they are another body's."""
+        if not isinstance(self.sizes, sizes_kind(body)):
+            raise ShadowPuppetError(f"the person's sizes are those of the body {kind_of(self.sizes)!r}, expected those of {body!r}: choose "
+                                    "that body, or measure the person again")
+        return self.sizes
+
 
 def read_person(path: str | Path) -> Person:
     """A person from a file. Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible."""
@@ -42,11 +53,14 @@ def read_person(path: str | Path) -> Person:
     unknown = set(data) - set(KEYS)
     if unknown:
         raise FormatError(f"{path}: found the key {min(unknown)!r}; keys known: {choices(KEYS)}")
-    sizes = data.pop("sizes", None)
+    sizes, body = data.pop("sizes", None), data.pop("body", UPPER)
+    if not isinstance(body, str) or body not in ALL:
+        raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(ALL)}")
+    kind = sizes_kind(body)
     if not isinstance(sizes, dict):
-        raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(CardboxSizes.names())}")
+        raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")
     try:
-        return Person(CardboxSizes.from_mapping(sizes), **data)
+        return Person(kind.from_mapping(sizes), **data)
     except ShadowPuppetError as error:
         raise FormatError(f"{path}: {error}") from None
 
@@ -55,7 +69,9 @@ def write_person(path: str | Path, person: Person) -> None:
     """Write a person so that `read_person` gives them back. Raises `ShadowPuppetError` where that fails."""
     import tomli_w
 
-    known: dict[str, Any] = {} if person.height is None else {"height": float(person.height)}
+    upper = isinstance(person.sizes, CardboxSizes)
+    known: dict[str, Any] = {} if upper else {"body": kind_of(person.sizes)}
+    known |= {} if person.height is None else {"height": float(person.height)}
     sizes = dict(zip(person.sizes.names(), person.sizes.to_array().tolist()))
-    head = "# Lengths in metres; the sizes are a1..a18 of Liu 2011, Fig. 2.\n"
+    head = "# Lengths in metres" + ("; the sizes are a1..a18 of Liu 2011, Fig. 2.\n" if upper else ".\n")
     write_whole(Path(path), head + tomli_w.dumps({**known, "source": person.source, "notes": person.notes, "sizes": sizes}))
