@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from people import camera, picture
 from shadowpuppet.body import BODIES, SIDES
-from shadowpuppet.first_pose import arm_parts, coarse_arms, search
+from shadowpuppet.first_pose import search
 from shadowpuppet.likelihood import Observation
+from shadowpuppet.members import coarse_arms, parts_of
 
 LIBRARY = coarse_arms()
 VIEW = picture("rounded")
@@ -41,7 +42,7 @@ def test_every_direction_of_an_arm_is_near_a_coarse_one():
 @pytest.mark.parametrize("body", BODIES)
 def test_an_arm_s_parts(body):
     hand = ["left_hand"] if body == "rounded" else []
-    assert arm_parts(picture(body), "left") == ["left_upper_arm", "left_forearm", *hand]
+    assert parts_of(picture(body).body, "left_arm") == ["left_upper_arm", "left_forearm", *hand]
 
 
 @given(st.integers(0, len(LIBRARY) - 1), st.integers(0, len(LIBRARY) - 1), st.floats(-0.6, 0.6))
@@ -67,8 +68,8 @@ def test_level_arms_are_found_to_the_pixel():
 def test_all_arms_come_back_the_best_first():
     mask = VIEW.mask(np.array([0.1, 0, 0, 0, *LIBRARY[100], *LIBRARY[200]]))
     found = search(VIEW, mask)
-    assert list(found.arms) == list(SIDES)
-    for side, arms in found.arms.items():
+    assert list(found.limbs) == ["left_arm", "right_arm"]
+    for side, arms in zip(SIDES, found.limbs.values()):
         np.testing.assert_array_equal(arms[0], found.pose[VIEW.body.skeleton.dof_indices(
             [f"{side}_{name}" for name in ("shoulder_abduction", "shoulder_forward", "elbow_roll", "elbow_flexion")])])
         np.testing.assert_array_equal(np.unique(arms, axis=0), np.unique(LIBRARY, axis=0))

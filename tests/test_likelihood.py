@@ -11,9 +11,9 @@ import naive
 from people import camera, picture, random_poses
 from shadowpuppet import kinematics, projection, rasterize, spans
 from shadowpuppet.body import BODIES, Body, Quads
-from shadowpuppet.first_pose import arm_parts
 from shadowpuppet.kernels import BLOCK
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
+from shadowpuppet.members import parts_of
 from shadowpuppet.rasterize import Picture, pack, unpack
 from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
@@ -113,7 +113,7 @@ def test_partial_costs_are_whole_costs(body, stage, rng):
 @pytest.mark.parametrize("body", BODIES)
 def test_hidden_parts_are_not_drawn_neither_fixed_nor_moved(body, stage, rng):
     view = picture(body)
-    dofs, hidden = dofs_of(view, STAGES[stage]), arm_parts(view, "left") + arm_parts(view, "right")[:1]
+    dofs, hidden = dofs_of(view, STAGES[stage]), parts_of(view.body, "left_arm") + parts_of(view.body, "right_arm")[:1]
     pose = random_poses(rng, view.body.skeleton, 1)[0] * 0.5
     poses, mask = around(rng, view, pose, dofs, 5), view.mask(pose)
     drawn = np.flatnonzero([part not in hidden for part in view.body.parts])

@@ -9,7 +9,7 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from shadowpuppet.body import BODIES
+from shadowpuppet.bodies import ALL
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.options import Options
 from shadowpuppet.resampling import SCHEMES
@@ -59,7 +59,7 @@ def test_merging_changes_no_preset():
 
 def test_names_that_settings_offer_are_those_there_are():
     hints = get_type_hints(MonocularSettings)
-    assert set(get_args(hints["body"])) == set(BODIES)
+    assert set(get_args(hints["body"])) == set(ALL)
     assert set(get_args(hints["resampling"])) == set(SCHEMES)
 
 
@@ -81,7 +81,7 @@ def test_names_that_settings_offer_are_those_there_are():
     ({"stages": ["torso", 3]}, "stages.1: found 3"), ({"cycles": 0}, "cycles: found 0"), ({"cycles": 101}, "cycles: found 101"),
     ({"cooling": 0}, "cooling"), ({"cooling": 1.1}, "cooling"), ({"explore": -1}, "explore"), ({"motion_weight": -1}, "motion_weight"),
     ({"motion_reach": 0}, "motion_reach"), ({"posture_weight": math.nan}, "posture_weight"),
-    ({"body": "ball"}, "body: found 'ball'; input should be 'cardbox', 'boxes' or 'rounded'"),
+    ({"body": "ball"}, "body: found 'ball'; input should be 'cardbox', 'boxes', 'rounded', 'anatomical' or 'cylinders'"),
     ({"resampling": "best"}, "resampling: found 'best'; input should be 'deterministic', 'stratified'"),
     ({"rank_by": None}, "rank_by: found None"), ({"torso_arms": "both"}, "input should be 'last' or 'hidden'"),
     ({"estimate": "median"}, "input should be 'best' or 'mean'"), ({"limits": 2}, "limits: found 2"),

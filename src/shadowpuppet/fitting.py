@@ -9,15 +9,17 @@ from itertools import chain, islice
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.bodies import WHOLE
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
 from shadowpuppet.geometry import Array
-from shadowpuppet.initialization import POSTURES, Fit, Guess, find_person, fit_references
+from shadowpuppet.initialization import POSTURES, Fit, Guess, as_whole, find_person, fit_references
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
+from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.tracking import MonocularTracker
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
@@ -92,15 +94,16 @@ def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Opt
     subject, body = footage.recording.subject, options.tracker.body
     known = {"height": subject.height, "distance": subject.distance, "body": body, "settings": options.initialization}
     if options.person is not None:
-        person = read_person(options.person)
+        person = read_person(options.person, body)
         known["height"] = known["height"] or person.height
         fit = find_person(rng, footage.camera, _few(masks), sizes=person.sizes, **known)
         return replace(fit, curves={}), str(options.person)
     references = _references(footage, seen)
     if references:
+        known["body"] = "rounded" if body in WHOLE else body
         fit = fit_references(rng, footage.camera, references, **known)
         _check_postures(footage, references, fit)
-        return fit, "references"
+        return as_whole(footage.camera, references, fit, body) if body in WHOLE else fit, "references"
     return find_person(rng, footage.camera, _few(masks), **known), "proportions, refined on the first seconds"
 
 
@@ -143,6 +146,7 @@ def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: Fit) -> No
 def wrong_posture(camera: Camera, mask: Mask, name: str, fit: Fit, pose: Array) -> str | None:
     """What shows that a reference's mask (H, W) does not have its posture, after the fit with `pose` (D,); None where nothing does."""
     sizes = fit.guess.sizes
+    assert isinstance(sizes, CardboxSizes)
     if fit.overlaps[name] < WRONG[name]:
         return f"the body overlaps the silhouette by {fit.overlaps[name]:.2f} only, expected over {DOUBTFUL[name]}"
     if name == "side_arms_hanging":

@@ -5,20 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.first_pose import arm_parts, coarse_arms
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
+from shadowpuppet.members import HELD, coarse_limbs, dofs_of, members_of, parts_of
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import Scheme, make_scheme, normalise
 from shadowpuppet.settings import MonocularSettings, pixel_scale
 
-PARTS = {"torso": "torso_", "left_arm": "left_", "right_arm": "right_"}
-"""Parts that a stage can name, and how the names of their DOF begin."""
-HELD = {"torso": ("left_shoulder", "right_shoulder"), "left_arm": ("left_elbow", "left_hand"), "right_arm": ("right_elbow", "right_hand")}
-"""Points of each part that the motion's pull holds."""
 WANDER, AROUND = 0.3, 0.2
-"""Where a stage explores: deviation of the torso's angles from upright, and of an arm's from a coarse arm, rad."""
+"""Where a stage explores: deviation of the torso's angles from upright, and of a limb's from a coarse one, rad."""
 TEMPERATURE = 50.0
 """For the mean estimate: a particle worse by so many pixels (at 320 x 240) weighs 1/e."""
 
@@ -30,20 +26,21 @@ class FilterStage:
         """`name`: parts joined by +. Raises `SettingsError` for a part that there is not."""
         self.picture, self.settings = picture, settings
         self.parts = tuple(dict.fromkeys(part.strip() for part in name.split("+")))
-        unknown = [part for part in self.parts if part not in PARTS]
-        if unknown:
-            raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(PARTS)}")
         skeleton = picture.body.skeleton
-        owner = {d: part for d, dof in enumerate(skeleton.dofs) for part in self.parts if dof.name.startswith(PARTS[part])}
+        unknown = [part for part in self.parts if part not in members_of(skeleton)]
+        if unknown:
+            raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(members_of(skeleton))}")
+        owner = {d: part for part in self.parts for d in dofs_of(skeleton, part).tolist()}
         self.dofs = np.array(sorted(owner), np.int64)
         self.moves_torso = "torso" in self.parts
         hide = self.parts == ("torso",) and settings.torso_arms == "hidden"
-        self.partial = PartialCost(picture, self.dofs, arm_parts(picture, "left") + arm_parts(picture, "right") if hide else ())
+        arms = [part for arm in ("left_arm", "right_arm") for part in parts_of(picture.body, arm)]
+        self.partial = PartialCost(picture, self.dofs, arms if hide else ())
 
         of = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}
         self.number = sum(part.particles for part in of.values())
         self.resample: Scheme = make_scheme(settings.resampling, of[self.parts[0]].survival)
-        self.turns = np.array([skeleton.dofs[d].kind == "rotation" for d in self.dofs])
+        self.turns = np.array([skeleton.dofs[d].kind != "translation" for d in self.dofs])
         self.sigma = np.array([of[owner[d]].sigma_rotation if turn else of[owner[d]].sigma_translation
                                for d, turn in zip(self.dofs.tolist(), self.turns, strict=True)])
         self.scale = pixel_scale(picture.camera.size)
@@ -77,8 +74,8 @@ class FilterStage:
         if self.moves_torso:
             spread = np.where(self.turns, WANDER, 5 * self.settings.torso.sigma_translation)
             return np.where(self.turns, 0.0, best) + rng.standard_normal((number, len(best))) * spread
-        arms = coarse_arms()
-        return arms[rng.integers(len(arms), size=number)] + AROUND * rng.standard_normal((number, len(best)))
+        limbs = coarse_limbs(self.picture.body.skeleton, self.parts[0])
+        return limbs[rng.integers(len(limbs), size=number)] + AROUND * rng.standard_normal((number, len(best)))
 
     def weigh(self, observation: Observation, around: Array, last: Array) -> Weigh:
         """Costs (N,) and log weights (eq. 6) of values (N, d), all other DOF as in `around` (D,).

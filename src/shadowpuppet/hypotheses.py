@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.anthropometry import SizePrior
+from shadowpuppet.bodies import make_body
 from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
@@ -17,7 +18,7 @@ from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import Mask
 from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.settings import InitializationSettings, pixel_scale
-from shadowpuppet.sizes import CardboxSizes
+from shadowpuppet.sizes import CardboxSizes, Sizes
 
 NAMES = CardboxSizes.names()
 MAY_BE_NEGATIVE = ("neck_gap", "shoulder_inset")
@@ -29,17 +30,18 @@ GAP = 1 / 80
 class Guess:
     """A person's sizes and place, as far as they are known."""
 
-    sizes: CardboxSizes
+    sizes: Sizes
+    """Of an upper body, or of a whole one."""
     height: float
     """Of the person, metres, shoes on."""
     distance: float
     """From the camera to the middle of the body, horizontally, metres."""
     elevation: float
-    """Of the torso's lower edge over the camera, metres."""
+    """Of the torso's lower edge, or of a whole body's pelvis, over the camera, metres."""
 
     def picture(self, camera: Camera, body: str = "rounded") -> Picture:
         """How the camera sees this person."""
-        return Picture(BODIES[body](self.sizes), camera, place(camera, self.distance, self.elevation))
+        return Picture(make_body(body, self.sizes), camera, place(camera, self.distance, self.elevation))
 
 
 class Unknowns(NamedTuple):

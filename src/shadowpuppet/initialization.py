@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SizePrior, sizes_from_height
-from shadowpuppet.body import BODIES
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
+from shadowpuppet.bodies import WHOLE, make_body, whole_from_upper
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.first_pose import search
 from shadowpuppet.geometry import Array
 from shadowpuppet.hypotheses import Guess, Hypotheses
+from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.rasterize import place
 from shadowpuppet.settings import InitializationSettings
-from shadowpuppet.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, expected_metres, is_within
+from shadowpuppet.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.whole_sizes import BoneSizes
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},
@@ -61,7 +63,7 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     seen = _checked(camera, references)
     names, masks = list(seen), list(seen.values())
     guess = _first_guess(camera, names[0], masks[0], height, distance)
-    skeleton = BODIES["cardbox"](guess.sizes).skeleton
+    skeleton = make_body("cardbox", guess.sizes).skeleton
     poses = np.array([skeleton.pose(**POSTURES[name]) for name in names])
     side = skeleton.dof_indices(["torso_y"])
     for k, mask in enumerate(masks):
@@ -86,7 +88,7 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
 
 
 def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], *, height: float | None = None,
-                distance: float | None = None, sizes: CardboxSizes | None = None, body: str = "rounded",
+                distance: float | None = None, sizes: Sizes | None = None, body: str = "rounded",
                 settings: InitializationSettings | None = None) -> Fit:
     """Place and sizes without references, from masks (H, W) of the first seconds in any posture.
 
@@ -95,6 +97,9 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     nobody in the masks, one is not of the camera's size, or height or distance cannot be.
     """
     settings = settings or InitializationSettings()
+    if body in WHOLE:
+        return _find_whole(rng, camera, masks, height, distance, sizes, body, settings)
+    assert sizes is None or isinstance(sizes, CardboxSizes)
     _check_scale(height, distance)
     checked = [check_mask(mask, camera.size, f"mask {k} of the first seconds") for k, mask in enumerate(masks)]
     seen = [mask for mask in checked if may_be_person(mask)]
@@ -106,6 +111,32 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     guess = guesses[int(np.argmin(costs))]
     poses = np.array([search(guess.picture(camera, body), mask).pose for mask in seen])
     return refine(rng, camera, guess, seen, poses, free_sizes=sizes is None, free_distance=distance is None, body=body, settings=settings)
+
+
+def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None,
+                sizes: Sizes | None, body: str, settings: InitializationSettings) -> Fit:
+    """A whole body: the upper one is found first, for the legs may not be in the picture."""
+    assert sizes is None or isinstance(sizes, BoneSizes)
+    if height is None and sizes is not None:
+        height = stature_of(dict(zip(sizes.names(), sizes.to_array().tolist()))) + SOLE
+    fit = find_person(rng, camera, masks, height=height, distance=distance, settings=settings)
+    return as_whole(camera, {str(k): mask for k, mask in enumerate(filter(may_be_person, masks))}, fit, body, sizes)
+
+
+def as_whole(camera: Camera, masks: Mapping[str, Mask], fit: Fit, body: str, sizes: Sizes | None = None) -> Fit:
+    """The fit of an upper body as that of a whole one, its pelvis under the same neck, with poses anew; sizes are the same person's, or
+    those given.
+    """
+    upper = fit.guess.sizes
+    assert isinstance(upper, CardboxSizes)
+    whole = sizes or whole_from_upper(body, upper, fit.guess.height)
+    made = make_body(body, whole)
+    neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
+    guess = replace(fit.guess, sizes=whole, elevation=fit.guess.elevation + upper.torso_height - neck)
+    picture = guess.picture(camera, body)
+    poses = np.array([search(picture, mask).pose for mask in masks.values()])
+    overlaps = {name: Observation.of(mask).cost_and_overlap(picture.draw(pose))[1] for (name, mask), pose in zip(masks.items(), poses)}
+    return Fit(guess, fit.curves, overlaps, poses)
 
 
 def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,

@@ -5,6 +5,8 @@ A limb's frame follows from two directions: its own, and that of the limb below 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -100,8 +102,23 @@ def _limb(parent: Array, along: Array, bend: Array) -> Array:
     return np.stack([x, np.cross(-along, x), -along], 2)
 
 
-def _angles(rotations: Array, dofs: list[Dof]) -> Array:
-    """Values (T, 3) of three DOF whose rotation is known (T, 3, 3), on the branch that limits and neighbours in time want."""
+def angles_of(rotations: Array, dofs: Sequence[Dof]) -> Array:
+    """Values (N, 3) of three DOF that make rotations (N, 3, 3), each on the branch that is best within the limits."""
+    candidates, low, high = _candidates(rotations, dofs)
+    return candidates[np.arange(len(candidates)), _excess(candidates, low, high).argmin(1)]
+
+
+def _angles(rotations: Array, dofs: Sequence[Dof]) -> Array:
+    """Values (T, 3) of three DOF that make rotations (T, 3, 3), on the branch that limits and neighbours in time want."""
+    candidates, low, high = _candidates(rotations, dofs)
+    free = ~np.isfinite(low)
+    values = _branch(candidates, _excess(candidates, low, high), wraps=free)
+    values[:, free] = np.unwrap(values[:, free], axis=0)
+    return values
+
+
+def _candidates(rotations: Array, dofs: Sequence[Dof]) -> tuple[Array, Array, Array]:
+    """Both triples of values (N, 2, 3) that make rotations (N, 3, 3), each angle in the turn about its limits' middle; and the limits."""
     from scipy.spatial.transform import Rotation
 
     turns = Rotation.from_matrix(rotations)
@@ -109,23 +126,22 @@ def _angles(rotations: Array, dofs: list[Dof]) -> Array:
     if dofs[0].kind == "vector":
         v = turns.as_rotvec()
         other = v - 2 * np.pi * unit(np.where(np.linalg.norm(v, axis=1, keepdims=True) > 1e-9, v, [0, 0, 1e-9]))
-        return _branch(np.stack([v, other], 1), low, high, wraps=np.zeros(3, bool))
-    order = "".join("XYZ"[AXES[dof.axis][0]] for dof in dofs)
-    signs = np.array([AXES[dof.axis][1] for dof in dofs])
-    first = turns.as_euler(order)
+        return np.stack([v, other], 1), low, high
+    signs, free = np.array([AXES[dof.axis][1] for dof in dofs]), ~np.isfinite(low)
+    first = turns.as_euler("".join("XYZ"[AXES[dof.axis][0]] for dof in dofs))
     both = np.stack([first, first * [1, -1, 1] + np.pi], 1) * signs
-    free = ~np.isfinite(low)
     centre = np.where(free, 0.0, (np.where(free, 0, low) + np.where(free, 0, high)) / 2)
-    both = centre + (both - centre + np.pi) % (2 * np.pi) - np.pi
-    values = _branch(both, low, high, wraps=free)
-    values[:, free] = np.unwrap(values[:, free], axis=0)
-    return values
+    return centre + (both - centre + np.pi) % (2 * np.pi) - np.pi, low, high
 
 
-def _branch(candidates: Array, low: Array, high: Array, wraps: Array) -> Array:
-    """Of candidates (T, K, 3) the path (T, 3) of least squared steps and squared excess over the limits (Viterbi 1967)."""
+def _excess(candidates: Array, low: Array, high: Array) -> Array:
+    """Squared excess (N, K) of candidates (N, K, 3) over limits; of those within them the small are a little better."""
     over = np.maximum(low - candidates, 0) + np.maximum(candidates - high, 0)
-    own = (np.where(np.isfinite(over), over, 0) ** 2).sum(2) + 1e-6 * (candidates**2).sum(2)
+    return (np.where(np.isfinite(over), over, 0) ** 2).sum(2) + 1e-6 * (candidates**2).sum(2)
+
+
+def _branch(candidates: Array, own: Array, wraps: Array) -> Array:
+    """Of candidates (T, K, 3) the path (T, 3) of least squared steps and least costs of their own (T, K) (Viterbi 1967)."""
     steps = candidates[1:, None, :] - candidates[:-1, :, None]
     steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
     between = (steps**2).sum(3)

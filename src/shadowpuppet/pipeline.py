@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, sizes_from_height
-from shadowpuppet.body import BODIES, Body
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body import Body
 from shadowpuppet.fitting import Found
 from shadowpuppet.footage import opened
 from shadowpuppet.io._files import write_whole
@@ -97,7 +98,7 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
 
 def named_body(name: str) -> tuple[Body, list[str]]:
     """A body of average sizes, for its names, and the names of the joints that a run keeps."""
-    body = BODIES[name](sizes_from_height(AVERAGE_HEIGHT))
+    body = make_body(name, average_sizes(name, AVERAGE_HEIGHT))
     return body, [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
 
 

@@ -69,8 +69,8 @@ class PartSettings:
 class MonocularSettings:
     """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
-    body: Literal["cardbox", "boxes", "rounded"] = "rounded"
-    """The body's model."""
+    body: Literal["cardbox", "boxes", "rounded", "anatomical", "cylinders"] = "rounded"
+    """The body's model: of the upper body (the first three), or of the whole person, legs and all."""
     resampling: Literal["deterministic", "stratified", "systematic", "multinomial", "residual"] = "deterministic"
     """DRS (Algorithm 4), SRS (Algorithm 3), or another scheme in SRS's place."""
     torso: PartSettings = PartSettings(particles=500)
@@ -78,7 +78,8 @@ class MonocularSettings:
     arm: PartSettings = PartSettings(particles=500, survival=0.4, sigma_rotation=0.25, sigma_cost=4000.0)
     """Each arm's stage."""
     stages: Annotated[tuple[str, ...], Field(min_length=1)] = ("torso", "left_arm", "right_arm")
-    """The filter's stages, in order; parts joined by + are moved at once ("torso+left_arm+right_arm" is a flat filter)."""
+    """The filter's stages, in order; parts joined by + are moved at once ("torso+left_arm+right_arm" is a flat filter). Legs of a whole
+    body that no stage names follow."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
     """Estimation cycles a frame. More of them fit the silhouette closer, but not the person: many particles in one cycle do better."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
@@ -102,7 +103,7 @@ class MonocularSettings:
     limits: bool = True
     """Whether joint limits are kept."""
     ignore_legs: bool = True
-    """Leave out of the cost what is seen below the waist, where the model has no legs."""
+    """Leave out of the cost what is seen below the waist, where the model has no legs; of no use for a whole body."""
 
 
 PRESETS: dict[str, dict] = {

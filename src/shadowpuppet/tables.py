@@ -17,7 +17,7 @@ from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import FAR, LOST
 from shadowpuppet.motion import JointTable
-from shadowpuppet.sizes import CardboxSizes
+from shadowpuppet.sizes import CardboxSizes, Sizes
 from shadowpuppet.synthetic.spec import Spec
 from shadowpuppet.training import Trained
 
@@ -89,10 +89,11 @@ def live_rows(live: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows + ([("breaks", f"{live['breaks']} times no pictures came")] if live["breaks"] else [])
 
 
-def sizes_table(sizes: CardboxSizes) -> RenderableType:
-    """The 18 sizes a1..a18."""
+def sizes_table(sizes: Sizes) -> RenderableType:
+    """The named sizes: a1..a18 of an upper body, or a whole body's."""
     table = _table("sizes, mm", ("", "size", "mm", "", "size", "mm"), right=(2, 5))
-    rows = [(f"a{n}", name, f"{1000 * value:.0f}") for n, (name, value) in enumerate(zip(sizes.names(), sizes.to_array()), 1)]
+    numbers = [f"a{n}" if isinstance(sizes, CardboxSizes) else "" for n in range(1, len(sizes.names()) + 1)]
+    rows = [(number, name, f"{1000 * value:.0f}") for number, name, value in zip(numbers, sizes.names(), sizes.to_array())]
     half = (len(rows) + 1) // 2
     for i in range(half):
         table.add_row(*rows[i], *(rows[half + i] if half + i < len(rows) else ("", "", "")))

@@ -18,6 +18,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import Mask, check_mask
+from shadowpuppet.members import dofs_of, limbs_of
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.particle_filter import Particles, Refine, Weigh, diffuse, evaluate, step
 from shadowpuppet.proposals import Proposals
@@ -55,7 +56,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MonocularTracker:
-    """Liu 2011: the posture of an upper body in one camera's silhouettes, by a hierarchical particle filter (Algorithm 2).
+    """Liu 2011: the posture of a body in one camera's silhouettes, by a hierarchical particle filter (Algorithm 2).
 
     Causal: a frame's pose uses no later frame. The same generator state and masks give the same poses.
     """
@@ -103,9 +104,9 @@ class MonocularTracker:
         observation, particles = self.observe(mask, found.pose), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
-            for side, arms in found.arms.items():
-                if f"{side}_arm" in stage.parts:
-                    poses[:, first_pose.arm_dofs(self.picture.body.skeleton, side)] = arms[np.arange(stage.number) % first_pose.GOOD]
+            for limb, postures in found.limbs.items():
+                if limb in stage.parts:
+                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = postures[np.arange(stage.number) % first_pose.GOOD]
             values = stage.clamp(diffuse(rng, poses[:, stage.dofs], stage.sigma))
             particles.append(evaluate(values, stage.weigh(observation, found.pose, found.pose)))
         state = self.judge(found.pose, particles, observation)
@@ -136,8 +137,10 @@ class MonocularTracker:
 
     @cached_property
     def stages(self) -> tuple[FilterStage, ...]:
-        """The filter's stages, in order."""
-        return tuple(FilterStage(self.picture, self.settings, name) for name in self.settings.stages)
+        """The filter's stages, in order; legs that no stage names, of a body that has some, follow."""
+        named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
+        legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
+        return tuple(FilterStage(self.picture, self.settings, name) for name in (*named, *legs))
 
 
 class MultiviewState(NamedTuple):

@@ -32,13 +32,16 @@ def test_whole_people_are_written_and_read_too(tmp_path, body):
     assert read_person(tmp_path / "person.toml") == person
 
 
-def test_upper_bodies_share_their_sizes_and_others_do_not():
+def test_upper_bodies_share_their_sizes_and_others_do_not(tmp_path):
     upper, whole = Person(SIZES), Person(average_sizes("anatomical", 1.7))
-    assert upper.sizes_for("rounded") is upper.sizes_for("cardbox") is SIZES
-    assert whole.sizes_for("anatomical") is whole.sizes
-    for person, body, other in ((upper, "anatomical", "cardbox"), (whole, "cylinders", "anatomical"), (whole, "boxes", "anatomical")):
-        with pytest.raises(ShadowPuppetError, match=f"sizes are those of the body '{other}', expected those of '{body}'"):
-            person.sizes_for(body)
+    write_person(tmp_path / "upper.toml", upper)
+    write_person(tmp_path / "whole.toml", whole)
+    for body in ("rounded", "cardbox", "boxes"):
+        assert read_person(tmp_path / "upper.toml", body) == upper
+    assert read_person(tmp_path / "whole.toml", "anatomical") == whole
+    for file, body, other in (("upper", "anatomical", "rounded"), ("whole", "cylinders", "anatomical"), ("whole", "boxes", "anatomical")):
+        with pytest.raises(FormatError, match=rf"{file}.toml: sizes: found those of the body '{other}', expected those of '{body}'"):
+            read_person(tmp_path / f"{file}.toml", body)
 
 
 def test_files_from_before_there_were_whole_bodies_are_read(tmp_path):

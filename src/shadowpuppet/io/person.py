@@ -38,17 +38,13 @@ class Person:
             if not isinstance(getattr(self, key), str):
                 raise ShadowPuppetError(f"{key}: found {getattr(self, key)!r}, expected text in quotes")
 
-    def sizes_for(self, body: str) -> Sizes:
-        """The sizes, if a body can be made from them. Raises `ShadowPuppetError` where they are another body's."""
-        if not isinstance(self.sizes, sizes_kind(body)):
-            raise ShadowPuppetError(f"the person's sizes are those of the body {kind_of(self.sizes)!r}, expected those of {body!r}: choose "
-                                    "that body, or measure the person again")
-        return self.sizes
 
+def read_person(path: str | Path, body: str | None = None) -> Person:
+    """A person from a file, to be made into `body`, if one is named.
 
-def read_person(path: str | Path) -> Person:
-    """A person from a file. Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible."""
-    path = Path(path)
+    Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible, or the sizes are another body's.
+    """
+    path, wanted = Path(path), body
     data = read_toml(path, FormatError)
     unknown = set(data) - set(KEYS)
     if unknown:
@@ -60,9 +56,13 @@ def read_person(path: str | Path) -> Person:
     if not isinstance(sizes, dict):
         raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")
     try:
-        return Person(kind.from_mapping(sizes), **data)
+        person = Person(kind.from_mapping(sizes), **data)
     except ShadowPuppetError as error:
         raise FormatError(f"{path}: {error}") from None
+    if wanted is not None and kind is not sizes_kind(wanted):
+        raise FormatError(f"{path}: sizes: found those of the body {body!r}, expected those of {wanted!r}: choose that body, or measure the "
+                          "person again")
+    return person
 
 
 def write_person(path: str | Path, person: Person) -> None:

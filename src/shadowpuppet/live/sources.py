@@ -41,7 +41,7 @@ def lens(options: Options, size: Size) -> Camera:
 
 def known_person(options: Options) -> Person | None:
     """Whose sizes are known. Raises `FormatError`."""
-    person = read_person(options.person) if options.person is not None else None
+    person = read_person(options.person, options.tracker.body) if options.person is not None else None
     if options.height is None and (person is None or person.height is None) and options.distance is None:
         _warn("neither height nor distance is known: the average height is assumed, and all lengths are as wrong as that; give --height")
     return person

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, sizes_from_height
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.bodies import average_sizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.initialization import Guess, find_person
 from shadowpuppet.options import Options
@@ -17,7 +18,7 @@ from shadowpuppet.tracking import MonocularTracker
 def warm_up(camera: Camera, options: Options) -> None:
     """Segment, measure and track somebody drawn, in pictures of the camera's size, and forget all of it."""
     rng = np.random.default_rng(0)
-    picture = Guess(sizes_from_height(AVERAGE_HEIGHT), AVERAGE_HEIGHT, 2.5, -0.3).picture(camera, options.tracker.body)
+    picture = Guess(average_sizes(options.tracker.body, AVERAGE_HEIGHT), AVERAGE_HEIGHT, 2.5, -0.3).picture(camera, options.tracker.body)
     mask = picture.mask(np.zeros(len(picture.body.skeleton.dofs)))
     empty = [rng.integers(100, 110, (*mask.shape, 3), dtype=np.uint8) for _ in range(2)]
     image = empty[0].copy()
