@@ -103,7 +103,7 @@ def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Opt
         known["body"] = "rounded" if body in WHOLE else body
         fit = fit_references(rng, footage.camera, references, **known)
         _check_postures(footage, references, fit)
-        return as_whole(footage.camera, references, fit, body) if body in WHOLE else fit, "references"
+        return as_whole(footage.camera, list(references.values()), fit, body) if body in WHOLE else fit, "references"
     return find_person(rng, footage.camera, _few(masks), **known), "proportions, refined on the first seconds"
 
 

@@ -9,17 +9,17 @@ from itertools import product
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
-from shadowpuppet.bodies import WHOLE, make_body, whole_from_upper
+from shadowpuppet.bodies import WHOLE, make_body
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.first_pose import search
 from shadowpuppet.geometry import Array
 from shadowpuppet.hypotheses import Guess, Hypotheses
-from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.rasterize import place
 from shadowpuppet.settings import InitializationSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.whole_person import whole_person
 from shadowpuppet.whole_sizes import BoneSizes
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
@@ -35,7 +35,6 @@ THICK = 1 / 60
 NEAREST, FARTHEST = 0.3, 2.0
 """A distance that is told, over that at which the upper body (nearest), or the whole person or their level arms (farthest), look as
 large as in a reference: outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
-
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -120,23 +119,18 @@ def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     if height is None and sizes is not None:
         height = stature_of(dict(zip(sizes.names(), sizes.to_array().tolist()))) + SOLE
     fit = find_person(rng, camera, masks, height=height, distance=distance, settings=settings)
-    return as_whole(camera, {str(k): mask for k, mask in enumerate(filter(may_be_person, masks))}, fit, body, sizes)
+    return as_whole(camera, list(filter(may_be_person, masks)), fit, body, sizes, distance)
 
 
-def as_whole(camera: Camera, masks: Mapping[str, Mask], fit: Fit, body: str, sizes: Sizes | None = None) -> Fit:
-    """The fit of an upper body as that of a whole one, its pelvis under the same neck, with poses anew; sizes are the same person's, or
-    those given.
+def as_whole(camera: Camera, masks: Sequence[Mask], fit: Fit, body: str, sizes: BoneSizes | None = None,
+             distance: float | None = None) -> Fit:
+    """The fit of an upper body as that of a whole one, with poses anew; sizes and distance (m), too, where they are not given.
+
+    Overlaps stay the upper body's: they tell how well the person was measured.
     """
-    upper = fit.guess.sizes
-    assert isinstance(upper, CardboxSizes)
-    whole = sizes or whole_from_upper(body, upper, fit.guess.height)
-    made = make_body(body, whole)
-    neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
-    guess = replace(fit.guess, sizes=whole, elevation=fit.guess.elevation + upper.torso_height - neck)
+    guess = whole_person(camera, masks, fit.guess, body, sizes, distance)
     picture = guess.picture(camera, body)
-    poses = np.array([search(picture, mask).pose for mask in masks.values()])
-    overlaps = {name: Observation.of(mask).cost_and_overlap(picture.draw(pose))[1] for (name, mask), pose in zip(masks.items(), poses)}
-    return Fit(guess, fit.curves, overlaps, poses)
+    return replace(fit, guess=guess, poses=np.array([search(picture, mask).pose for mask in masks]))
 
 
 def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,

@@ -48,8 +48,8 @@ def _angles(joint: str, axes: tuple[str, str, str], names: tuple[str, str, str],
 def _root() -> list[Dof]:
     """The pelvis in the world: place; heading, then bow (positive forward), then tilt (positive to the right)."""
     places = [_dof(f"root_{axis}", "pelvis", axis, FREE, kind="translation") for axis in "xyz"]
-    return [*places, _dof("root_heading", "pelvis", "z", FREE), _dof("root_bow", "pelvis", "y", (-100, 130), spread=(20, 40)),
-            _dof("root_tilt", "pelvis", "x", (-80, 80), spread=(15, 15))]  # fmt: skip
+    return [*places, _dof("root_heading", "pelvis", "z", FREE), _dof("root_bow", "pelvis", "y", (-100, 130), spread=(5, 10)),
+            _dof("root_tilt", "pelvis", "x", (-80, 80), spread=(8, 8))]  # fmt: skip
 
 
 def _places(side: str, s: BoneSizes) -> tuple[Three, Three]:
@@ -63,7 +63,7 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
     s = sizes
     joints = [Joint("pelvis", None), Joint("chest", "pelvis", (0.0, 0.0, s.lumbar_height)),
               Joint("head", "chest", (0.0, 0.0, s.thorax_height))]  # fmt: skip
-    dofs = [*_root(), *_ball("chest", ((-50, 50), (-45, 80), (-65, 65)), (0, 0, 0), (12, 15, 15)),
+    dofs = [*_root(), *_ball("chest", ((-50, 50), (-45, 80), (-65, 65)), (0, 0, 0), (12, 10, 12)),
             *_ball("head", ((-55, 55), (-70, 75), (-90, 90)), (0, 0, 0), (15, 20, 25))]  # fmt: skip
     for side in SIDES:
         x, y, z = _places(side, s)[0]
@@ -75,8 +75,8 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
         hip, knee, ankle = f"{side}_hip", f"{side}_knee", f"{side}_ankle"
         joints += [Joint(hip, "pelvis", _places(side, s)[1]), Joint(knee, hip, (0.0, 0.0, -s.thigh_length)),
                    Joint(ankle, knee, (0.0, 0.0, -s.shank_length))]
-        dofs += _ball(hip, *_sided(side, ((-60, 95), (-150, 60), (-75, 75)), (4, -5, 0), (15, 35, 20)))
-        dofs += [_dof(f"{side}_knee_flexion", knee, "y", (0, 155), 10, (15, 50)),
+        dofs += _ball(hip, *_sided(side, ((-60, 95), (-150, 60), (-75, 75)), (4, -5, 0), (10, 20, 12)))
+        dofs += [_dof(f"{side}_knee_flexion", knee, "y", (0, 155), 10, (10, 30)),
                  _dof(f"{side}_ankle_flexion", ankle, "y", (-40, 60), 0, (15, 20)),
                  _dof(f"{side}_ankle_inversion", ankle, "-x" if side == "left" else "x", (-30, 40), 0, (10, 10))]
     return Skeleton(tuple(joints), tuple(dofs))
@@ -101,6 +101,6 @@ def cylinder_skeleton(sizes: CylinderSizes) -> Skeleton:
     for side in SIDES:
         hip, knee = f"{side}_hip", f"{side}_knee"
         joints += [Joint(hip, "pelvis", _places(side, s)[1]), Joint(knee, hip, (0.0, 0.0, -s.thigh_length))]
-        dofs += _angles(hip, SWING[side], swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (35, 15, 20))
-        dofs += [_dof(f"{knee}_flexion", knee, "y", (0, 155), 10, (15, 50))]
+        dofs += _angles(hip, SWING[side], swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (20, 10, 12))
+        dofs += [_dof(f"{knee}_flexion", knee, "y", (0, 155), 10, (10, 30))]
     return Skeleton(tuple(joints), tuple(dofs))

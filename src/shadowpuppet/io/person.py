@@ -60,8 +60,8 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
     except ShadowPuppetError as error:
         raise FormatError(f"{path}: {error}") from None
     if wanted is not None and kind is not sizes_kind(wanted):
-        raise FormatError(f"{path}: sizes: found those of the body {body!r}, expected those of {wanted!r}: choose that body, or measure the "
-                          "person again")
+        raise FormatError(f"{path}: sizes: found those of the body {body!r}, expected those of {wanted!r}: choose that body, or measure "
+                          "the person again")
     return person
 
 
