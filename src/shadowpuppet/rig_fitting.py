@@ -30,7 +30,7 @@ def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options
     fit."""
     settings = options.multiview
     if options.body not in (None, settings.body):
-        raise SettingsError(f"body: found {options.body!r}, which is no whole person's, for several cameras; expected one of {choices(WHOLE)}, "
+        raise SettingsError(f"body: found {options.body!r}, an upper body, for several cameras; expected one of {choices(WHOLE)}, "
                             "or one camera (--camera)")
     hull = VisualHull(rig.cameras, settings.hull)
     known = familiar(rng, options, training, settings.body, rig.rate)
