@@ -10,15 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.bodies import WHOLE, average_sizes, make_body
+from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.clips import mirrored
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.inverse_kinematics import _along, _Linear, _solved, fit_poses
 from shadowpuppet.io.joints import read_joints
+from shadowpuppet.joint_frames import _three_turns
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import NEEDED
 from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.whole_sizes import WHOLE
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
 SOMEONE = {"upper_arm_length": 0.27, "forearm_length": 0.25, "thigh_length": 0.41, "shank_length": 0.39, "hip_distance": 0.19,
@@ -168,6 +170,17 @@ def test_a_joint_measured_wrongly_does_not_carry_the_body_away(name):
     assert np.delete(off, 12, axis=0).max() < 0.02
     assert fitted.by_frame.argmax() == 12
     assert fitted.sizes.forearm_length == pytest.approx(clean.sizes.forearm_length, abs=3e-3)
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
+def test_three_turns_make_the_rotation_again_in_the_singular_place_too(axes, rng):
+    angles = rng.uniform(-3, 3, (60, 3)) * [1, 0.5, 1]
+    angles[:20, 1] = rng.choice([-1, 1], 20) * np.pi / 2
+    turned = [rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, angles.T)]
+    R = turned[0] @ turned[1] @ turned[2]
+    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, _three_turns(R, axes).T))
+    np.testing.assert_allclose(first @ second @ third, R, atol=1e-6)
+    np.testing.assert_array_equal(_three_turns(R, axes)[:20, 0], 0)
 
 
 def test_one_frame_is_enough():

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from people import random_poses
 from shadowpuppet.anthropometry import ANATOMICAL, CYLINDERS, SOLE
-from shadowpuppet.bodies import ALL, WHOLE, average_sizes, make_body, sizes_kind
+from shadowpuppet.bodies import ALL, average_sizes, make_body
 from shadowpuppet.body import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
@@ -17,6 +17,7 @@ from shadowpuppet.limbs import Limbs
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.whole_sizes import KINDS, WHOLE, kind_of, sizes_kind
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}
 
@@ -85,7 +86,8 @@ def test_sizes_are_kept_checked_and_grow_with_the_height(name):
         make_body("cardbox", sizes)
     with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"):
         sizes_kind("ball")
-    assert set(ALL) > set(WHOLE)
+    assert set(ALL) == set(KINDS) > set(WHOLE)
+    assert kind_of(sizes) == name
 
 
 @pytest.mark.parametrize("name", WHOLE)

@@ -7,31 +7,13 @@ from typing import Any
 
 from shadowpuppet.anthropometry import PROPORTIONS, SOLE, shares_of, sizes_from_height, whole_sizes_from_bones, whole_sizes_from_height
 from shadowpuppet.body import BODIES, HAND_SHARE, WRIST_SHARE, Body
-from shadowpuppet.errors import ShadowPuppetError, choices
+from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.sizes import CardboxSizes, Sizes
 from shadowpuppet.whole_body import anatomical, cylinders
-from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
+from shadowpuppet.whole_sizes import BoneSizes, sizes_kind
 
-ALL: dict[str, tuple[Callable[[Any], Body], type[Sizes]]] = {
-    **{name: (make, CardboxSizes) for name, make in BODIES.items()},
-    "anatomical": (anatomical, AnatomicalSizes),
-    "cylinders": (cylinders, CylinderSizes),
-}
-"""How each body is made, and the sizes that it is made from."""
-WHOLE = ("anatomical", "cylinders")
-"""Bodies of the whole person, which stand in the world."""
-
-
-def sizes_kind(name: str) -> type[Sizes]:
-    """The sizes that a body is made from. Raises `ShadowPuppetError` with the names there are."""
-    if name not in ALL:
-        raise ShadowPuppetError(f"unknown body {name!r}; there are: {choices(ALL)}")
-    return ALL[name][1]
-
-
-def kind_of(sizes: Sizes) -> str:
-    """Name of a body that is made from such sizes; of several the first."""
-    return next(name for name, (_, kind) in ALL.items() if isinstance(sizes, kind))
+ALL: dict[str, Callable[[Any], Body]] = {**BODIES, "anatomical": anatomical, "cylinders": cylinders}
+"""How each body is made from its sizes."""
 
 
 def make_body(name: str, sizes: Sizes) -> Body:
@@ -39,7 +21,7 @@ def make_body(name: str, sizes: Sizes) -> Body:
     kind = sizes_kind(name)
     if not isinstance(sizes, kind):
         raise ShadowPuppetError(f"body {name!r}: found {type(sizes).__name__}, expected {kind.__name__}")
-    return ALL[name][0](sizes)
+    return ALL[name](sizes)
 
 
 def average_sizes(name: str, height: float) -> Sizes:

@@ -21,6 +21,7 @@ from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.whole_sizes import WHOLE
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
 """Overlap (intersection over union) of the fitted body and a reference's silhouette under which it does not show its posture..."""

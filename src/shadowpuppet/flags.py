@@ -25,7 +25,7 @@ RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, LEARNING, OTHER = (Group(title, sor
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "overlay"), RUN),
-    **dict.fromkeys(("height", "distance", "person", "prior"), PERSON),
+    **dict.fromkeys(("height", "distance", "body", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size"), PICTURES),
 }

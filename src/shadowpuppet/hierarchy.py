@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
-from shadowpuppet.members import HELD, coarse_limbs, dofs_of, members_of, parts_of
+from shadowpuppet.members import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import Scheme, make_scheme, normalise
@@ -32,6 +32,7 @@ class FilterStage:
             raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(members_of(skeleton))}")
         owner = {d: part for part in self.parts for d in dofs_of(skeleton, part).tolist()}
         self.dofs = np.array(sorted(owner), np.int64)
+        self.legs = [limb for limb in limbs_of(skeleton) if limb.endswith("leg") and limb not in self.parts]
         self.moves_torso = "torso" in self.parts
         hide = self.parts == ("torso",) and settings.torso_arms == "hidden"
         arms = [part for arm in ("left_arm", "right_arm") for part in parts_of(picture.body, arm)]
@@ -53,10 +54,12 @@ class FilterStage:
         return np.clip(values, low[self.dofs], high[self.dofs]) if self.settings.limits else values
 
     def put(self, pose: Array, values: Array) -> Array:
-        """The pose (D,), or poses (N, D), with this stage's values (d,) or (N, d) in it."""
-        poses = np.repeat(pose[None], len(values), axis=0) if values.ndim == 2 else pose.copy()
-        poses[..., self.dofs] = values
-        return poses
+        """The pose (D,), or poses (N, D), with this stage's values (d,) or (N, d) in it; legs do not turn with the torso."""
+        poses = np.repeat(pose[None], len(values) if values.ndim == 2 else 1, axis=0)
+        poses[:, self.dofs] = values
+        if self.moves_torso and self.legs:
+            poses = steady(self.picture.body.skeleton, pose, poses, self.legs)
+        return poses if values.ndim == 2 else poses[0]
 
     def propose(self, cycle: int) -> Propose:
         """Gaussian noise (Algorithms 3, 4), less of it in every cycle; in the first, poses from afar are tried beside."""

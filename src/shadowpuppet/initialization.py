@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
-from shadowpuppet.bodies import WHOLE, make_body
+from shadowpuppet.bodies import make_body
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.first_pose import search
@@ -20,7 +20,7 @@ from shadowpuppet.rasterize import place
 from shadowpuppet.settings import InitializationSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.whole_person import whole_person
-from shadowpuppet.whole_sizes import BoneSizes
+from shadowpuppet.whole_sizes import WHOLE, BoneSizes
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.anthropometry import shares_of, stature_of, whole_sizes_from_bones
-from shadowpuppet.bodies import WHOLE, make_body, sizes_kind
+from shadowpuppet.bodies import make_body
 from shadowpuppet.body import Body
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
@@ -23,7 +23,7 @@ from shadowpuppet.joint_frames import guess
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import SIDES, check_person, of
 from shadowpuppet.sizes import LEAST
-from shadowpuppet.whole_sizes import BoneSizes
+from shadowpuppet.whole_sizes import WHOLE, BoneSizes, sizes_kind
 
 REACH = 0.1
 """A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""

@@ -121,17 +121,30 @@ def _candidates(rotations: Array, dofs: Sequence[Dof]) -> tuple[Array, Array, Ar
     """Both triples of values (N, 2, 3) that make rotations (N, 3, 3), each angle in the turn about its limits' middle; and the limits."""
     from scipy.spatial.transform import Rotation
 
-    turns = Rotation.from_matrix(rotations)
     low, high = np.array([dof.low for dof in dofs]), np.array([dof.high for dof in dofs])
     if dofs[0].kind == "vector":
-        v = turns.as_rotvec()
+        v = Rotation.from_matrix(rotations).as_rotvec()
         other = v - 2 * np.pi * unit(np.where(np.linalg.norm(v, axis=1, keepdims=True) > 1e-9, v, [0, 0, 1e-9]))
         return np.stack([v, other], 1), low, high
     signs, free = np.array([AXES[dof.axis][1] for dof in dofs]), ~np.isfinite(low)
-    first = turns.as_euler("".join("XYZ"[AXES[dof.axis][0]] for dof in dofs))
+    first = _three_turns(rotations, [AXES[dof.axis][0] for dof in dofs])
     both = np.stack([first, first * [1, -1, 1] + np.pi], 1) * signs
     centre = np.where(free, 0.0, (np.where(free, 0, low) + np.where(free, 0, high)) / 2)
     return centre + (both - centre + np.pi) % (2 * np.pi) - np.pi, low, high
+
+
+def _three_turns(R: Array, axes: Sequence[int]) -> Array:
+    """Angles (N, 3) of turns about three different axes, one after another, that make rotations (N, 3, 3); the second within a quarter.
+
+    Where the second is a quarter, the first and the third are one and the same, and the first is none.
+    """
+    i, j, k = axes
+    e = 1 if (j - i) % 3 == 1 else -1
+    second = np.arcsin(np.clip(e * R[:, i, k], -1, 1))
+    first, third = np.arctan2(-e * R[:, j, k], R[:, k, k]), np.arctan2(-e * R[:, i, j], R[:, i, i])
+    single = np.hypot(R[:, i, i], R[:, i, j]) < 1e-7
+    third = np.where(single, np.arctan2(e * R[:, j, i], R[:, j, j]), third)
+    return np.stack([np.where(single, 0.0, first), second, third], 1)
 
 
 def _excess(candidates: Array, low: Array, high: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from itertools import product
 
@@ -52,6 +53,20 @@ def parts_of(body: Body, member: str) -> list[str]:
 def coarse_limbs(skeleton: Skeleton, limb: str) -> Array:
     """Postures (K, d) of an arm or leg, rad, all over its range, in its own DOF. Made once, read-only."""
     return _coarse(tuple(skeleton.dofs[d] for d in dofs_of(skeleton, limb)))
+
+
+def steady(skeleton: Skeleton, before: Array, poses: Array, limbs: Iterable[str]) -> Array:
+    """Poses (N, D) with some limbs turned in their first joint so that they point as in the pose `before` (D,), as far as limits allow."""
+    poses, (low, high) = poses.copy(), skeleton.limits
+    for limb in limbs:
+        joint = skeleton.joint_index(JOINTS[limb][0])
+        parent, dofs = skeleton.tree[0][joint], dofs_of(skeleton, limb)[:3]
+        above, T = np.arange(parent + 1), np.empty((len(poses), len(skeleton.joints), 3, 4))
+        skeleton.forward_some(poses, above, T, np.eye(4))
+        own = skeleton.forward(before[None])[0, joint, :, :3]
+        turned = angles_of(np.swapaxes(T[:, parent, :, :3], 1, 2) @ own, [skeleton.dofs[d] for d in dofs])
+        poses[:, dofs] = np.clip(turned, low[dofs], high[dofs])
+    return poses
 
 
 @cache

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from dataclasses import Field as DataclassField
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
@@ -30,6 +30,7 @@ from shadowpuppet.settings import (
 )
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres
+from shadowpuppet.whole_sizes import WHOLE
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
@@ -68,6 +69,8 @@ class Options:
     """Height of the person, metres, shoes on. Replaces what recording.toml says."""
     distance: Annotated[float, Field(ge=DISTANCES[0], le=DISTANCES[1]), _metres(DISTANCES)] | None = None
     """Distance from the camera to the middle of the body at the start, metres. Replaces what recording.toml says."""
+    body: Literal["cardbox", "boxes", "rounded", "anatomical", "cylinders"] | None = None
+    """The body's model, in place of the tracker's own: of the upper body (the first three), or of the whole person."""
     person: Path | None = None
     """Sizes of the person, as an earlier run or `fit-person` saved them (person.toml)."""
     prior: Path | None = None
@@ -116,6 +119,9 @@ def make_options(values: Mapping[str, Any] | None = None, source: str = "setting
     known = {**PRESETS, **MULTIVIEW_PRESETS}
     if preset not in known:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(known)}")
+    if values.get("body") is not None:
+        values |= {table: {**values.get(table, {}), "body": values["body"]} for table in ("tracker", "multiview")
+                   if table == "tracker" or values["body"] in WHOLE}
     of = {table: preset if preset in presets else "default" for table, presets in (("tracker", PRESETS), ("multiview", MULTIVIEW_PRESETS))}
     values["tracker"] = make_settings(of["tracker"], values.get("tracker", {}), f"{source}: tracker")
     values["multiview"] = make_multiview_settings(of["multiview"], values.get("multiview", {}), f"{source}: multiview")

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import average_sizes, make_body, sizes_kind
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person, write_person
 from shadowpuppet.measuring import measure, seen_height, spread_of
 from shadowpuppet.motion import JointTable
@@ -22,20 +22,22 @@ from shadowpuppet.rig_look import Opening
 from shadowpuppet.rig_run import Puppet
 from shadowpuppet.tracking import MultiviewTracker
 from shadowpuppet.visual_hull import VisualHull
+from shadowpuppet.whole_sizes import WHOLE
 
 
 def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options: Options, training: JointTable | None) -> Puppet:
     """Measure the person in the first seconds, and make the tracker. Raises a `ShadowPuppetError` where nobody is found, or a file does not
     fit."""
     settings = options.multiview
-    kind, hull = sizes_kind(settings.body), VisualHull(rig.cameras, settings.hull)
+    if options.body not in (None, settings.body):
+        raise SettingsError(f"body: found {options.body!r}, an upper body, for several cameras; expected one of {choices(WHOLE)}, "
+                            "or one camera (--camera)")
+    hull = VisualHull(rig.cameras, settings.hull)
     known = familiar(rng, options, training, settings.body, rig.rate)
     first = [(hull.points(masks), masks) for masks in opening.masks]
     height = options.height or rig.recording.subject.height
     if options.person is not None:
-        sizes, source = read_person(options.person).sizes, str(options.person)
-        if not isinstance(sizes, kind):
-            raise SettingsError(f"{options.person}: found sizes of {type(sizes).__name__}, expected {kind.__name__}, those of the body {settings.body!r}")
+        sizes, source = read_person(options.person, settings.body).sizes, str(options.person)
         spread = np.zeros(len(sizes.names()))
     elif known.sizes is not None:
         sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", spread_of(known.sizes, shown=True)

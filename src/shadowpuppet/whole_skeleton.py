@@ -75,7 +75,7 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
         hip, knee, ankle = f"{side}_hip", f"{side}_knee", f"{side}_ankle"
         joints += [Joint(hip, "pelvis", _places(side, s)[1]), Joint(knee, hip, (0.0, 0.0, -s.thigh_length)),
                    Joint(ankle, knee, (0.0, 0.0, -s.shank_length))]
-        dofs += _ball(hip, *_sided(side, ((-60, 95), (-150, 60), (-75, 75)), (4, -5, 0), (10, 20, 12)))
+        dofs += _ball(hip, *_sided(side, ((-60, 95), (-150, 60), (-75, 75)), (4, -5, 0), (15, 25, 12)))
         dofs += [_dof(f"{side}_knee_flexion", knee, "y", (0, 155), 10, (10, 30)),
                  _dof(f"{side}_ankle_flexion", ankle, "y", (-40, 60), 0, (15, 20)),
                  _dof(f"{side}_ankle_inversion", ankle, "-x" if side == "left" else "x", (-30, 40), 0, (10, 10))]
@@ -101,6 +101,6 @@ def cylinder_skeleton(sizes: CylinderSizes) -> Skeleton:
     for side in SIDES:
         hip, knee = f"{side}_hip", f"{side}_knee"
         joints += [Joint(hip, "pelvis", _places(side, s)[1]), Joint(knee, hip, (0.0, 0.0, -s.thigh_length))]
-        dofs += _angles(hip, SWING[side], swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (20, 10, 12))
+        dofs += _angles(hip, SWING[side], swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (25, 15, 12))
         dofs += [_dof(f"{knee}_flexion", knee, "y", (0, 155), 10, (10, 30))]
     return Skeleton(tuple(joints), tuple(dofs))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.bodies import ALL, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import read_toml
 from shadowpuppet.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.whole_sizes import KINDS, kind_of, sizes_kind
 
 KEYS = ("body", "height", "source", "notes", "sizes")
 UPPER = "rounded"
@@ -50,8 +50,8 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
     if unknown:
         raise FormatError(f"{path}: found the key {min(unknown)!r}; keys known: {choices(KEYS)}")
     sizes, body = data.pop("sizes", None), data.pop("body", UPPER)
-    if not isinstance(body, str) or body not in ALL:
-        raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(ALL)}")
+    if not isinstance(body, str) or body not in KINDS:
+        raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(KINDS)}")
     kind = sizes_kind(body)
     if not isinstance(sizes, dict):
         raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")

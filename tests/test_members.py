@@ -1,0 +1,75 @@
+"""Torso, arms and legs: what belongs to which, and coarse postures of a limb, which are the same directions for every body."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shadowpuppet.bodies import ALL, average_sizes, make_body
+from shadowpuppet.members import GIVEN, HELD, JOINTS, coarse_arms, coarse_limbs, dofs_of, limbs_of, members_of, parts_of
+from shadowpuppet.whole_sizes import WHOLE
+
+BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in ALL}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_angle_is_one_member_s(name):
+    body = BODY[name]
+    members = members_of(body.skeleton)
+    assert members == (("torso", "left_arm", "right_arm", "left_leg", "right_leg") if name in WHOLE else ("torso", "left_arm", "right_arm"))
+    assert limbs_of(body.skeleton) == members[1:]
+    owned = np.concatenate([dofs_of(body.skeleton, member) for member in members])
+    assert len(set(owned.tolist())) == len(owned)
+    assert {body.skeleton.dof_names[d] for d in set(range(len(body.skeleton.dofs))) - set(owned.tolist())} <= set(GIVEN)
+    assert {name for member in members for name in HELD[member]} <= set(body.landmark_names)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_limb_s_parts_move_with_it_alone(name, rng):
+    body = BODY[name]
+    for limb in limbs_of(body.skeleton):
+        parts = parts_of(body, limb)
+        assert len(parts) >= 2
+        assert all(part.startswith(limb.split("_")[0]) for part in parts)
+        others = {part for member in members_of(body.skeleton) if member != limb for part in parts_of(body, member)}
+        assert not others & set(parts)
+
+
+def pointing(name: str, limb: str, postures: np.ndarray) -> np.ndarray:
+    """Directions (K, 2, 3) of a limb's upper and lower half."""
+    body, points = BODY[name], {"arm": ("shoulder", "elbow", "hand"), "leg": ("hip", "knee", "ankle")}
+    side, kind = limb.split("_")
+    poses = np.zeros((len(postures), len(body.skeleton.dofs)))
+    poses[:, dofs_of(body.skeleton, limb)] = postures
+    at = body.points(poses, names=[f"{side}_{point}" for point in points[kind]])
+    bones = np.diff(at, axis=1)
+    return bones / np.linalg.norm(bones, axis=2, keepdims=True)
+
+
+@pytest.mark.parametrize("limb", ["left_arm", "right_arm"])
+@pytest.mark.parametrize("name", WHOLE)
+def test_coarse_arms_point_where_an_upper_body_s_do(name, limb):
+    mine, theirs = (pointing(body, limb, coarse_limbs(BODY[body].skeleton, limb)) for body in (name, "cardbox"))
+    low, high = BODY[name].skeleton.limits
+    np.testing.assert_array_equal(coarse_limbs(BODY["cardbox"].skeleton, limb), coarse_arms())
+    assert (np.abs(mine[:, 0] - theirs[:, 0]).max(1) < 1e-9).mean() > 0.95
+    near = (mine[:, 1] * theirs[:, 1]).sum(1)
+    assert (near > 1 - 1e-9).mean() > 0.85  # an arm that turns farther than the limits is cut
+    library = coarse_limbs(BODY[name].skeleton, limb)
+    dofs = dofs_of(BODY[name].skeleton, limb)
+    assert ((library >= low[dofs]) & (library <= high[dofs])).all()
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_coarse_legs_are_mirrored_and_of_use(name):
+    left, right = (pointing(name, limb, coarse_limbs(BODY[name].skeleton, limb)) for limb in ("left_leg", "right_leg"))
+    np.testing.assert_allclose(right, left * [1, -1, 1], atol=1e-9)
+    wanted = np.array([[0, 0, -1], [0, 0.5, -0.87], [1, 0.1, 0]])
+    wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+    assert np.degrees(np.arccos((wanted @ left[:, 0].T).max(1))).max() < 20
+    assert np.degrees(np.arccos((left[:, 0] * left[:, 1]).sum(1).clip(-1, 1))).max() > 100  # knees bend far
+
+
+def test_joints_of_members_do_not_overlap():
+    every = [joint for joints in JOINTS.values() for joint in joints]
+    assert len(set(every)) == len(every)
