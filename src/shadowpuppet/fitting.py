@@ -9,7 +9,6 @@ from itertools import chain, islice
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import WHOLE
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
