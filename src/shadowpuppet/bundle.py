@@ -42,14 +42,16 @@ class Bundle(Generic[Measured]):
 
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
-                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float = 1e-6, first: Measured | None = None) -> Bundle[Measured]:
+                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
+                 first: Measured | None = None) -> Bundle[Measured]:
     """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
 
-    Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull` holds poses where the points say
-    nothing, and points count less the farther off they are, both as in `Refiner.gauss_newton`. `first`: sizes to begin with, if not
+    Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull`, one or (F, D), holds poses to
+    `centre` (F, D), or to where they begin, and points count less the farther off they are, both as in `Refiner.gauss_newton`. `first`: sizes to begin with, if not
     those expected.
     """
-    settings, start, about = settings or SurfaceSettings(), poses, expected.to_array()
+    settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
+    pull = np.broadcast_to(pull, poses.shape)
     free, scale = np.flatnonzero(spread > 0), WORTH / NOISE**2
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
@@ -57,7 +59,7 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
         model = _model(body)
         frames = [_equations(model, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
         strain = (at[0] - about)[free] / spread[free]
-        cost = scale * (sum(frame.cost for frame in frames) + pull * ((at[1] - start) ** 2).sum()) + (strain**2).sum()
+        cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + (strain**2).sum()
         better = best is None or cost < best.cost
         damping *= 0.3 if better else 8
         if best is None or better:
@@ -122,15 +124,15 @@ def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, f
     return [_model(make(kind.from_array(at + NUDGE * (np.arange(len(at)) == k)))) for k in free]
 
 
-def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: float,
+def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: Array,
            damping: float) -> tuple[Array, Array]:
     """Sizes and poses after a step: the frames' poses are eliminated, the sizes solved for, the poses found from them."""
     D, K = start.shape[1], len(free)
     total, right, parts = np.diag(tight * (1 + damping)), -best.strain / scale, []
-    for frame, pose, first in zip(best.frames, best.at[1], start, strict=True):
+    for frame, pose, first, held in zip(best.frames, best.at[1], start, pull, strict=True):
         H, g = frame.rows.copy(), frame.gradient.copy()
-        H[np.arange(D), np.arange(D)] += pull
-        g[:D] -= pull * (pose - first)
+        H[np.arange(D), np.arange(D)] += held
+        g[:D] -= held * (pose - first)
         H[np.arange(D + K), np.arange(D + K)] *= 1 + damping
         H[np.arange(D), np.arange(D)] += 1e-9
         solved = np.linalg.solve(H[:D, :D], np.concatenate([H[:D, D:], g[:D, None]], 1))

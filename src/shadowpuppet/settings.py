@@ -314,6 +314,9 @@ class MultiviewSettings:
     """A pose worse than the best by its square (m^2) weighs 1/e (eq. 29)."""
     silhouettes: NonNegative = 0.002
     """Weight of the share of pixels in which drawn body and silhouettes differ (m^2), beside the distance of the surface points."""
+    posture: NonNegative = 1e-5
+    """Pull to usual postures, those of the training motion where there is any (m^2 for each squared deviation): it decides what the
+    surface does not show, such as how pelvis and chest share a bend."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
     """Estimation cycles a frame, each with `cooling` times the noise of the last (annealing)."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
@@ -340,6 +343,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "keep": 0.0,
         "velocity": 1.0,
         "silhouettes": 0.0,
+        "posture": 0.0,
         "surface": {"epsilon": 0.3, "tau": 0.06},
     },
 }

@@ -146,7 +146,7 @@ class Skeleton:
         return np.array([self.dof_names.index(name) for name in names], np.int64)
 
     @cached_property
-    def _usual(self) -> tuple[Array, Array, Array]:
+    def usual(self) -> tuple[Array, Array, Array]:
         return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
 
     def strain(self, poses: ArrayLike) -> Array:
@@ -154,7 +154,7 @@ class Skeleton:
 
         The bound leaves a posture that is plainly seen alone, and still decides where the picture says little.
         """
-        rest, below, above = self._usual
+        rest, below, above = self.usual
         off = np.asarray(poses, float) - rest
         squared = (off / np.where(off < 0, below, above)) ** 2
         return (squared / (1 + squared / 9)).sum(1)

@@ -26,6 +26,7 @@ from shadowpuppet.rasterize import Picture, count
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.resampling import Scheme, make_scheme, normalise
 from shadowpuppet.settings import MonocularSettings, MultiviewSettings
+from shadowpuppet.usual import Usual
 from shadowpuppet.visual_hull import SurfacePoints
 
 ABSENT, LOST, UNCERTAIN = 0.2, 0.5, 0.7
@@ -222,6 +223,8 @@ class MultiviewTracker:
             costs = self.refiner.costs(poses, evidence.full)
             if s.silhouettes:
                 costs = costs + s.silhouettes * evidence.differing(poses)
+            if s.posture:
+                costs = costs + s.posture * self.usual.strain(poses)
             return costs, -costs / s.sigma_cost**2
 
         return weigh
@@ -234,8 +237,9 @@ class MultiviewTracker:
         if s.refinement == "forces" or s.method == "image_force":
             return lambda poses: self.refiner.forces(poses, evidence.full, s.forces)
         clouds = (evidence.cloud(g.share), g.coarse, g.coarse_tau), (evidence.full, g.fine, g.fine_tau)
-        pull = np.full(len(last), g.pull)
-        return lambda poses: self.refiner.gauss_newton(poses, clouds, last, pull, g.damping)
+        rest = s.posture * self.usual.pull(last)
+        centre = (g.pull * last + rest * self.usual.rest) / (g.pull + rest + 1e-30)
+        return lambda poses: self.refiner.gauss_newton(poses, clouds, centre, g.pull + rest, g.damping)
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
         """The state with its cost, overlap and status."""
@@ -262,6 +266,11 @@ class MultiviewTracker:
     def refiner(self) -> Refiner:
         """The body's half of refinement."""
         return Refiner(self.body, self.settings.surface)
+
+    @cached_property
+    def usual(self) -> Usual:
+        """What postures are usual."""
+        return Usual.of(self.body.skeleton, self.library)
 
     @cached_property
     def proposals(self) -> Proposals:

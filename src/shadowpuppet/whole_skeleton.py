@@ -63,7 +63,7 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
     s = sizes
     joints = [Joint("pelvis", None), Joint("chest", "pelvis", (0.0, 0.0, s.lumbar_height)),
               Joint("head", "chest", (0.0, 0.0, s.thorax_height))]  # fmt: skip
-    dofs = [*_root(), *_ball("chest", ((-50, 50), (-45, 80), (-65, 65)), (0, 0, 0), (12, 10, 12)),
+    dofs = [*_root(), *_ball("chest", ((-50, 50), (-30, 80), (-65, 65)), (0, 3, 0), (12, 10, 12)),
             *_ball("head", ((-55, 55), (-70, 75), (-90, 90)), (0, 0, 0), (15, 20, 25))]  # fmt: skip
     for side in SIDES:
         x, y, z = _places(side, s)[0]
