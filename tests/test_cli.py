@@ -211,6 +211,21 @@ def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording,
     assert "sizes from me.toml" in out
 
 
+def test_a_whole_body_is_tracked_with_one_camera_and_its_sizes_are_kept(shell, recording, tmp_path):
+    code, out, err = shell("track", recording, "-o", "run", "--body", "cylinders", *QUICK)
+    assert (code, err) == (0, "")
+    assert "frames" in out
+    header = (tmp_path / "run" / "angles.csv").read_text().splitlines()[0].split(",")
+    assert {"root_bow", "left_shoulder_abduction", "right_knee_flexion"} <= set(header)
+    assert "left_ankle_x" in (tmp_path / "run" / "joints.csv").read_text().splitlines()[0]
+    person = tmp_path / "run" / "person.toml"
+    assert 'body = "cylinders"' in person.read_text()
+    assert shell("track", recording, "-o", "again", "--body", "cylinders", "--person", person, "--quiet", *QUICK)[0] == 0
+    assert (tmp_path / "again" / "person.toml").read_text().split("[sizes]")[1] == person.read_text().split("[sizes]")[1]
+    assert "sizes: found those of the body 'cylinders', expected those of 'rou" in refused(shell, "track", recording, "--person", person)
+    assert 'Invalid value "ball" for --body. Choose from: "cardbox"' in refused(shell, "track", recording, "--body", "ball")
+
+
 def test_a_demo_makes_tracks_and_names_its_pictures(shell, monkeypatch, tmp_path):
     monkeypatch.setattr("shadowpuppet.demo.demo_spec", lambda: made.SPEC)
     code, out, err = shell("demo", "-o", "show", *QUICK)

@@ -126,6 +126,16 @@ def test_angles_do_not_jump_in_turns_nor_with_arms_overhead(name):
     assert np.ptp(fitted.poses[:, 3]) == pytest.approx(13, abs=0.05)
 
 
+def test_a_short_trunk_bends_forward_not_backward():
+    body, t = make_body("anatomical", person("anatomical")), np.linspace(0, 1, 30)
+    poses = np.zeros((30, 32))
+    for dof, values in {"root_bow": 0.4 + 0.3 * t, "chest_y": 0.4 + 0.4 * t, "root_z": 0.9 + 0 * t}.items():
+        poses[:, body.skeleton.dof_names.index(dof)] = values
+    fitted = fit_poses(JointTable(t, JOINTS, body.points(poses, names=JOINTS)))
+    assert fitted.residual < 4e-3
+    assert np.abs(fitted.poses[:, body.skeleton.dof_names.index("chest_y")] - 0.4 - 0.4 * t).max() < 0.35
+
+
 # What is missing or wrong ----------------------------------------------------------------------------------------------
 
 

@@ -9,7 +9,7 @@ from scipy import ndimage
 from people import random_poses
 from shadowpuppet.anthropometry import ANATOMICAL, CYLINDERS, SOLE
 from shadowpuppet.bodies import ALL, average_sizes, make_body
-from shadowpuppet.body import Body
+from shadowpuppet.body import Body, Hulls
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
@@ -174,6 +174,16 @@ def test_vectors_have_three_components_in_a_row():
     split = (Dof("x", "a", "x", kind="vector"), Dof("y", "a", "y", kind="vector"), Dof("r", "a", "z"), Dof("z", "a", "z", kind="vector"))
     with pytest.raises(ShadowPuppetError, match="degree of freedom 'x'"):
         Skeleton((Joint("a", None),), split)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_a_limb_is_drawn_as_wide_and_deep_as_it_is(name):
+    limbs, shapes = limbs_of(BODY[name]), BODY[name].shapes
+    assert isinstance(shapes, Hulls)
+    along = (np.abs(np.swapaxes(limbs.rotations, 1, 2))[:, None] @ shapes.radii[..., None])[..., 0]
+    np.testing.assert_allclose(along[..., :2], limbs.radii)
+    assert (along[..., 2] >= limbs.caps).all()
+    np.testing.assert_allclose(shapes.centres, np.stack([limbs.starts, limbs.ends], 1))
 
 
 # Limbs and pictures ---------------------------------------------------------------------------------------------------
