@@ -5,8 +5,6 @@ Ni 2008 does not say how tracking begins.
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,13 +14,13 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.particle_filter import Particles, Weigh, evaluate
 from shadowpuppet.proposals import GLOBAL
 from shadowpuppet.refinement import Refiner
-from shadowpuppet.skeleton import Skeleton
+from shadowpuppet.usual import usual_postures
 
 HEADINGS = 16
 """Directions that are tried."""
 MOST = 60
 """Postures of a library that are tried."""
-BEGIN, GOOD = 64, 24
+BEGIN, GOOD = 96, 32
 """Poses that are refined on some of the points, and on all of them."""
 ROUGH = ((8, 4, 0.25), (4, 6, 0.12))
 FINE = ((4, 4, 0.08), (1, 6, 0.05))
@@ -30,41 +28,15 @@ FINE = ((4, 4, 0.08), (1, 6, 0.05))
 PULL = 1e-4
 """Pull to the posture that a search began with (see `Refiner.gauss_newton`)."""
 
-ARMS = ((8, 5, 10), (0, 90, 0), (90, 10, 5), (170, 10, 10), (20, 20, 95))
-"""Both arms: flexion and abduction of the shoulder, flexion of the elbow, degrees."""
-LEGS = (((3, 5), (3, 5), 0), ((25, 10), (-15, 20), 0), ((-15, 20), (25, 10), 0), ((85, 90), (85, 90), 25), ((70, 10), (70, 10), 60))
-"""Flexion of the left hip and knee, of the right ones, and the pelvis' bow, degrees: standing, two strides, a squat, a bow."""
-
-
-def usual_postures(skeleton: Skeleton) -> Array:
-    """Poses (L, D) to begin with where no other are known."""
-    return np.array([_posture(skeleton, arms, legs) for arms, legs in product(ARMS, LEGS)])
-
-
-def _posture(skeleton: Skeleton, arms: tuple, legs: tuple) -> Array:
-    shoulder_flexion, abduction, elbow = np.radians(arms)
-    angles = {"root_bow": np.radians(legs[2])}
-    for side, (hip, knee) in zip(("left", "right"), np.radians(legs[:2]), strict=True):
-        angles |= _swing(skeleton, side, "shoulder", shoulder_flexion, abduction) | _swing(skeleton, side, "hip", hip, 0.05)
-        angles |= {f"{side}_elbow_flexion": elbow, f"{side}_knee_flexion": knee}
-    return skeleton.clamp(skeleton.pose(**{name: float(value) for name, value in angles.items()}))
-
-
-def _swing(skeleton: Skeleton, side: str, joint: str, flexion: float, abduction: float) -> dict[str, float]:
-    """A limb's direction, in the angles that the skeleton has."""
-    name = f"{side}_{joint}"
-    if f"{name}_flexion" in skeleton.dof_names:
-        return {f"{name}_flexion": flexion, f"{name}_abduction": abduction}
-    return {f"{name}_x": abduction if side == "left" else -abduction, f"{name}_y": -flexion}
-
 
 def search(rng: np.random.Generator, body: Body, refiner: Refiner, evidence: Evidence, library: ArrayLike | None, weigh: Weigh,
            number: int) -> Particles:
     """The `number` best poses (number, D) for a frame's surface points, weighed by `weigh`. `library`: poses (L, D) to begin with, of which
     place and heading do not count."""
-    postures = usual_postures(body.skeleton) if library is None or not len(np.asarray(library)) else np.asarray(library, float)
-    if len(postures) > MOST:
-        postures = postures[np.sort(rng.choice(len(postures), MOST, replace=False))]
+    postures = usual_postures(body.skeleton)
+    if library is not None and len(library):
+        known = np.asarray(library, float)
+        postures = np.concatenate([known if len(known) <= MOST else known[np.sort(rng.choice(len(known), MOST, replace=False))], postures])
     poses = placed(body, postures, evidence.full.origin)
     poses = poses[refiner.costs(poses, evidence.cloud(ROUGH[0][0]), ROUGH[0][2]).argsort(kind="stable")[:BEGIN]]
     for stages, kept in ((ROUGH, GOOD), (FINE, number)):

@@ -9,6 +9,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.skeleton import Skeleton
+from shadowpuppet.usual import usual_arms
 
 GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
 """Degrees of freedom that a prior of articulation leaves to a walk."""
@@ -29,6 +30,8 @@ class Proposals:
         self.sigma = np.array(sigma)
         self.owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs])
         self.root = skeleton.dof_indices(GLOBAL)
+        self.arms = [(skeleton.dof_indices(arm), np.stack(list(arm.values()), 1)) for arm in (usual_arms(skeleton, side)
+                     for side in ("left", "right"))]  # fmt: skip
         self.modelled = np.zeros(0, np.int64)
         if prior is not None:
             unknown = sorted(set(prior.names) - set(skeleton.dof_names))
@@ -56,10 +59,16 @@ class Proposals:
         return self.skeleton.clamp(out)
 
     def _diffused(self, rng: np.random.Generator, poses: Array, scale: float) -> Array:
-        """Gaussian noise on all DOF (Table II's particle filter), or, where poses are refined afterwards, on some joints, near and far."""
+        """Gaussian noise on all DOF (Table II's particle filter), or, where poses are refined afterwards, on some joints, near and far; some
+        poses get another arm."""
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
         if self.settings.method == "particle_filter":
             return poses + noise
+        explored = range(len(poses) - round(self.settings.explore * len(poses)), len(poses))
         far = rng.choice(REACH, size=(len(poses), 1))
         moved = rng.random((len(poses), len(self.skeleton.joints))) < MOVED
-        return poses + noise * far * moved[:, self.owners]
+        out = poses + noise * far * moved[:, self.owners]
+        for n in explored:
+            dofs, arms = self.arms[rng.integers(2)]
+            out[n, dofs] = arms[rng.integers(len(arms))] + noise[n, dofs]
+        return out

@@ -308,13 +308,15 @@ class MultiviewSettings:
     """Noise of the place (m)."""
     sigma_heading: Positive = 0.05
     """Noise of the heading (rad)."""
+    explore: Share = 0.2
+    """Share of the defensive proposals in which an arm is tried in a usual posture: an arm that was lost is found again."""
     velocity: Share = 0.0
     """Share of the last frame's motion of place and heading with which proposals move on."""
     sigma_cost: Positive = 0.003
     """A pose worse than the best by its square (m^2) weighs 1/e (eq. 29)."""
     silhouettes: NonNegative = 0.002
     """Weight of the share of pixels in which drawn body and silhouettes differ (m^2), beside the distance of the surface points."""
-    posture: NonNegative = 1e-5
+    posture: NonNegative = 2e-6
     """Pull to usual postures, those of the training motion where there is any (m^2 for each squared deviation): it decides what the
     surface does not show, such as how pelvis and chest share a bend."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
@@ -341,6 +343,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "particles": 40,
         "defensive": 0.0,
         "keep": 0.0,
+        "explore": 0.0,
         "velocity": 1.0,
         "silhouettes": 0.0,
         "posture": 0.0,
