@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
@@ -177,7 +178,7 @@ def measures(table: JointTable, truth: JointTable) -> dict[str, Any]:
 
 def run_all(paths: Sequence[Path], rows: Sequence[str], seeds: int, folder: Path, workers: int, again: bool) -> None:
     """All runs that are not there yet; one that fails is told, and the others go on."""
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), str(max(1, 2 // workers)))
+    os.environ |= ONE_EACH
     wanted = [(path, row, seed) for row in rows for path in paths for seed in range(seeds)
               if again or not (folder / "results" / path.name / slug(row) / f"{seed}.json").exists()]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
