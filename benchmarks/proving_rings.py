@@ -53,6 +53,8 @@ ROWS: dict[str, dict[str, Any]] = {
     "keep 1": {"keep": 1.0},
     "velocity 1": {"velocity": 1.0},
     "pull x 10": {"gauss_newton": {"pull": 1e-4}},
+    "pull x 30": {"gauss_newton": {"pull": 3e-4}},
+    "pull x 10, 32 particles": {"gauss_newton": {"pull": 1e-4}, "particles": 32},
     "pull / 10": {"gauss_newton": {"pull": 1e-6}},
     "tau x 1.5": {"gauss_newton": {"coarse_tau": 0.09, "fine_tau": 0.06}},
     "epsilon 0.3": {"surface": {"epsilon": 0.3, "tau": 0.06}},
