@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
@@ -37,6 +38,7 @@ from shadowpuppet.metrics import LIMBS, joint_errors
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
+from shadowpuppet.priors import prior_from_files
 from shadowpuppet.synthetic import proving_rings, synthesize
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -54,8 +56,8 @@ class Row:
     cameras: tuple[str, ...] = ()
     """Those that are used; all, if none is named."""
     training: bool = True
-    true_sizes: bool = False
-    """Bone lengths of the truth, in place of those that are found."""
+    truth: bool = False
+    """Bone lengths, and postures that the first may be like, are the truth's; the motion prior is the training's, and girths are found."""
 
 
 def _with(**values: Any) -> dict[str, Any]:
@@ -75,15 +77,15 @@ ROWS: dict[str, Row] = {
     "ni2008, image_force": Row({"preset": "ni2008", **_with(method="image_force", forces=PLAIN)}),
     "ni2008, particle_filter": Row({"preset": "ni2008", **_with(method="particle_filter", particles=1000)}),
     "exact masks": Row({"masks": True}),
-    "true sizes": Row(true_sizes=True),
-    "exact masks, true sizes": Row({"masks": True}, true_sizes=True),
+    "true bones and first pose": Row(truth=True),
+    "exact masks, true bones and first pose": Row({"masks": True}, truth=True),
     "forces": Row(_with(refinement="forces")),
     "cylinders": Row(_with(body="cylinders")),
 }
 """What can be run; which of them a set has is in `SETS`."""
 SETS: dict[str, tuple[str, ...]] = {
     "measured": tuple(name for name in ROWS if name.startswith(("default", "ni2008"))),
-    "shares": ("default", "exact masks", "true sizes", "exact masks, true sizes", "forces", "cylinders"),
+    "shares": ("default", "exact masks", "true bones and first pose", "exact masks, true bones and first pose", "forces", "cylinders"),
     "proving": ("default", "default, no training motion", "exact masks", "ni2008"),
 }
 
@@ -107,7 +109,7 @@ def made(folder: Path, names: Iterable[str] = ()) -> list[Path]:
 
 def given(recording: Recording, row: Row, folder: Path) -> Path:
     """The recording as the row sees it: its own folder, or one of links in `folder` that lacks the other cameras, or the training."""
-    if not row.cameras and row.training:
+    if not row.cameras and row.training and not row.truth:
         return recording.path
     views = [view for view in recording.views if not row.cameras or view.camera.name in row.cameras]
     if row.cameras and len(views) < len(row.cameras):
@@ -120,21 +122,19 @@ def given(recording: Recording, row: Row, folder: Path) -> Path:
             if path is not None:
                 (folder / path.parent.name).mkdir(exist_ok=True)
                 (folder / path.parent.name / path.name).symlink_to(path.resolve())
-    kept = [recording.truth, recording.training if row.training else None, recording.path / "recording.toml"]
-    for path in kept:
+    training = recording.truth if row.truth else recording.training if row.training else None
+    for name, path in (("truth", recording.truth), ("training", training), ("recording", recording.path / "recording.toml")):
         if path is not None and path.exists():
-            (folder / path.name).symlink_to(path.resolve())
+            (folder / name).with_suffix(path.suffix).symlink_to(path.resolve())
     return folder
 
 
-def true_person(recording: Recording, body: str, file: Path) -> Path:
-    """A person.toml with bone lengths from the truth; the girths that people of such bones have."""
-    from shadowpuppet.inverse_kinematics import fit_poses
-    from shadowpuppet.io.person import Person, write_person
-
-    assert recording.truth is not None
-    fitted = fit_poses(read_joints(recording.truth), body)
-    write_person(file, Person(fitted.sizes))
+def prior_of(recording: Recording, options: Mapping[str, Any], file: Path) -> Path:
+    """The motion prior that a run learns from the recording's training motion, as a file."""
+    told = make_options(dict(options))
+    assert recording.training is not None
+    file.parent.mkdir(parents=True, exist_ok=True)
+    prior_from_files([recording.training], file, told.training, seed=told.seed, body=told.multiview.body)
     return file
 
 
@@ -151,10 +151,8 @@ def run(path: Path, name: str, seed: int, folder: Path) -> dict[str, Any]:
     row, recording = ROWS[name], read_recording(path)
     place = Path(path.name, slug(name), str(seed))
     options = dict(row.options) | {"seed": seed}
-    if row.true_sizes:
-        body = make_options(options).multiview.body
-        (folder / "persons").mkdir(parents=True, exist_ok=True)
-        options["person"] = true_person(recording, body, folder / "persons" / f"{path.name}-{body}-{seed}.toml")
+    if row.truth:
+        options["prior"] = prior_of(recording, options, folder / "priors" / place.with_suffix(".npz"))
     source, target = given(recording, row, folder / "inputs" / place), folder / "runs" / place
     shutil.rmtree(target, ignore_errors=True)
     start = time.perf_counter()
@@ -180,7 +178,7 @@ def measures(table: JointTable, truth: JointTable) -> dict[str, Any]:
 
 def run_all(paths: Sequence[Path], rows: Sequence[str], seeds: int, folder: Path, workers: int, again: bool) -> None:
     """All runs that are not there yet; one that fails is told, and the others go on."""
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), str(max(1, 2 // workers)))
+    os.environ |= ONE_EACH
     wanted = [(path, row, seed) for row in rows for path in paths for seed in range(seeds)
               if again or not (folder / "results" / path.name / slug(row) / f"{seed}.json").exists()]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -23,6 +24,7 @@ from typing import Any
 import numpy as np
 from multiview import BUILD, made, measures
 
+from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.masks import Mask
@@ -51,6 +53,8 @@ ROWS: dict[str, dict[str, Any]] = {
     "keep 1": {"keep": 1.0},
     "velocity 1": {"velocity": 1.0},
     "pull x 10": {"gauss_newton": {"pull": 1e-4}},
+    "pull x 30": {"gauss_newton": {"pull": 3e-4}},
+    "pull x 10, 32 particles": {"gauss_newton": {"pull": 1e-4}, "particles": 32},
     "pull / 10": {"gauss_newton": {"pull": 1e-6}},
     "tau x 1.5": {"gauss_newton": {"coarse_tau": 0.09, "fine_tau": 0.06}},
     "epsilon 0.3": {"surface": {"epsilon": 0.3, "tau": 0.06}},
@@ -121,8 +125,10 @@ class Case:
 def run(path: Path, rows: Mapping[str, Mapping[str, Any]], seeds: int, masks: bool, frames: int) -> dict[str, list[dict[str, Any]]]:
     """Measures of one recording: row to seeds."""
     case = Case(path, masks, frames)
-    out = {name: [case.run(values, seed) for seed in range(seeds)] for name, values in rows.items()}
-    print(path.name, {name: round(float(np.mean([one["rmse"] for one in runs])), 1) for name, runs in out.items()}, flush=True)
+    out = {}
+    for name, values in rows.items():
+        out[name] = [case.run(values, seed) for seed in range(seeds)]
+        print(f"{path.name}, {name}: {np.mean([one['rmse'] for one in out[name]]):.1f} mm", flush=True)
     return out
 
 
@@ -167,6 +173,7 @@ def main() -> None:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
     paths = made(args.folder, filter(None, args.recordings.split(";")))
     rows, n = {row: ROWS[row] for row in chosen}, len(paths)
+    os.environ |= ONE_EACH
     with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
         results = pool.map(run, paths, [rows] * n, [args.seeds] * n, [args.masks] * n, [args.frames] * n)
         found = {path.name: one for path, one in zip(paths, results)}

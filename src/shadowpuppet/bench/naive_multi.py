@@ -20,9 +20,6 @@ from shadowpuppet.skeleton import AXES, Skeleton
 FLAT = 1e-4
 """A dome lower than this (m) is a flat end."""
 
-BLOCK = 200
-"""Points whose normal equations are summed at once."""
-
 
 class Surface(NamedTuple):
     """Where points are nearest to a part, or each to its own part."""
@@ -213,11 +210,7 @@ def normal_equations(
     for d in range(len(pose)):
         moves = motions.axes[d] if motions.shifts[d] else np.cross(motions.axes[d], found.feet - motions.centres[d])
         rows[:, d] = np.where(motions.moved[d, owner], (moves * normals).sum(1), 0.0)
-    H = np.zeros((len(pose),) * 2)
-    for begin in range(0, len(points), BLOCK):  # BLAS would wake further threads for more at once
-        some = rows[begin : begin + BLOCK]
-        H += some.T @ (share[begin : begin + BLOCK, None] * some)
-    return H, rows.T @ (share * residual)
+    return rows.T @ (share[:, None] * rows), rows.T @ (share * residual)
 
 
 def move_by_gauss_newton(

@@ -8,6 +8,7 @@ from shadowpuppet.bench.machine import environment
 from shadowpuppet.bench.mono import run_mono
 from shadowpuppet.bench.multi import run_multi
 from shadowpuppet.pipeline import Listener
+from shadowpuppet.threads import one_blas_thread
 
 
 def run_bench(quick: bool = False, listener: Listener | None = None) -> dict[str, Any]:
@@ -16,6 +17,7 @@ def run_bench(quick: bool = False, listener: Listener | None = None) -> dict[str
 
     `quick`: fewer rounds, shorter films, nothing compiled anew. Raises `ShadowPuppetError` where a part of it fails.
     """
-    mono, multi = run_mono(quick, listener), run_multi(quick, listener)
+    with one_blas_thread():
+        mono, multi = run_mono(quick, listener), run_multi(quick, listener)
     raw, drawn = mono.pop("raw") | multi.pop("raw"), mono.pop("curves") | {"multi": multi.pop("curves")}
     return {**mono, **multi, "quick": quick, "environment": environment(), "raw": raw, "curves": drawn}
