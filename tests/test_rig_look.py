@@ -64,7 +64,7 @@ def test_a_look_is_plain(recording):
 def test_the_opening_is_spread_over_the_first_seconds(recording):
     opening = look_at_rig(open_rig(recording, MASKS), MASKS).opening
     assert opening.times[0] == 0
-    assert opening.times[-1] > 2
+    assert opening.times[-1] > 1.5
     assert len(opening.times) == len(opening.masks) <= 40
 
 
