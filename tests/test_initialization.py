@@ -421,3 +421,18 @@ def test_costs_of_many_sizes_are_those_of_bodies_built_one_by_one(body, rng):
         at = place(CAMERA, 2.8 - shift[n, 0], 0.15 + shift[n, 1])
         alone = Picture(BODIES[body](CardboxSizes.from_array(sizes)), CAMERA, at)
         assert abs(found[n] - silhouette_costs(alone, Observation.of(mask, ignore), poses[n : n + 1])[0]) <= 2
+
+
+@pytest.mark.parametrize(("found", "best"), [((0.8,), 0.8), ((0.2, 0.7), 0.7), ((0.2, 0.4, 0.1, 0.3, 0.3), 0.4)])
+def test_a_search_that_ran_into_a_corner_is_begun_again(monkeypatch, found, best):
+    from shadowpuppet import initialization
+
+    left = list(found)
+
+    def searched(rng, hypotheses, names, free_distance, settings):
+        return Fit(hypotheses.guess, {}, dict.fromkeys(names, left.pop(0)), np.zeros((len(names), 12)))
+
+    monkeypatch.setattr(initialization, "_searched", searched)
+    fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78)
+    assert set(fit.overlaps.values()) == {best}
+    assert not left

@@ -64,7 +64,7 @@ def test_a_look_is_plain(recording):
 def test_the_opening_is_spread_over_the_first_seconds(recording):
     opening = look_at_rig(open_rig(recording, MASKS), MASKS).opening
     assert opening.times[0] == 0
-    assert opening.times[-1] > 2
+    assert opening.times[-1] > 1.5
     assert len(opening.times) == len(opening.masks) <= 40
 
 
@@ -140,4 +140,4 @@ def test_the_look_as_json_on_the_command_line(recording, capsys):
 
 def test_an_unknown_camera_is_a_users_mistake(recording, capsys):
     assert run(["info", str(recording), "--camera", "cam1,cam8"]) == 2
-    assert "expected some of cam1, cam2, cam3, cam4" in capsys.readouterr().err
+    assert "expected one of cam1, cam2, cam3, cam4" in capsys.readouterr().err

@@ -109,7 +109,8 @@ def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
     asked = [name.strip() for name in names.split(",")] if names is not None else list(views)
     for name in asked:
         if name not in views or asked.count(name) > 1:
-            raise RecordingError(f"{recording.path}: camera: found {names!r}, expected some of {choices(views)}, each once")
+            raise RecordingError(f"{recording.path}: camera: found {names!r}, expected one of {choices(views)}; or some, each once, "
+                                 "with commas between")
     return tuple(views[name] for name in views if name in asked)
 
 
