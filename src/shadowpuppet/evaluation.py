@@ -12,7 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import GROUPS, evaluate, of_surfaces
+from shadowpuppet.metrics import GROUPS, evaluate
 
 
 def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Sequence[str] | None = None,
@@ -29,8 +29,9 @@ def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Se
     if reference is not None and not 0 <= start < len(reference.times):
         raise ShadowPuppetError(f"start: found {start}, expected 0 to {len(reference.times) - 1}, a frame of {table}")
     chosen = None if joints is None else [name for joint in joints for name in GROUPS.get(joint, (joint,))]
-    measured = evaluate(run.motion, reference, chosen, camera=_camera(run.folder), start=start)
-    measured = of_surfaces(measured) if "cameras" in run.info else measured
+    cameras = _cameras(run.folder)
+    measured = evaluate(run.motion, reference, chosen, camera=cameras[0] if len(cameras) == 1 else None, start=start,
+                        cameras=max(len(cameras), 1))  # fmt: skip
     return {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete, **measured}
 
 
@@ -41,7 +42,7 @@ def _known_truth(path: object) -> str | None:
     return path if isinstance(path, str) else None
 
 
-def _camera(folder: Path) -> Camera | None:
-    """The run's camera; None, which is taken for level, where it is not known."""
+def _cameras(folder: Path) -> list[Camera]:
+    """The run's cameras; none where they are not known, and one is taken for level."""
     path = folder / "calibration.toml"
-    return read_calibration(path)[0] if path.exists() else None
+    return read_calibration(path) if path.exists() else []
