@@ -20,11 +20,10 @@ def demo_spec() -> Spec:
 
 
 def demo_ring_spec() -> Spec:
-    """The recording of several cameras of `shadowpuppet demo`: a walk of 4.6 s before five small cameras, no two of which face each other:
-    these would see the same outline."""
-    ring = Ring(count=5, radius=3.8, start_deg=35, jitter=0.5, fov_deg=42, seed=5)
-    scene = Scene(clothing=8, room=3, empty_seconds=1.5)
-    return Spec(name="demo_ring", body=Mannequin(stature=1.70, build=0.2), motion=gestures_from("walk 3"), ring=ring, scene=scene, rate=25)
+    """The recording of several cameras of `shadowpuppet demo`: somebody walks and turns before four small cameras, 5.6 s."""
+    ring = Ring(count=4, radius=3.8, start_deg=35, jitter=0.5, fov_deg=42, seed=5)
+    scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), gestures_from("walk 2, turn_around 2")
+    return Spec(name="demo_ring", body=Mannequin(stature=1.70, build=0.2), motion=gestures, ring=ring, scene=scene, rate=20)
 
 
 PAPER = "wave_hands 3.6, bend_aside 3.6, bow_forward 2.8"
