@@ -36,8 +36,10 @@ FRAME, TIMES = 34, (0.3, 0.55)
 """The frame that is looked at, and the shares of the film that the overlay is shown of."""
 LARGE, GREYS, PAPER = 3, 6, 235
 """By how much a picture is enlarged; the step of the grey levels; the ground of drawings."""
-NORMAL = 0.045
-"""Length of a normal (m)."""
+NORMAL, NEAREST = 0.045, 2.0
+"""Length of a normal, and the distance from which on points are drawn (m)."""
+TAU = 0.06
+"""Where forces are bounded (m)."""
 PALETTE = [(180, 119, 31), (14, 127, 255), (44, 160, 44), (40, 39, 214), (189, 103, 148), (75, 86, 140), (194, 119, 227), (34, 189, 188),
            (207, 190, 23), (120, 60, 20), (0, 0, 160), (0, 110, 0), (160, 0, 160), (160, 120, 0), (60, 60, 60), (0, 160, 220),
            (200, 80, 80)]  # fmt: skip
@@ -47,7 +49,7 @@ PALETTE = [(180, 119, 31), (14, 127, 255), (44, 160, 44), (40, 39, 214), (189, 1
 class Scene(NamedTuple):
     """A frame of a run with several cameras."""
 
-    cameras: list[Camera]
+    cameras: tuple[Camera, ...]
     images: list[np.ndarray]
     surface: SurfacePoints
     body: Body
@@ -57,7 +59,7 @@ class Scene(NamedTuple):
 def scene(folder: Path) -> Scene:
     """Pictures, exact silhouettes' surface points, and the pose that was found, of one frame of the demo."""
     recording, run = folder / "recording-ring", read_run(folder / "run-ring")
-    cameras = read_calibration(recording / "calibration.toml")
+    cameras = tuple(read_calibration(recording / "calibration.toml"))
     images, masks = ([list(open_frames(recording / kind / f"{camera.name}{ending}"))[FRAME].image for camera in cameras]
                      for kind, ending in (("video", ".mp4"), ("masks", ".mkv")))  # fmt: skip
     body = make_body(run.motion.body_name, read_person(folder / "run-ring" / "person.toml", run.motion.body_name).sizes)
@@ -83,8 +85,9 @@ def lines(out: np.ndarray, camera: Camera, starts: Array, ends: Array, colour: t
 
 
 def facing(camera: Camera, points: Array, normals: Array) -> np.ndarray:
-    """Which points look toward a camera."""
-    return ((camera.centre - points) * normals).sum(1) > 0
+    """Which points look toward a camera, and are not just before it."""
+    away = camera.centre - points
+    return ((away * normals).sum(1) > 0) & (np.linalg.norm(away, axis=1) > NEAREST)
 
 
 def hull(found: Scene) -> np.ndarray:
@@ -97,53 +100,57 @@ def hull(found: Scene) -> np.ndarray:
         near = facing(camera, points, normals)
         for tile in (image, drawn):
             lines(tile, camera, points[near], points[near] + NORMAL * normals[near], (40, 40, 200))
-            tiles.append(cropped(tile, camera, points))
+            tiles.append(cropped(tile, camera, found.body.points(found.pose[None])[0]))
     return row(tiles)
 
 
-def nearest(body: Body, pose: Array, points: Array, normals: Array, epsilon: float = 0.3) -> tuple[np.ndarray, Array]:
-    """The part (P,) that each point is nearest to, and where on it (P, 3)."""
+def nearest(body: Body, pose: Array, points: Array, normals: Array, epsilon: float = 0.3) -> tuple[np.ndarray, Array, Array]:
+    """The part (P,) that each point is nearest to, where on it (P, 3), and the cosine of the normals (P,)."""
     assert body.limbs is not None
     T, _ = naive.place(body.skeleton, pose)
     each = [naive.closest(body.limbs, s, T[joint], points) for s, joint in enumerate(body.limbs.joints)]
-    distance = np.array([np.abs(one.distance) * (1 - epsilon * (one.normals * normals).sum(1)) for one in each])
-    which = distance.argmin(0)
-    return which, np.array([one.feet for one in each])[which, np.arange(len(points))]
+    cosines = np.array([(one.normals * normals).sum(1) for one in each])
+    which = (np.abs([one.distance for one in each]) * (1 - epsilon * cosines)).argmin(0)
+    own = which, np.arange(len(points))
+    return which, np.array([one.feet for one in each])[own], cosines[own]
 
 
 def parts(found: Scene) -> np.ndarray:
     """Points in the colour of the part that they belong to."""
-    which, _ = nearest(found.body, found.pose, *found.surface[:2])
+    which = nearest(found.body, found.pose, *found.surface[:2])[0]
     tiles = []
     for n in range(4):
         camera, tile = enlarged(found.cameras[n])
         near = facing(camera, *found.surface[:2])
         for pixel, part in zip(np.rint(camera.project(found.surface.points[near])).astype(int).tolist(), which[near]):
             cv2.circle(tile, pixel, 4, PALETTE[part % len(PALETTE)], -1, cv2.LINE_AA)
-        tiles.append(cropped(tile, camera, found.surface.points))
+        tiles.append(cropped(tile, camera, found.body.points(found.pose[None])[0]))
     return row(tiles)
 
 
 def forces(found: Scene) -> np.ndarray:
-    """An arm put beside its points: forces on it; after 5 and 40 iterations of them; after Gauss-Newton."""
+    """An arm put beside its points, and the forces on it (eq. 32); after 20 and 100 iterations of them; after 10 of Gauss-Newton."""
     skeleton, cloud, refiner = found.body.skeleton, make_cloud(*found.surface[:3]), Refiner(found.body)
     settled = refiner.gauss_newton(found.pose[None], ((cloud, 10, 0.05),), found.pose[None], np.full(len(found.pose), 1e-5))[0]
     side = "left"
     pose = settled.copy()
-    pose[skeleton.dof_indices((f"{side}_shoulder_x", f"{side}_elbow_flexion"))] += 0.35, 0.35
-    pulled = [refiner.forces(pose[None], cloud, ForceSettings(iterations=n))[0] for n in (5, 40)]
+    pose[skeleton.dof_indices((f"{side}_shoulder_y", f"{side}_elbow_flexion"))] += 0.08, 0.3
+    pulled = [refiner.forces(pose[None], cloud, ForceSettings(iterations=n))[0] for n in (20, 100)]
     solved = refiner.gauss_newton(pose[None], ((cloud, 10, 0.05),), pose[None], np.full(len(pose), 1e-5))[0]
     arm, tiles = [s for s, part in enumerate(found.body.limbs.parts) if part.startswith(side) and "arm" in part], []  # pyright: ignore
     about = found.body.points(settled[None], names=[f"{side}_shoulder", f"{side}_elbow", f"{side}_hand"])[0]
     for shown in (pose, *pulled, solved):
-        camera, tile = enlarged(found.cameras[0])
+        camera, tile = enlarged(found.cameras[1])
         draw_model(tile, Picture(found.body, camera, camera.T_camera_world), shown)
         tile[:] = np.uint8(0.45 * tile + 0.55 * PAPER)
-        which, feet = nearest(found.body, shown, *found.surface[:2])
-        mine = np.isin(which, arm)
-        lines(tile, camera, found.surface.points[mine], found.surface.points[mine], (40, 40, 40))
-        lines(tile, camera, feet[mine], found.surface.points[mine], (40, 40, 220), tips=True)
-        tiles.append(cropped(tile, camera, about, 90))
+        which, feet, cosines = nearest(found.body, shown, *found.surface[:2])
+        mine = np.isin(which, arm) & (cosines > 0)
+        points, feet = found.surface.points[mine], feet[mine]
+        away = np.linalg.norm(points - feet, axis=1) + 1e-9
+        force = (points - feet) * (np.minimum(cosines[mine] * away, TAU) / away)[:, None]
+        lines(tile, camera, points, points, (40, 40, 40))
+        lines(tile, camera, feet, feet + force, (40, 40, 220), tips=True)
+        tiles.append(cropped(tile, camera, about, 70))
     return row(tiles)
 
 
@@ -153,9 +160,9 @@ def bodies() -> np.ndarray:
     for name in ("cylinders", "anatomical"):
         body = make_body(name, average_sizes(name, 1.75))
         stand, stride = body.skeleton.pose(root_z=0.95), body.skeleton.pose(root_z=0.93, **striding(body))
-        for pose, azimuth in ((stand, 0), (stand, 90), (stride, 50)):
-            camera = Spec(ring=Ring(count=2, radius=5.0, height=1.2, start_deg=azimuth, fov_deg=14.5, size=(230, 430))).views()[0].camera()
-            tile = np.full((430, 230, 3), PAPER, np.uint8)
+        for pose, azimuth in ((stand, 90), (stand, 0), (stride, 50)):
+            camera = Spec(ring=Ring(count=2, radius=5.0, height=1.2, start_deg=azimuth, fov_deg=11, size=(200, 400))).views()[0].camera()
+            tile = np.full((400, 200, 3), PAPER, np.uint8)
             draw_model(tile, Picture(body, camera, camera.T_camera_world), pose)
             tiles.append(tile)
     return row(tiles)
@@ -173,10 +180,10 @@ def overlays(folder: Path) -> np.ndarray:
     """Two frames of the overlay film."""
     frames = list(open_frames(folder / "run-ring" / "overlay.mp4"))
     sheet = np.concatenate([frames[round(share * len(frames))].image for share in TIMES], axis=1)
-    return np.asarray(cv2.bilateralFilter(sheet, 5, 25, 3) // GREYS * GREYS, np.uint8)
+    return np.asarray(cv2.bilateralFilter(sheet, 7, 30, 3) // GREYS * GREYS, np.uint8)
 
 
-def cropped(image: np.ndarray, camera: Camera, points: Array, margin: int = 40) -> np.ndarray:
+def cropped(image: np.ndarray, camera: Camera, points: Array, margin: int = 85) -> np.ndarray:
     """What lies around points in space."""
     pixels = camera.project(points)
     (x0, y0), (x1, y1) = (pixels.min(0) - margin).astype(int).clip(0), (pixels.max(0) + margin).astype(int)

@@ -42,7 +42,7 @@ def _known_truth(path: object) -> str | None:
     return path if isinstance(path, str) else None
 
 
-def _cameras(folder: Path) -> list[Camera]:
+def _cameras(folder: Path) -> Sequence[Camera]:
     """The run's cameras; none where they are not known, and one is taken for level."""
     path = folder / "calibration.toml"
     return read_calibration(path) if path.exists() else []

@@ -157,9 +157,9 @@ def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[s
     run = motion.table
     errors = None if truth is None else joint_errors(run, truth, joints, camera=camera, start=start)
     names = errors.names if errors else joints or default_joints(run, run)
-    said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts, "overlap": statistics(motion.overlap),
-                            "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost), "jitter_m_s2": jitter(run.select(names)),
-                            "bones_m": bone_lengths(run)}
+    said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
+                            "overlap": statistics(motion.overlap), "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
+                            "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(run)}
     if truth is not None and errors is not None:
         said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
     return said
