@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,8 @@ import pytest
 import made
 from shadowpuppet import cli
 from shadowpuppet.demo import contact_sheet
+from shadowpuppet.evaluation import angle_errors
+from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
@@ -111,6 +114,29 @@ def test_evaluate_measures_limbs_by_default_and_those_that_are_named(shell):
     assert measured["cameras"] == 4
     assert measured["cost_m2"]["count"] == measured["frames"]
     assert not {"cost_px", "plane_mm", "depth_mm"} & {*measured, *measured["errors"]}
+
+
+def test_evaluate_measures_angles_where_they_are_asked_for(shell, shown):
+    code, out, err = shell("evaluate", "show/run-ring", "--angles")
+    assert (code, err) == (0, "")
+    assert "by degrees, rmse" in out
+    measured = json.loads(shell("evaluate", "show/run-ring", "--angles", "--json").out)["angles_deg"]
+    assert measured["left_knee"] < 15
+    assert measured["pelvis"] < 15
+    assert measured["all"] == pytest.approx(np.sqrt(np.mean([value**2 for name, value in measured.items() if name != "all"])))
+    assert "expected one of anatomical" in shell("evaluate", "show/run", "--angles").err
+
+
+def test_angles_are_those_between_turns(shown):
+    """The fitted truth against itself, with one knee bent by 10 degrees more and the person turned by 20."""
+    truth = read_joints(shown / "recording-ring" / "truth.csv")
+    fitted = fit_poses(truth)
+    bent, skeleton = fitted.poses.copy(), fitted.body.skeleton
+    bent[:, skeleton.dof_indices(("left_knee_flexion", "root_heading"))] += np.radians([10, 20])
+    run = read_run(shown / "run-ring").motion
+    told = angle_errors(replace(run, poses=bent, status=np.full(len(bent), "tracked")), truth)
+    turned = {name: value for name, value in told.items() if value > 0.01}
+    assert turned == pytest.approx({"left_knee": 10, "pelvis": 20, "all": np.sqrt(500 / (len(skeleton.joints) - 3))}, abs=1e-3)
 
 
 def test_info_tells_of_every_camera_as_json(shell):

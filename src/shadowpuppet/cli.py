@@ -123,7 +123,8 @@ def info(recording: Recording, /, *, config: Config = None, as_json: AsJson = Fa
 
 
 @app.command
-def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0, as_json: AsJson = False) -> None:
+def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0,
+             angles: Annotated[bool, Parameter(negative=(), show_default=False)] = False, as_json: AsJson = False) -> None:
     """Measure a run: joint errors against a truth, overlap, cost, jitter.
 
     Parameters
@@ -136,17 +137,20 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
         First frame of the truth that counts.
+    angles
+        Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
     """
     from shadowpuppet.evaluation import evaluate_run
-    from shadowpuppet.tables import error_table, measures_table
+    from shadowpuppet.tables import angle_table, error_table, measures_table
     from shadowpuppet.terminal import show, show_json, terminal
 
     with terminal():
-        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start)
+        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start, angles)
     if as_json:
         show_json(metrics)
     else:
-        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []))
+        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []),
+             *([angle_table(metrics["angles_deg"])] if angles else []))
 
 
 @app.command

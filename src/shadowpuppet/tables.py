@@ -59,6 +59,16 @@ def error_table(errors: Mapping[str, Any]) -> RenderableType:
     return table
 
 
+def angle_table(angles: Mapping[str, float]) -> RenderableType:
+    """Errors of angles, a row a joint."""
+    table = plain_table("", ("turned at", "by degrees, rmse"))
+    for name, value in angles.items():
+        if name == "all":
+            table.add_section()
+        table.add_row(name, f"{value:.1f}")
+    return table
+
+
 def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     """What is known without a truth, and beside it."""
     several = "cost_m2" in metrics
