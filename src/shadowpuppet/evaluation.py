@@ -49,9 +49,9 @@ def angle_errors(motion: Motion, truth: JointTable, start: int = 0) -> dict[str,
     """By what angle each joint of a whole body is turned otherwise than in the poses that fit the truth best: root mean square, degrees,
     by joint, and of `all`.
 
-    One angle a joint, of the whole turn between the two (Ni 2008, Fig. 7, has one an axis): how a straight limb is turned about itself is in
-    it, which joints do not show. Heads and ankles are left out, of whose turns the places of joints tell little or nothing; so are frames
-    without a pose. Raises `ShadowPuppetError` for another body, or joints that are no whole person's.
+    One angle a joint, of the whole turn between the two (Ni 2008, Fig. 7, has one an axis); how a straight limb is turned about itself,
+    which joints do not show, is in it. Heads and ankles are left out, of whose turns the places of joints tell little or nothing; so are
+    frames without a pose. Raises `ShadowPuppetError` for another body, or joints that are no whole person's.
     """
     fitted = fit_poses(truth, motion.body_name, source="truth")
     index, matched = match(motion.times, truth.times[start:])
