@@ -24,7 +24,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import tomli_w
 
 from shadowpuppet.options import Options, default_of, settings_of
-from shadowpuppet.settings import PRESETS
+from shadowpuppet.settings import MULTIVIEW_PRESETS, PRESETS
 from shadowpuppet.synthetic.spec import TABLES, Spec
 
 MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
@@ -79,11 +79,11 @@ def help_text(*command: str) -> str:
 
 def presets() -> str:
     """What each preset changes, as TOML."""
-    parts = []
-    for name, values in PRESETS.items():
-        parts.append(f"**`{name}`**" + ("" if values else ": the defaults above."))
-        if values:
-            parts.append("```toml\n" + tomli_w.dumps({"tracker": values}).strip() + "\n```")
+    parts = ["**`default`**: the defaults above."]
+    for table, known in (("tracker", PRESETS), ("multiview", MULTIVIEW_PRESETS)):
+        for name, values in known.items():
+            if values:
+                parts += [f"**`{name}`**", "```toml\n" + tomli_w.dumps({table: values}).strip() + "\n```"]
     return "\n\n".join(parts)
 
 

@@ -8,13 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.synthetic import Gesture, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.video import open_frames, write_frames
 
 SIZE = (160, 120)
 RATE, FRAMES = 8.0, 29
 SPEC = Spec(name="tiny", motion=(Gesture(motion="wave_hands", seconds=2),), cameras=(Viewpoint(size=SIZE),), rate=RATE,
             scene=Scene(empty_seconds=1))
+
+RING = Spec(name="tiny_ring", motion=(Gesture(motion="walk", seconds=2),), rate=RATE, scene=Scene(empty_seconds=1),
+            ring=Ring(count=4, radius=3.6, fov_deg=42, size=SIZE))  # fmt: skip
+"""Somebody walks before four cameras, 29 frames; with training motion."""
 
 
 def make(folder: Path) -> Path:

@@ -226,19 +226,6 @@ def test_a_whole_body_is_tracked_with_one_camera_and_its_sizes_are_kept(shell, r
     assert 'Invalid value "ball" for --body. Choose from: "cardbox"' in refused(shell, "track", recording, "--body", "ball")
 
 
-def test_a_demo_makes_tracks_and_names_its_pictures(shell, monkeypatch, tmp_path):
-    monkeypatch.setattr("shadowpuppet.demo.demo_spec", lambda: made.SPEC)
-    code, out, err = shell("demo", "-o", "show", *QUICK)
-    assert (code, err) == (0, "")
-    named = [tmp_path / line.split()[-1] for line in out.splitlines() if "show/run/" in line]
-    assert {"overlay.png", "overlay.mp4", "joints.csv"} <= {path.name for path in named}
-    assert all(path.stat().st_size > 1000 for path in named)
-    [sheet] = made.images(tmp_path / "show" / "run" / "overlay.png")
-    assert sheet.shape == (3 * made.SIZE[1], 6 * made.SIZE[0], 3)
-    assert "joint errors, mm" in out
-    assert shell("demo", "-o", "show", "--quiet", *QUICK) == (0, "", "")  # again, over the first one
-
-
 # Settings
 
 

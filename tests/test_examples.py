@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shadowpuppet.synthetic import Gesture, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, Viewpoint, synthesize
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-MADE = {"01": ["sample-run/joints.csv", "sample-run/overlay.mp4"], "02": ["one_picture.png"], "04": ["masks.mkv"]}
+MADE = {"01": ["sample-run/joints.csv", "sample-run/overlay.mp4"], "02": ["one_picture.png"], "04": ["masks.mkv"],
+        "05": ["ring-run/joints.csv", "ring-run/overlay.mp4"], "06": ["prior.npz", "prior.png"], "07": ["refined.png"]}
 """Files that examples leave behind, by their numbers."""
 
 
@@ -24,10 +25,25 @@ def recording(tmp_path_factory) -> Path:
     return synthesize(spec, tmp_path_factory.mktemp("examples") / "recording", np.random.default_rng(1))
 
 
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory) -> Path:
+    """Four small cameras."""
+    spec = Spec(motion=(Gesture(motion="walk", seconds=2),), scene=Scene(empty_seconds=1), rate=6,
+                ring=Ring(count=4, radius=3.6, fov_deg=42, size=(160, 120)))  # fmt: skip
+    return synthesize(spec, tmp_path_factory.mktemp("examples") / "ring", np.random.default_rng(1))
+
+
+def given(example: Path, recording: Path, ring: Path) -> list[str]:
+    """What an example is started with: what it would else make is large, and what it makes itself is not."""
+    if "synthesize" not in example.read_text("utf-8"):
+        return []
+    return [str(ring if "several" in example.stem else recording)]
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_examples_run_and_say_something(example, recording, tmp_path, monkeypatch, capsys):
+def test_examples_run_and_say_something(example, recording, ring, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(example), *([str(recording)] if "argv" in example.read_text("utf-8") else [])])
+    monkeypatch.setattr(sys, "argv", [str(example), *given(example, recording, ring)])
     runpy.run_path(str(example), run_name="__main__")
     assert capsys.readouterr().out.strip()
     for name in MADE.get(example.name[:2], []):

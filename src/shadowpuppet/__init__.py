@@ -28,11 +28,18 @@ if TYPE_CHECKING:
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.rasterize import Picture
-    from shadowpuppet.settings import HullSettings, MonocularSettings, PriorSettings, make_settings
+    from shadowpuppet.settings import (
+        HullSettings,
+        MonocularSettings,
+        MultiviewSettings,
+        PriorSettings,
+        make_multiview_settings,
+        make_settings,
+    )
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
-    from shadowpuppet.tracking import MonocularTracker
+    from shadowpuppet.tracking import MonocularTracker, MultiviewTracker
     from shadowpuppet.video import open_frames, write_frames
     from shadowpuppet.visual_hull import SurfacePoints, VisualHull
     from shadowpuppet.vqpca import choose_regions, fit_prior
@@ -53,7 +60,8 @@ _HOMES = {
     "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull",
     "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
     "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
-    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking", "MultiviewSettings": "settings",
+    "make_multiview_settings": "settings",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -65,7 +73,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "write_calibration", "write_frames", "write_joints", "write_person",
     "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
     "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
-    "read_humaneva", "read_motion",
+    "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings",
 ]  # fmt: skip
 
 

@@ -123,7 +123,8 @@ def info(recording: Recording, /, *, config: Config = None, as_json: AsJson = Fa
 
 
 @app.command
-def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0, as_json: AsJson = False) -> None:
+def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0,
+             angles: Annotated[bool, Parameter(negative=(), show_default=False)] = False, as_json: AsJson = False) -> None:
     """Measure a run: joint errors against a truth, overlap, cost, jitter.
 
     Parameters
@@ -136,48 +137,60 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
         First frame of the truth that counts.
+    angles
+        Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
     """
     from shadowpuppet.evaluation import evaluate_run
-    from shadowpuppet.tables import error_table, measures_table
+    from shadowpuppet.tables import angle_table, error_table, measures_table
     from shadowpuppet.terminal import show, show_json, terminal
 
     with terminal():
-        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start)
+        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start, angles)
     if as_json:
         show_json(metrics)
     else:
-        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []))
+        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []),
+             *([angle_table(metrics["angles_deg"])] if angles else []))
 
 
 @app.command
-def demo(*, folder: Annotated[Path, output("Folder that gets recording/ and run/.")] = Path("shadowpuppet-demo"),
+def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and runs.")] = Path("shadowpuppet-demo"),
          config: Config = None, quiet: Quiet = False, flags: ForDemo = None) -> None:
-    """Make a sample recording with known truth, track it, and name the pictures to open. Needs no data and no network."""
+    """Make two sample recordings with known truth, of one camera and of four around a person, track them, and name the pictures to open.
+
+    Needs no data and no network.
+    """
     from dataclasses import replace
 
     from shadowpuppet.demo import run_demo
     from shadowpuppet.terminal import terminal
 
     options = replace(options_from(flags, config), overlay=True)
-    with terminal(quiet, folder / "run") as shown:
-        summary = run_demo(folder, options, shown)
-    if not quiet:
-        _show_run(folder / "run", summary.metrics, "overlay.png")
+    with terminal(quiet, folder) as shown:
+        summaries = run_demo(folder, options, shown)
+    for summary in () if quiet else summaries:
+        print(f"\n{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
+        _show_run(summary.folder, summary.metrics, "overlay.png")
 
 
 @app.command(name="fit-person")
 def measure_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
                    config: Config = None, flags: ForLook = None) -> None:
-    """Measure a person once, from reference pictures or the film; `track --person` uses the sizes again."""
+    """Measure a person once, from reference pictures or the film, or from several cameras' first seconds; `track --person` uses the sizes
+    again."""
+    from shadowpuppet.fitting import Found
     from shadowpuppet.pipeline import fit_person
-    from shadowpuppet.tables import curves_table, fit_table, sizes_table
+    from shadowpuppet.tables import curves_table, fit_table, measured_table, sizes_table
     from shadowpuppet.terminal import show, terminal
 
     with terminal() as shown:
         shown.begin("looking")
         found, look = fit_person(recording, file, options_from(flags, config))
         shown.doubt(look)
-    show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
+    if isinstance(found, Found):
+        show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
+    elif found.person is not None:
+        show(sizes_table(found.person.sizes), measured_table(found.told, file))
 
 
 @app.command
@@ -216,7 +229,7 @@ def settings(*, preset: str = "default") -> None:
     Parameters
     ----------
     preset
-        Settings to begin with: default or liu2011.
+        Settings to begin with: default, liu2011 or ni2008.
     """
     from shadowpuppet.options import make_options, options_text
 

@@ -115,7 +115,7 @@ else:
     """Those that matter where nothing is tracked."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
     """Those that matter where the recording is known."""
-    SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training"))
+    SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training", "multiview"))
     """Those that matter where a camera is tracked as it happens."""
     LiveFlags = flags_of(LiveSettings)
     """What can be set about that beside."""

@@ -45,15 +45,16 @@ class JointErrors:
     aligned: Array
     """In space, less each frame's mean offset over the joints."""
 
-    def summary(self) -> dict[str, Any]:
-        """Figures in millimetres, over all joints and for each: mean, RMSE, percentiles, share that is far off."""
-        joints = {name: _summary(self._values(k)) for k, name in enumerate(self.names) if self.known[:, k].any()}
-        return {"frames": len(self.known), "lost": int(self.lost.any(1).sum()), **_summary(self._values()), "joints": joints}
+    def summary(self, across: bool = True) -> dict[str, Any]:
+        """Figures in millimetres, over all joints and for each: mean, RMSE, percentiles, share that is far off; `across` and along the
+        camera's axis, too."""
+        kinds = ("distance", *(("plane", "depth") if across else ()), "aligned")
+        joints = {name: _summary(self._values(kinds, k)) for k, name in enumerate(self.names) if self.known[:, k].any()}
+        return {"frames": len(self.known), "lost": int(self.lost.any(1).sum()), **_summary(self._values(kinds)), "joints": joints}
 
-    def _values(self, joint: int | None = None) -> dict[str, Array]:
+    def _values(self, kinds: Sequence[str], joint: int | None = None) -> dict[str, Array]:
         """Distances of each kind, of one joint or all, where there is a truth."""
         these = np.arange(len(self.names)) if joint is None else np.array([joint])
-        kinds = ("distance", "plane", "depth", "aligned")
         return {kind: getattr(self, kind)[:, these][self.known[:, these]] for kind in kinds}
 
 
@@ -147,22 +148,20 @@ def bone_lengths(table: JointTable) -> dict[str, dict[str, float]]:
     return {f"{a}-{b}": statistics(np.linalg.norm(ends[a] - ends[b], axis=1)) for a, b in bones}
 
 
-def of_surfaces(measured: dict[str, Any]) -> dict[str, Any]:
-    """What `evaluate` says of a run whose cost is weighed by surface points, in square metres, not by pixels."""
-    return {("cost_m2" if key == "cost_px" else key): value for key, value in measured.items()}
-
-
 def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[str] | None = None, *,
-             camera: Camera | None = None, start: int = 0) -> dict[str, Any]:
-    """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments."""
+             camera: Camera | None = None, start: int = 0, cameras: int = 1) -> dict[str, Any]:
+    """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments.
+
+    Where several `cameras` saw it costs are m^2, and no error is told along or across the axis of one.
+    """
     run = motion.table
     errors = None if truth is None else joint_errors(run, truth, joints, camera=camera, start=start)
     names = errors.names if errors else joints or default_joints(run, run)
-    said: dict[str, Any] = {"frames": len(motion), "status": motion.status_counts, "overlap": statistics(motion.overlap),
-                            "cost_px": statistics(motion.cost), "jitter_m_s2": jitter(run.select(names)),
-                            "bones_m": bone_lengths(run)}
+    said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
+                            "overlap": statistics(motion.overlap), "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
+                            "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(run)}
     if truth is not None and errors is not None:
-        said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary()}
+        said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
     return said
 
 
@@ -190,4 +189,4 @@ def _summary(values: dict[str, Array]) -> dict[str, float]:
     return {"mean_mm": float(d.mean()), "rmse_mm": float(np.sqrt((d**2).mean())), "p50_mm": p50, "p90_mm": p90, "p95_mm": p95,
             "max_mm": float(d.max()), "far": float((d > 1000 * FAR).mean()),
             **{f"{key}_mm": float(values[kind].mean() * 1000)
-               for key, kind in (("plane", "plane"), ("depth", "depth"), ("aligned_mean", "aligned"))}}
+               for key, kind in (("plane", "plane"), ("depth", "depth"), ("aligned_mean", "aligned")) if kind in values}}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +26,8 @@ from shadowpuppet.overlay import OverlayWriter
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import chosen_views, open_rig
 from shadowpuppet.rig_fitting import prepare_puppet
-from shadowpuppet.rig_look import RigLook, look_at_rig
-from shadowpuppet.rig_run import track_rig
+from shadowpuppet.rig_look import RigLook, check_rig, look_at_rig
+from shadowpuppet.rig_run import Puppet, track_rig, training_of
 from shadowpuppet.running import (
     FALLBACK_RATE,
     Listener,
@@ -91,13 +92,27 @@ def several(recording: str | Path, options: Options) -> bool:
 
 
 @one_blas_thread()
-def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[Found, Look]:
+def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[Found | Puppet, Look | RigLook]:
     """Find a person's sizes and save them. Raises a `ShadowPuppetError` where nobody is found or the file cannot be written."""
     options = options or Options()
+    if several(recording, options):
+        puppet, look = measured(recording, options)
+        assert puppet.person is not None
+        write_person(file, puppet.person)
+        return puppet, look
     prepared = prepare(str(recording), options, generators(options)[0])
     found = check(prepared)
     write_person(file, found.person)
     return found, prepared.look
+
+
+def measured(recording: str | Path, options: Options) -> tuple[Puppet, RigLook]:
+    """Who is before several cameras, measured in the first seconds. Raises a `ShadowPuppetError` where nobody is found."""
+    rig = open_rig(recording, options)
+    prepared = look_at_rig(rig, options)
+    check_rig(prepared)
+    puppet = prepare_puppet(generators(options)[0], rig, prepared.opening, options, training_of(rig))
+    return puppet, replace(prepared.look, person=puppet.told, doubts=(*prepared.look.doubts, *puppet.doubts))
 
 
 def named_body(name: str) -> tuple[Body, list[str]]:

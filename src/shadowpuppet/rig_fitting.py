@@ -4,7 +4,6 @@ seconds; a motion prior; the tracker."""
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.io.person import Person, read_person, write_person
+from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.measuring import measure, seen_height, spread_of
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options
@@ -52,5 +51,4 @@ def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options
     tracker = MultiviewTracker(person.body, rig.cameras, settings, prior, library)
     told: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                             "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    saved = Person(person.sizes, height, source)
-    return Puppet(person.body, tracker, hull, told, (), lambda folder: write_person(Path(folder) / "person.toml", saved))
+    return Puppet(person.body, tracker, hull, told, (), Person(person.sizes, height, source))

@@ -16,9 +16,9 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.masks import Mask, may_be_person
-from shadowpuppet.metrics import of_surfaces
 from shadowpuppet.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.rasterize import Picture
@@ -77,8 +77,8 @@ class Puppet:
     """What was found, plain values, for the look."""
     doubts: tuple[str, ...] = ()
     """What may harm the run, a sentence each."""
-    write: Callable[[Path], None] = lambda folder: None
-    """Writes what can be used again (person.toml) into the run's folder."""
+    person: Person | None = None
+    """What can be used again: person.toml of the run's folder."""
 
 
 Prepare = Callable[[np.random.Generator, Rig, Opening, Options, JointTable | None], Puppet]
@@ -107,7 +107,8 @@ def track_rig(recording: str | Path, folder: str | Path, options: Options, liste
         run.metrics["look_s"] = spent
         write_whole(run.folder / "look.json", json_text(look) + "\n")
         write_calibration(run.folder / "calibration.toml", [footage.view.camera for footage in rig.footage])
-        puppet.write(run.folder)
+        if puppet.person is not None:
+            write_person(run.folder / "person.toml", puppet.person)
         _follow(run, prepared, puppet, options, listener, for_track)
     return _summary(Path(folder), rig, look)
 
@@ -119,7 +120,7 @@ def training_of(rig: Rig) -> JointTable | None:
 
 def _summary(folder: Path, rig: Rig, look: RigLook) -> Summary:
     written = read_run(folder)
-    metrics = written.metrics | of_surfaces(evaluated(rig.recording, written.motion))
+    metrics = written.metrics | evaluated(rig.recording, written.motion, cameras=len(rig.cameras))
     warn_of_losses(written.motion)
     write_metrics(folder, metrics)
     return Summary(folder, written.motion, metrics, look)

@@ -120,11 +120,11 @@ def warn_of_losses(motion: Motion) -> None:
              ShadowPuppetWarning, stacklevel=3)
 
 
-def evaluated(recording: Recording, motion: Motion, camera: Camera | None = None) -> dict[str, Any]:
-    """Measures, against the truth where there is one that fits; `camera` says what is depth."""
+def evaluated(recording: Recording, motion: Motion, camera: Camera | None = None, cameras: int = 1) -> dict[str, Any]:
+    """Measures, against the truth where there is one that fits; `camera` says what is depth, where it is not one of several `cameras`."""
     try:
         truth = read_joints(recording.truth) if recording.truth is not None else None
-        return evaluate(motion, truth, camera=camera)
+        return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is done: it is not to be lost over this
         warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)
-        return evaluate(motion, camera=camera)
+        return evaluate(motion, camera=camera, cameras=cameras)

@@ -49,9 +49,9 @@ def pairs(rows: Iterable[tuple[str, str]]) -> RenderableType:
 
 def error_table(errors: Mapping[str, Any]) -> RenderableType:
     """Joint errors, a row a joint."""
-    table = plain_table("joint errors, mm", ("joint", "mean", "rmse", "plane", "depth", "p95", "max", f"over {1000 * FAR:.0f}"))
+    keys = [key for key in ("mean_mm", "rmse_mm", "plane_mm", "depth_mm", "p95_mm", "max_mm") if key in errors]
+    table = plain_table("joint errors, mm", ("joint", *(key.removesuffix("_mm") for key in keys), f"over {1000 * FAR:.0f}"))
     rows = [*errors["joints"].items(), ("all", errors)]
-    keys = ("mean_mm", "rmse_mm", "plane_mm", "depth_mm", "p95_mm", "max_mm")
     for name, row in rows:
         if name == "all":
             table.add_section()
@@ -59,20 +59,33 @@ def error_table(errors: Mapping[str, Any]) -> RenderableType:
     return table
 
 
+def angle_table(angles: Mapping[str, float]) -> RenderableType:
+    """Errors of angles, a row a joint."""
+    table = plain_table("", ("turned at", "by degrees, rmse"))
+    for name, value in angles.items():
+        if name == "all":
+            table.add_section()
+        table.add_row(name, f"{value:.1f}")
+    return table
+
+
 def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     """What is known without a truth, and beside it."""
-    fit, cost = metrics["overlap"], metrics.get("cost_px", {"count": 0})
+    several = "cost_m2" in metrics
+    fit, cost = metrics["overlap"], metrics["cost_m2" if several else "cost_px"]
     frames = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
     rows = [("frames", f"{metrics['frames']}: {frames}" if frames else "none")]
     if fit["count"]:
         rows.append(("overlap", f"{fit['mean']:.3f} (5 % of frames under {fit['p5']:.3f})"))
     if cost["count"]:
-        rows.append(("cost", f"{cost['mean']:.0f} pixels (5 % of frames over {cost['p95']:.0f})"))
+        scale, unit, digits = (1e4, "cm2", 1) if several else (1, "pixels", 0)
+        rows.append(("cost", f"{scale * cost['mean']:.{digits}f} {unit} (5 % of frames over {scale * cost['p95']:.{digits}f})"))
     truth = metrics.get("truth_jitter_m_s2")
     rows.append(("jitter", f"{_number(metrics['jitter_m_s2'])} m/s2" + (f", the truth's {_number(truth)}" if truth is not None else "")))
     errors = metrics.get("errors")
     if errors:
-        rows.append(("error", f"{errors['mean_mm']:.1f} mm (plane {errors['plane_mm']:.1f}, depth {errors['depth_mm']:.1f}); aligned "
+        parts = f"rmse {errors['rmse_mm']:.1f}" if several else f"plane {errors['plane_mm']:.1f}, depth {errors['depth_mm']:.1f}"
+        rows.append(("error", f"{errors['mean_mm']:.1f} mm ({parts}); aligned "
                               f"{errors['aligned_mean_mm']:.1f} mm; {100 * errors['far']:.1f} % off by over {1000 * FAR:.0f} mm"))
         lost, known, frames = errors["lost"], errors["frames"], metrics["frames"]
         rows += [("lost", f"{lost} of the truth's {known} frames have no pose: {1000 * LOST:.0f} mm off each")] if lost else []
@@ -114,6 +127,14 @@ def fit_table(found: Found, saved: Path) -> RenderableType:
     overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
     return pairs([("overlap", f"{overlaps}; film {found.start:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"),
                   ("source", found.source), ("saved", str(saved))])
+
+
+def measured_table(told: Mapping[str, Any], saved: Path) -> RenderableType:
+    """How well the sizes fit that several cameras told, and where they were saved."""
+    off = told["residual"]
+    return pairs([("overlap", f"{told['overlap']:.2f} of body and silhouettes, in {told['frames']} frames"),
+                  *([("surface", f"{1000 * off:.1f} mm (rms) from the points of the hulls")] if np.isfinite(off) else []),
+                  ("source", told["source"]), ("saved", str(saved))])
 
 
 def specs_table(specs: Mapping[str, Spec]) -> RenderableType:
@@ -197,9 +218,6 @@ def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
             ("film to pose", f"{found['mono.chain_fps']:.0f} frames/s, {found['mono.one_core']} (ms a frame: {stages})"),
             ("memory", f"{_megabytes(found['mono.peak_mb'])} at most, grown by {_megabytes(found['mono.growth_mb'])} over "
                        f"{found['mono.chain_frames']} frames")]
-    rows += [("several", f"{found['multi.fps']:.0f} frames/s with the default preset, {found['multi.forces_fps']:.0f} with ni2008"),
-             ("films to pose", f"{found['multi.chain_fps']:.0f} frames/s from seven films, {found['multi.cores']}; "
-                               f"{_megabytes(found['multi.peak_mb'])} at most")]
     if "mono.compile_s" in found:
         rows.append(("first pose", f"{found['mono.start_s']:.1f} s after the start of a new process, {found['mono.compile_s']:.1f} s where "
                                    "all kernels must be compiled"))
@@ -225,8 +243,6 @@ BENCHED_SEVERAL = (
     ("naive_forces", "  plain NumPy", 1e6, "us", "multi.ratio_naive"),
     ("gauss_newton", "Gauss-Newton, a particle and iteration", 1e6, "us", ""),
     ("naive_gauss_newton", "  plain NumPy", 1e6, "us", "multi.ratio_naive_gauss_newton"),
-    ("forces_frame", "a frame of ni2008, silhouettes to pose", 1e3, "ms", ""),
-    ("default_frame", "a frame of the default preset", 1e3, "ms", ""),
 )
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
 
