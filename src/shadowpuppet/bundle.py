@@ -42,7 +42,8 @@ class Bundle(Generic[Measured]):
 
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
-                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float = 1e-6, first: Measured | None = None) -> Bundle[Measured]:
+                 settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float = 1e-6,
+                 first: Measured | None = None) -> Bundle[Measured]:
     """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
 
     Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull` holds poses where the points say

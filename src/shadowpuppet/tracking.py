@@ -104,9 +104,9 @@ class MonocularTracker:
         observation, particles = self.observe(mask, found.pose), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
-            for limb, postures in found.limbs.items():
+            for limb, angles in found.limbs.items():
                 if limb in stage.parts:
-                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = postures[np.arange(stage.number) % first_pose.GOOD]
+                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = angles[np.arange(stage.number) % first_pose.GOOD]
             values = stage.clamp(diffuse(rng, poses[:, stage.dofs], stage.sigma))
             particles.append(evaluate(values, stage.weigh(observation, found.pose, found.pose)))
         state = self.judge(found.pose, particles, observation)
