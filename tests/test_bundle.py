@@ -33,7 +33,7 @@ def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsil
     pose = some_pose(body, rng)
     points, normals, weights = scan(body, pose, rng, 15)
     points = points + rng.normal(0, 0.02, points.shape)
-    frame = bundle._equations(body, [], pose, make_cloud(points, normals, weights), surface)
+    frame = bundle._equations(bundle._model(body), [], pose, make_cloud(points, normals, weights), surface)
     H, g = naive.normal_equations(body, pose, points, normals, weights, surface)
     np.testing.assert_allclose(frame.rows, H, atol=2e-4 * np.abs(H).max())
     np.testing.assert_allclose(frame.gradient, g, atol=2e-4 * np.abs(g).max())
@@ -42,22 +42,22 @@ def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsil
 
 def test_what_sizes_do_to_distances_is_their_derivative(rng):
     """Of a longer loin: what hangs on the chest rises, so that the points there are less far out along their normals."""
-    body, settings, step = actor.body(), SurfaceSettings(), 0.002
+    body, settings, step = actor.body(), SurfaceSettings(), bundle.NUDGE
     pose, k = actor.stance(body.skeleton), NAMES.index("lumbar_height")
     seen = actor.surface(body, pose, rng, 20)
     cloud = make_cloud(seen.points + 0.005 * seen.normals, seen.normals, seen.weights)
     nudged = bundle._nudged(anatomical, AnatomicalSizes, MEAN.to_array(), np.array([k]))
-    frame = bundle._equations(body, nudged, pose, cloud, settings)
+    frame = bundle._equations(bundle._model(body), nudged, pose, cloud, settings)
     near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
-    _, here = bundle._measured(body, pose, cloud, settings, near, True)
+    _, here = bundle._measured(bundle._model(body), pose, cloud, settings, near, True)
     taller = anatomical(MEAN.with_values(lumbar_height=MEAN.lumbar_height + step))
-    grows = (here[0] - bundle._measured(taller, pose, cloud, settings, near, False)[1][0]) / step
+    grows = (here[0] - bundle._measured(bundle._model(taller), pose, cloud, settings, near, False)[1][0]) / step
     arms = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("arm", "hand"))])
     legs = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("thigh", "shank", "foot"))])
-    assert np.quantile(np.abs(grows - here[7])[arms], 0.75) < 0.02  # all but points of edges
+    assert np.quantile(np.abs(grows - here[7])[arms], 0.75) < 0.05  # all but points of edges
     np.testing.assert_allclose(grows[legs], 0, atol=1e-6)
-    assert frame.rows[-1, -1] == pytest.approx((here[1] * grows**2).sum() / cloud.total, rel=0.02)
-    assert frame.gradient[-1] == pytest.approx((here[1] * here[0] * grows).sum() / cloud.total, rel=0.05, abs=1e-5)
+    assert frame.rows[-1, -1] == pytest.approx((here[1] * grows**2).sum() / cloud.total, rel=1e-3)
+    assert frame.gradient[-1] == pytest.approx((here[1] * here[0] * grows).sum() / cloud.total, rel=1e-3)
 
 
 # Somebody who is not average ------------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ def test_nothing_is_ever_made_worse_and_more_rounds_do_more():
     assert residuals[0].sizes == MEAN
 
     def cost(found) -> float:
-        of = anatomical(found.sizes)
+        of = bundle._model(anatomical(found.sizes))
         frames = [bundle._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
         strain = (found.sizes.to_array() - MEAN.to_array()) / SPREAD
         return bundle.WORTH / bundle.NOISE**2 * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
