@@ -15,7 +15,7 @@ from scans import make_body as random_tree
 from scans import scan, some_pose
 from shadowpuppet import refinement
 from shadowpuppet.bench import naive_multi as naive
-from shadowpuppet.bodies import WHOLE, average_sizes
+from shadowpuppet.bodies import average_sizes
 from shadowpuppet.bodies import make_body as make_named
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.errors import ShadowPuppetError
@@ -24,6 +24,7 @@ from shadowpuppet.refinement import Refiner
 from shadowpuppet.screws import place_one
 from shadowpuppet.settings import ForceSettings, SurfaceSettings
 from shadowpuppet.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.whole_sizes import WHOLE
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)
 
