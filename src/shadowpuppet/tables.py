@@ -49,7 +49,7 @@ def pairs(rows: Iterable[tuple[str, str]]) -> RenderableType:
 
 def error_table(errors: Mapping[str, Any]) -> RenderableType:
     """Joint errors, a row a joint."""
-    table = _table("joint errors, mm", ("joint", "mean", "rmse", "plane", "depth", "p95", "max", f"over {1000 * FAR:.0f}"))
+    table = plain_table("joint errors, mm", ("joint", "mean", "rmse", "plane", "depth", "p95", "max", f"over {1000 * FAR:.0f}"))
     rows = [*errors["joints"].items(), ("all", errors)]
     keys = ("mean_mm", "rmse_mm", "plane_mm", "depth_mm", "p95_mm", "max_mm")
     for name, row in rows:
@@ -61,7 +61,7 @@ def error_table(errors: Mapping[str, Any]) -> RenderableType:
 
 def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     """What is known without a truth, and beside it."""
-    fit, cost = metrics["overlap"], metrics["cost_px"]
+    fit, cost = metrics["overlap"], metrics.get("cost_px", {"count": 0})
     frames = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
     rows = [("frames", f"{metrics['frames']}: {frames}" if frames else "none")]
     if fit["count"]:
@@ -91,7 +91,7 @@ def live_rows(live: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def sizes_table(sizes: Sizes) -> RenderableType:
     """The named sizes: a1..a18 of an upper body, or a whole body's."""
-    table = _table("sizes, mm", ("", "size", "mm", "", "size", "mm"), right=(2, 5))
+    table = plain_table("sizes, mm", ("", "size", "mm", "", "size", "mm"), right=(2, 5))
     numbers = [f"a{n}" if isinstance(sizes, CardboxSizes) else "" for n in range(1, len(sizes.names()) + 1)]
     rows = [(number, name, f"{1000 * value:.0f}") for number, name, value in zip(numbers, sizes.names(), sizes.to_array())]
     half = (len(rows) + 1) // 2
@@ -102,7 +102,7 @@ def sizes_table(sizes: Sizes) -> RenderableType:
 
 def curves_table(curves: Mapping[str, Sequence[Sequence[float]]]) -> RenderableType:
     """Cost over the rounds of Algorithm 1, a line a search of a subset."""
-    table = _table("cost by round, pixels", ("sizes", "search", "rounds", "first", "last", "curve"), right=(1, 2, 3, 4))
+    table = plain_table("cost by round, pixels", ("sizes", "search", "rounds", "first", "last", "curve"), right=(1, 2, 3, 4))
     for name, searches in curves.items():
         for n, curve in enumerate(searches, 1):
             table.add_row(name if n == 1 else "", str(n), str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
@@ -157,14 +157,14 @@ def trial_table(found: HumanEva, folder: Path) -> RenderableType:
 
 def prior_tables(trained: Trained, file: Path) -> list[RenderableType]:
     """What a motion prior was learnt from, how well it follows that, and where it lies."""
-    clips = _table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"))
+    clips = plain_table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"))
     for clip in trained.clips:
         frames = clip.fitted.by_frame[np.isfinite(clip.fitted.by_frame)]
         figures = (str(clip.frames), str(len(clip.parts)), f"{1000 * clip.fitted.residual:.1f}", f"{1000 * frames.max():.1f}")
         clips.add_row("/".join(Path(clip.name).parts[-2:])[-48:], *figures)
     prior, parts = trained.prior, [clips]
     if trained.choice is not None:
-        tried = _table("error in degrees of motion", ("regions", "learnt from", "left out"))
+        tried = plain_table("error in degrees of motion", ("regions", "learnt from", "left out"))
         for number, *errors in zip(trained.choice.candidates, trained.choice.training_errors, trained.choice.held_out_errors):
             tried.add_row(str(number), *(f"{np.degrees(error):.2f}" for error in errors))
         parts.append(tried)
@@ -187,7 +187,7 @@ def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
     """How fast it is here."""
     here, tables = found["environment"], []
     for title, rows_of in (("one camera, 320 x 240", BENCHED), ("seven cameras, 640 x 480", BENCHED_SEVERAL)):
-        table = _table(f"time, {title}", ("", "median", "least", "", "times"), right=(1, 2, 4))
+        table = plain_table(f"time, {title}", ("", "median", "least", "", "times"), right=(1, 2, 4))
         for key, name, scale, unit, ratio in rows_of:
             times = (f"{scale * found['raw'][key][which]:.4g}" for which in ("median", "least"))
             table.add_row(name, *times, unit, f"{found[ratio]:.3g}" if ratio else "")
@@ -197,6 +197,9 @@ def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
             ("film to pose", f"{found['mono.chain_fps']:.0f} frames/s, {found['mono.one_core']} (ms a frame: {stages})"),
             ("memory", f"{_megabytes(found['mono.peak_mb'])} at most, grown by {_megabytes(found['mono.growth_mb'])} over "
                        f"{found['mono.chain_frames']} frames")]
+    rows += [("several", f"{found['multi.fps']:.0f} frames/s with the default preset, {found['multi.forces_fps']:.0f} with ni2008"),
+             ("films to pose", f"{found['multi.chain_fps']:.0f} frames/s from seven films, {found['multi.cores']}; "
+                               f"{_megabytes(found['multi.peak_mb'])} at most")]
     if "mono.compile_s" in found:
         rows.append(("first pose", f"{found['mono.start_s']:.1f} s after the start of a new process, {found['mono.compile_s']:.1f} s where "
                                    "all kernels must be compiled"))
@@ -222,6 +225,8 @@ BENCHED_SEVERAL = (
     ("naive_forces", "  plain NumPy", 1e6, "us", "multi.ratio_naive"),
     ("gauss_newton", "Gauss-Newton, a particle and iteration", 1e6, "us", ""),
     ("naive_gauss_newton", "  plain NumPy", 1e6, "us", "multi.ratio_naive_gauss_newton"),
+    ("forces_frame", "a frame of ni2008, silhouettes to pose", 1e3, "ms", ""),
+    ("default_frame", "a frame of the default preset", 1e3, "ms", ""),
 )
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
 
@@ -237,7 +242,8 @@ def sparkline(values: Sequence[float], width: int = 30) -> str:
     return "".join(BARS[int((value - chosen.min()) / span * (len(BARS) - 1))] for value in chosen)
 
 
-def _table(title: str, columns: Sequence[str], right: Sequence[int] | None = None) -> Table:
+def plain_table(title: str, columns: Sequence[str], right: Sequence[int] | None = None) -> Table:
+    """An empty table without lines; numbers stand `right`."""
     table = Table(title=title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0), header_style="dim")
     for i, column in enumerate(columns):
         table.add_column(column, justify="right" if (i in right if right is not None else i) else "left", no_wrap=True)
