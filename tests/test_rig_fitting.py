@@ -104,6 +104,8 @@ def test_a_recording_becomes_joints(run):
     found = errors(run)
     assert found.mean() < 0.025
     assert found.max() < 0.06
+    assert run.metrics["errors"]["mean_mm"] < 40
+    assert run.metrics["errors"]["lost"] == 0
     assert run.info["body"] == "anatomical"
     assert run.info["settings"]["multiview"]["particles"] == 6
 
