@@ -117,8 +117,11 @@ def test_every_setting_runs(overrides):
 
 
 def test_one_particle_is_all_that_image_forces_have():
-    states = track(tracker(method="image_force", particles=50), actor.filmed()[1][:2])
-    assert states[-1].particles.poses.shape == (1, len(NAMES))
+    """And they are forces, however particles would be refined."""
+    by_default, forced = (track(tracker(method="image_force", refinement=refinement), actor.filmed()[1][:3])
+                          for refinement in ("gauss_newton", "forces"))
+    assert by_default[-1].particles.poses.shape == (1, len(NAMES))
+    assert all(same(a, b) for a, b in zip(by_default, forced))
 
 
 def test_a_state_says_what_its_pose_costs_and_how_it_moved():
@@ -191,6 +194,8 @@ def test_nobody_at_the_start_is_absent_and_found_when_they_come():
     assert [state.status for state in states] == ["absent"] * 2 + ["tracked"] * 2
     assert np.isfinite(states[0].pose).all()
     assert errors(of, states[2:], poses[:2]).max() < 0.04
+    after, anew = of.step(np.random.default_rng(1), states[1], *seen[2]), of.start(np.random.default_rng(1), *seen[2])
+    assert same(after, anew)  # searched for, not followed from where they were last
 
 
 def test_who_comes_back_elsewhere_or_jumps_is_found():

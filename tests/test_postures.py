@@ -54,8 +54,10 @@ def test_postures_are_placed_where_the_points_are_in_all_directions(name):
     np.testing.assert_allclose(np.diff(turns), 2 * np.pi / HEADINGS)
     rest = np.setdiff1d(np.arange(found.shape[1]), root)
     np.testing.assert_array_equal(found[:, rest], np.repeat(base, HEADINGS, 0)[:, rest])
-    mean = of.points(found).mean(1)
-    assert np.linalg.norm(mean - middle, axis=1).max() < 0.25
+    limbs = actor.limbs_of(of)
+    areas = limbs.lengths * limbs.radii.mean((1, 2))
+    middles = of.skeleton.points(found, limbs.joints, (limbs.starts + limbs.ends) / 2)
+    np.testing.assert_allclose(np.average(middles, 1, areas), np.tile(middle, (len(found), 1)), atol=1e-9)
     facing = found[HEADINGS // 2]
     assert facing[root[3]] == pytest.approx(0)
 

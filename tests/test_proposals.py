@@ -57,7 +57,8 @@ def test_what_is_refined_afterwards_is_moved_joint_by_joint_near_and_far():
         own = [d for d, dof in enumerate(SKELETON.dofs) if dof.joint == joint.name]
         if own:
             assert moved[:, own].any(1).mean() == pytest.approx(MOVED, abs=0.04)
-    chest = SKELETON.dof_indices(["chest_x"])[0]
+    chest, knee = SKELETON.dof_indices(["chest_x", "left_knee_flexion"])
+    assert np.corrcoef(moved[:, chest], moved[:, knee])[0, 1] == pytest.approx(0, abs=0.1)  # while one joint stays another is moved
     far = np.abs((drawn(settings, many()) - POSE)[1:, chest])
     assert far.max() > 2.5 * 0.01 * REACH[1]
     assert far.std() == pytest.approx(0.01 * np.sqrt(MOVED * np.mean(np.square(REACH))), rel=0.15)
