@@ -11,12 +11,29 @@ import pytest
 
 from shadowpuppet.bodies import ALL
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.options import Options
+from shadowpuppet.options import Options, make_options
 from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings, validate
+from shadowpuppet.settings import (
+    MULTIVIEW_PRESETS,
+    PRESETS,
+    ForceSettings,
+    GaussNewtonSettings,
+    HullSettings,
+    InitializationSettings,
+    MonocularSettings,
+    MultiviewSettings,
+    PartSettings,
+    PriorSettings,
+    SurfaceSettings,
+    make_multiview_settings,
+    make_settings,
+    validate,
+)
 from shadowpuppet.silhouette import SilhouetteSettings
+from shadowpuppet.whole_sizes import WHOLE
 
-KINDS = (PartSettings, MonocularSettings, InitializationSettings, SilhouetteSettings, Options)
+OF_SEVERAL = (MultiviewSettings, SurfaceSettings, GaussNewtonSettings, ForceSettings, HullSettings, PriorSettings)
+KINDS = (PartSettings, MonocularSettings, InitializationSettings, SilhouetteSettings, Options, *OF_SEVERAL)
 
 
 # Presets --------------------------------------------------------------------------------------------------------------
@@ -61,6 +78,67 @@ def test_names_that_settings_offer_are_those_there_are():
     hints = get_type_hints(MonocularSettings)
     assert set(get_args(hints["body"])) == set(ALL)
     assert set(get_args(hints["resampling"])) == set(SCHEMES)
+
+
+# Several cameras ------------------------------------------------------------------------------------------------------
+
+
+def test_ni2008_is_the_paper_s():
+    """What it says (V, VI): cylinders, forces, N = 40, proposals from the prior alone, which forgets what it cannot hold."""
+    paper = make_multiview_settings("ni2008")
+    assert (paper.body, paper.method, paper.refinement, paper.particles) == ("cylinders", "hybrid", "forces", 40)
+    assert (paper.defensive, paper.keep, paper.silhouettes, paper.cycles) == (0, 0, 0, 1)
+    assert paper.forces.modulated
+    assert paper.forces.robust
+    assert paper.forces.hierarchical
+
+
+@pytest.mark.parametrize("preset", MULTIVIEW_PRESETS)
+def test_presets_of_several_cameras_are_possible_and_overrides_come_last(preset):
+    plain = make_multiview_settings(preset)
+    changed = make_multiview_settings(preset, {"particles": 3, "surface": {"tau": 0.123}, "forces": {"iterations": 7}})
+    assert changed == replace(plain, particles=3, surface=replace(plain.surface, tau=0.123), forces=replace(plain.forces, iterations=7))
+    assert make_multiview_settings() == MultiviewSettings()
+
+
+def test_one_preset_is_for_both_trackers():
+    """A name that only one of the trackers knows leaves the other its default."""
+    paper = make_options({"preset": "ni2008", "multiview": {"particles": 5}})
+    assert paper.multiview == make_multiview_settings("ni2008", {"particles": 5})
+    assert paper.tracker == MonocularSettings()
+    assert make_options({"preset": "liu2011"}).multiview == MultiviewSettings()
+    with pytest.raises(SettingsError, match="unknown preset 'ni'; there are: default, liu2011, ni2008"):
+        make_options({"preset": "ni"}, "run.toml")
+    with pytest.raises(SettingsError, match="unknown preset 'liu2011'; there are: default, ni2008"):
+        make_multiview_settings("liu2011")
+
+
+def test_names_that_settings_of_several_cameras_offer_are_those_there_are():
+    hints = get_type_hints(MultiviewSettings)
+    assert set(get_args(hints["body"])) == set(WHOLE)
+    assert set(get_args(hints["resampling"])) == set(SCHEMES) - {"deterministic"}
+
+
+@pytest.mark.parametrize(("overrides", "said"), [
+    ({"particle": 3}, "multiview: unknown setting 'particle'; there are: body, cooling, cycles"),
+    ({"surface": {"far": 3}}, "multiview: unknown setting 'surface.far'; there are: epsilon, tau"),
+    ({"particles": 0}, "multiview: particles: found 0; input should be greater than or equal to 1"),
+    ({"defensive": 1.5}, "defensive: found 1.5; input should be less than or equal to 1"), ({"keep": -0.1}, "keep: found -0.1"),
+    ({"surface": {"epsilon": 1.0}}, "surface.epsilon: found 1.0; input should be less than 1"), ({"surface": {"tau": 0}}, "surface.tau"),
+    ({"gauss_newton": {"share": 0}}, "gauss_newton.share: found 0"), ({"gauss_newton": {"damping": 0}}, "gauss_newton.damping"),
+    ({"forces": {"iterations": -1}}, "forces.iterations: found -1"), ({"forces": {"rotation": 0}}, "forces.rotation: found 0"),
+    ({"hull": {"rays": 0}}, "hull.rays: found 0"), ({"hull": 3}, "hull: found 3; input should be a dictionary"),
+    ({"method": "luck"}, "method: found 'luck'; input should be 'hybrid', 'image_force' or 'particle_filter'"),
+    ({"refinement": None}, "refinement: found None; input should be 'gauss_newton' or 'forces'"),
+    ({"body": "rounded"}, "body: found 'rounded'; input should be 'anatomical' or 'cylinders'"),
+    ({"sigma_cost": math.nan}, "sigma_cost: found nan"), ({"velocity": 2}, "velocity: found 2"), ({"silhouettes": -1}, "silhouettes"),
+])  # fmt: skip
+def test_what_is_wrong_with_several_cameras_is_said(overrides, said):
+    with pytest.raises(SettingsError) as error:
+        make_options({"preset": "ni2008", "multiview": overrides}, "run.toml")
+    assert str(error.value).startswith("run.toml: multiview: ")
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 # What is wrong --------------------------------------------------------------------------------------------------------

@@ -155,7 +155,7 @@ def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, s
     screws[:, 3:] -= np.cross(cloud.origin, screws[:, :3])
     moves = (levers @ screws.T) * model.reach[:, model.joints[near[:, LANES:].ravel().astype(int)]].T
     grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / NUDGE for other in nudged]
-    rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), -1)], 1)
+    rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), len(nudged))], 1)
     weighed = rows * weights[:, None]
     squared = float(weights @ distances**2 / max(weights.sum(), 1e-9))
     return _Frame(float(out[8].sum()) / max(cloud.total, 1e-9), squared, rows.T @ weighed, weighed.T @ distances)

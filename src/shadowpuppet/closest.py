@@ -42,7 +42,8 @@ class Cloud(NamedTuple):
 
 def make_cloud(points: Array, normals: Array, weights: Array, origin: Array | None = None) -> Cloud:
     """Points (P, 3) with normals (P, 3) and weights (P,), ordered so that groups lie close together."""
-    origin = (points.mean(0) if len(points) else np.zeros(3)) if origin is None else origin
+    if origin is None:
+        origin = np.asarray(points.mean(0) if len(points) else np.zeros(3), float)
     order = _along_a_curve(points - origin)
     groups = -(-len(points) // LANES)
     flat = np.zeros((7, groups * LANES), np.float32)

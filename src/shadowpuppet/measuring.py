@@ -86,8 +86,8 @@ def measure(rng: np.random.Generator, make: Callable[[Measured], Body], expected
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library)
     found = _followed(rng, tracker, first)
     if not found:
-        raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or more "
-                            "at once, and do the cameras agree? `shadowpuppet info` tells")
+        raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
+                            "more at once, and do the cameras agree? `shadowpuppet info` tells")
     return Person(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found))
 
 

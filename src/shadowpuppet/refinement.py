@@ -128,8 +128,8 @@ def _bounded(rows, near, tau):  # pragma: no cover
 
 @summing
 def _add_equations(q, number, rows, near, tau, out, lanes):  # pragma: no cover
-    """Add what the points of the part `number` say about its motion to `lanes` (SUMS LANES,): the moment and direction along which each measures,
-    multiplied with one another (21, by rows of the upper triangle) and with the distance to the tangent plane (6)."""
+    """Add what the points of the part `number` say about its motion to `lanes` (SUMS LANES,): the moment and direction along which each
+    measures, multiplied with one another (21, by rows of the upper triangle) and with the distance to the tangent plane (6)."""
     one, nil = np.float32(1), np.float32(0)
     for i in range(LANES):
         f0, f1, f2 = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
@@ -303,9 +303,9 @@ def _gauss_newton(poses, centre, pull, chain, limbs, rows, spheres, origin, poin
 
 @summing
 def _add_forces(q, number, rows, near, tau, mode, out, lanes):  # pragma: no cover
-    """Add the forces on the part `number` (eq. 32) to `lanes` (SUMS LANES,): their moments about the cloud's origin (3), themselves (3), and of the
-    points on the model that they act on the number, the sum (3) and the products (6), weighed as the points."""
-    one, nil = np.float32(1), np.float32(0)
+    """Add the forces on the part `number` (eq. 32) to `lanes` (SUMS LANES,): their moments about the cloud's origin (3), themselves (3),
+    and of the points on the model that they act on the number, the sum (3) and the products (6), weighed as the points."""
+    nil = np.float32(0)
     bounded, modulated = mode & ROBUST, mode & MODULATED
     for i in range(LANES):
         f0, f1, f2 = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]

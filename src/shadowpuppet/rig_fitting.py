@@ -21,7 +21,7 @@ from shadowpuppet.rig_look import Opening
 from shadowpuppet.rig_run import Puppet
 from shadowpuppet.tracking import MultiviewTracker
 from shadowpuppet.visual_hull import VisualHull
-from shadowpuppet.whole_sizes import WHOLE
+from shadowpuppet.whole_sizes import WHOLE, BoneSizes
 
 
 def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options: Options, training: JointTable | None) -> Puppet:
@@ -44,6 +44,7 @@ def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options
         seen = height or seen_height(first) or AVERAGE_HEIGHT
         sizes = average_sizes(settings.body, seen)
         source = f"{'the height' if height else f'a height of {seen:.2f} m as seen'}, and the hulls of the first seconds"
+        assert isinstance(sizes, BoneSizes)
         spread = spread_of(sizes, shown=False)
     library = known.poses if len(known.poses) else None
     person = measure(rng, partial(make_body, settings.body), sizes, spread, rig.cameras, first, settings, library)

@@ -353,7 +353,8 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
 """Named settings of the tracker of several cameras, as `PRESETS`."""
 
 
-def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None, source: str = "settings") -> MultiviewSettings:
+def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None,
+                            source: str = "settings") -> MultiviewSettings:
     """A preset of `MULTIVIEW_PRESETS` with some values replaced, as `make_settings`."""
     if preset not in MULTIVIEW_PRESETS:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(MULTIVIEW_PRESETS)}")

@@ -218,6 +218,9 @@ def bench_tables(found: Mapping[str, Any]) -> list[RenderableType]:
             ("film to pose", f"{found['mono.chain_fps']:.0f} frames/s, {found['mono.one_core']} (ms a frame: {stages})"),
             ("memory", f"{_megabytes(found['mono.peak_mb'])} at most, grown by {_megabytes(found['mono.growth_mb'])} over "
                        f"{found['mono.chain_frames']} frames")]
+    rows += [("several", f"{found['multi.fps']:.0f} frames/s with the default preset, {found['multi.forces_fps']:.0f} with ni2008"),
+             ("films to pose", f"{found['multi.chain_fps']:.0f} frames/s from seven films, {found['multi.cores']}; "
+                               f"{_megabytes(found['multi.peak_mb'])} at most")]
     if "mono.compile_s" in found:
         rows.append(("first pose", f"{found['mono.start_s']:.1f} s after the start of a new process, {found['mono.compile_s']:.1f} s where "
                                    "all kernels must be compiled"))
@@ -243,6 +246,8 @@ BENCHED_SEVERAL = (
     ("naive_forces", "  plain NumPy", 1e6, "us", "multi.ratio_naive"),
     ("gauss_newton", "Gauss-Newton, a particle and iteration", 1e6, "us", ""),
     ("naive_gauss_newton", "  plain NumPy", 1e6, "us", "multi.ratio_naive_gauss_newton"),
+    ("forces_frame", "a frame of ni2008, silhouettes to pose", 1e3, "ms", ""),
+    ("default_frame", "a frame of the default preset", 1e3, "ms", ""),
 )
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
 
