@@ -15,6 +15,8 @@ GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
 """Degrees of freedom that a prior of articulation leaves to a walk."""
 REACH = (0.3, 1.0, 2.0)
 """What the noise of a defensive proposal is multiplied by, one of these each."""
+EXPLORED = 0.4
+"""Noise about a usual arm that is tried, rad."""
 MOVED = 0.3
 """Chance of each joint to be moved by it: a limb that was lost is found again while all else stays."""
 
@@ -70,5 +72,5 @@ class Proposals:
         out = poses + noise * far * moved[:, self.owners]
         for n in explored:
             dofs, arms = self.arms[rng.integers(2)]
-            out[n, dofs] = arms[rng.integers(len(arms))] + noise[n, dofs]
+            out[n, dofs] = arms[rng.integers(len(arms))] + EXPLORED * rng.standard_normal(len(dofs))
         return out

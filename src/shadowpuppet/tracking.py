@@ -34,7 +34,7 @@ ABSENT, LOST, UNCERTAIN = 0.2, 0.5, 0.7
 uncertain. A cardbox that fits overlaps by 0.8 to 0.9."""
 FEW, SMALLEST = 50, 0.5
 """Surface points, and their extent (m), from which on somebody may be there."""
-SETTLED = 20
+SETTLED = 10
 """Cycles on the first frame, after the search."""
 SETTLE = 10
 """Frames' worth of cycles on the first mask, after the search."""
