@@ -23,7 +23,7 @@ from shadowpuppet.sizes import Sizes
 Measured = TypeVar("Measured", bound=Sizes)
 NUDGE = 1e-3
 """Step (m) by which what a size does to the points is found."""
-NOISE, WORTH = 0.01, 3.0
+NOISE, WORTH = 0.01, 30.0
 """Deviation (m) of a surface point from its body, and how many points of a frame tell something of their own: neighbours err alike."""
 ROUNDS = 10
 FARTHEST, FARTHEST_TURN = 0.03, 0.3

@@ -26,9 +26,10 @@ def _dof(name: str, joint: str, axis: str, limits: Bounds, rest: float = 0.0, sp
                rest=float(np.radians(rest)), spread=(below, above))  # fmt: skip
 
 
-def _ball(joint: str, limits: tuple[Bounds, Bounds, Bounds], rest: Three, spread: Three) -> list[Dof]:
-    """The rotation vector of a ball joint, degrees."""
-    return [_dof(f"{joint}_{axis}", joint, axis, within, usual, (-wide, wide), "vector")
+def _ball(joint: str, limits: tuple[Bounds, Bounds, Bounds], rest: Three,
+          spread: tuple[float | Bounds, float | Bounds, float | Bounds]) -> list[Dof]:
+    """The rotation vector of a ball joint, degrees; a spread may differ below and above the rest."""
+    return [_dof(f"{joint}_{axis}", joint, axis, within, usual, wide if isinstance(wide, tuple) else (-wide, wide), "vector")
             for axis, within, usual, wide in zip("xyz", limits, rest, spread)]
 
 
@@ -63,7 +64,7 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
     s = sizes
     joints = [Joint("pelvis", None), Joint("chest", "pelvis", (0.0, 0.0, s.lumbar_height)),
               Joint("head", "chest", (0.0, 0.0, s.thorax_height))]  # fmt: skip
-    dofs = [*_root(), *_ball("chest", ((-50, 50), (-30, 80), (-65, 65)), (0, 3, 0), (12, 10, 12)),
+    dofs = [*_root(), *_ball("chest", ((-50, 50), (-30, 80), (-65, 65)), (0, 3, 0), (12, (6, 20), 12)),
             *_ball("head", ((-55, 55), (-70, 75), (-90, 90)), (0, 0, 0), (15, 20, 25))]  # fmt: skip
     for side in SIDES:
         x, y, z = _places(side, s)[0]
