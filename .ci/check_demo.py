@@ -27,7 +27,7 @@ def checked(folder: Path, error: str, most: float, least: float) -> dict[str, bo
         rows = sum(1 for _ in csv.DictReader(file))
     return {
         "run.toml says complete": tomllib.loads((folder / "run.toml").read_text("utf-8"))["complete"],
-        "a row a frame": rows == frames > 100,
+        "a row a frame": rows == frames > 80,
         f"under {LOST:.0%} of the frames lost": errors["lost"] <= LOST * frames,
         f"{error} {errors[error]:.1f}, under {most:.0f}": errors[error] < most,
         f"overlap {metrics['overlap']['mean']:.3f}, over {least}": metrics["overlap"]["mean"] > least,

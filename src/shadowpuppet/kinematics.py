@@ -64,7 +64,8 @@ def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no
 def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma: no cover
     """Transforms of `joints` in a block T (J, 3, 4, B), of the B poses from `begin` on (the last again where they end).
 
-    Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B).
+    Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Called with
+    arguments of the same types from everywhere (all joints are `tree[7]`, no range), it is compiled once.
     """
     first, axes, signs, kinds = tree[1], tree[2], tree[3], tree[4]
     value, sine, cosine = work[3], work[4], work[5]
@@ -147,7 +148,7 @@ def place_all(poses, joints, tree, offsets, root, out, T, work):  # pragma: no c
 def place_points(poses, tree, offsets, root, joints, places, out, T, work):  # pragma: no cover
     """Points (N, P, 3) at `places` (P, 3) in the frames of `joints` (P,). Room: T (J, 3, 4, B), work (6, B)."""
     for begin in range(0, poses.shape[0], T.shape[3]):
-        place_joints(poses, begin, range(T.shape[0]), tree, offsets, root, T, work)
+        place_joints(poses, begin, tree[7], tree, offsets, root, T, work)
         for i in range(joints.size):
             x, y, z = places[i, 0], places[i, 1], places[i, 2]
             for r in range(3):

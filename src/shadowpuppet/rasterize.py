@@ -252,7 +252,7 @@ def _compare(poses, joints, frame, shapes, which, lens, width, masks, block, pag
             outside[c, r], inside[c, r] = ~fixed[c, r] & ~silhouette[c, r], ~fixed[c, r] & silhouette[c, r]
     T, X, Y, counts, boxes, lines, work = block
     if joints.size < T.shape[0]:
-        place_joints(poses[:1], 0, range(T.shape[0]), tree, offsets, root, T, work)
+        place_joints(poses[:1], np.int64(0), tree[7], tree, offsets, root, T, work)
     for begin in range(0, poses.shape[0], T.shape[3]):
         place_joints(poses, begin, joints, tree, offsets, root, T, work)
         _project(begin, shapes, which, lens, block)
@@ -272,7 +272,7 @@ def _draw_corners(X, Y, counts, width, height, boxes, lines, page):  # pragma: n
     """Draw polygons of corners X, Y (S, K, 1) on a page."""
     find_edges(X, Y, counts, float(width), float(height), boxes, lines)
     for s in range(X.shape[0]):
-        draw_outline(s, 0, boxes, lines, float(width), page)
+        draw_outline(s, np.int64(0), boxes, lines, float(width), page)
 
 
 @kernel

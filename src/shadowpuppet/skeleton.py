@@ -118,8 +118,8 @@ class Skeleton:
 
     @cached_property
     def tree(self) -> tuple:
-        """What kernels need: parents (J,), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,), and of each coupling
-        joint and DOF (C, 2) and shift (C, 3)."""
+        """What kernels need: parents (J,), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,), of each coupling joint
+        and DOF (C, 2) and shift (C, 3), and the numbers of all joints (J,)."""
         parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
         owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
         first = np.searchsorted(owners, np.arange(len(self.joints) + 1))
@@ -128,7 +128,7 @@ class Skeleton:
         kinds = np.array([KINDS[dof.kind] for dof in self.dofs], np.int64)
         pairs = [(self.joint_index(c.joint), self.dof_indices([c.dof])[0]) for c in self.couplings]
         shifts = np.array([c.shift for c in self.couplings], float).reshape(-1, 3)
-        return parents, first, axes, signs, kinds, np.array(pairs, np.int64).reshape(-1, 2), shifts
+        return parents, first, axes, signs, kinds, np.array(pairs, np.int64).reshape(-1, 2), shifts, np.arange(len(self.joints))
 
     def joint_index(self, name: str) -> int:
         """Index of a joint. Raises `ShadowPuppetError` with the names there are."""
