@@ -103,7 +103,8 @@ def test_hybrid_keeps_what_image_forces_lose():
 
 @pytest.mark.parametrize("overrides", [
     {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
-    {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
+    {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
+    {"posture": 0.0}, {"explore": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
     {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"hierarchical": False}},
     {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
 ], ids=str)  # fmt: skip
@@ -130,8 +131,9 @@ def test_a_state_says_what_its_pose_costs_and_how_it_moved():
     states = track(of, seen[:3])
     for before, state, (points, masks) in zip(states, states[1:], seen[1:]):
         evidence = Evidence(of.stage, points, masks)
-        costs = of.refiner.costs(state.pose[None], evidence.full) + of.settings.silhouettes * evidence.differing(state.pose[None])
-        assert state.cost == pytest.approx(costs[0])
+        pose = state.pose[None]
+        costs = of.refiner.costs(pose, evidence.full) + of.settings.silhouettes * evidence.differing(pose)
+        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.usual.strain(pose)[0])
         assert state.overlap == evidence.overlap(state.pose)
         np.testing.assert_array_equal(state.velocity, state.pose - before.pose)
         np.testing.assert_array_equal(state.pose, state.particles.best)
