@@ -105,7 +105,7 @@ def test_hybrid_keeps_what_image_forces_lose():
     {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
     {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
     {"posture": 0.0}, {"explore": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
-    {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"hierarchical": False}},
+    {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
     {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
 ], ids=str)  # fmt: skip
 def test_every_setting_runs(overrides):
@@ -115,6 +115,14 @@ def test_every_setting_runs(overrides):
     assert {state.status for state in states} <= {"tracked", "uncertain"}
     assert errors(of, states, poses[:4]).max() < 0.15
     assert states[-1].particles.poses.shape == (of.settings.particles, len(NAMES))
+
+
+def test_without_the_sum_over_what_hangs_on_a_joint_tracking_runs_but_is_worse():
+    poses, seen = actor.filmed()
+    alone, summed = (tracker(refinement="forces", forces={"hierarchical": choice}) for choice in (False, True))
+    states = track(alone, seen[:4])
+    assert all(np.isfinite(state.pose).all() for state in states)
+    assert errors(alone, states, poses[:4]).mean() > errors(summed, track(summed, seen[:4]), poses[:4]).mean()
 
 
 def test_one_particle_is_all_that_image_forces_have():
