@@ -46,7 +46,8 @@ def measured(spread, first=None, expected=MEAN, seed: int = 0, library=None):
 
 def test_girths_are_found_where_the_bones_are_known():
     true, poses, _ = stout()
-    found = measured(spread_of(MEAN, shown=True))
+    spread = spread_of(MEAN, shown=True)
+    found = measured(np.where(spread > EXACT, 4 * spread, spread))  # more than people differ, so that a few frames decide
     before, after = (np.array([abs(getattr(sizes, name) - getattr(true, name)) for name in GIRTHS]) for sizes in (MEAN, found.sizes))
     assert after.sum() < 0.5 * before.sum()
     assert found.frames >= 5

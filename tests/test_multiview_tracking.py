@@ -103,8 +103,9 @@ def test_hybrid_keeps_what_image_forces_lose():
 
 @pytest.mark.parametrize("overrides", [
     {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
-    {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
-    {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"hierarchical": False}},
+    {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
+    {"posture": 0.0}, {"explore": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
+    {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
     {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
 ], ids=str)  # fmt: skip
 def test_every_setting_runs(overrides):
@@ -114,6 +115,14 @@ def test_every_setting_runs(overrides):
     assert {state.status for state in states} <= {"tracked", "uncertain"}
     assert errors(of, states, poses[:4]).max() < 0.15
     assert states[-1].particles.poses.shape == (of.settings.particles, len(NAMES))
+
+
+def test_without_the_sum_over_what_hangs_on_a_joint_tracking_runs_but_is_worse():
+    poses, seen = actor.filmed()
+    alone, summed = (tracker(refinement="forces", forces={"hierarchical": choice}) for choice in (False, True))
+    states = track(alone, seen[:4])
+    assert all(np.isfinite(state.pose).all() for state in states)
+    assert errors(alone, states, poses[:4]).mean() > errors(summed, track(summed, seen[:4]), poses[:4]).mean()
 
 
 def test_one_particle_is_all_that_image_forces_have():
@@ -130,8 +139,9 @@ def test_a_state_says_what_its_pose_costs_and_how_it_moved():
     states = track(of, seen[:3])
     for before, state, (points, masks) in zip(states, states[1:], seen[1:]):
         evidence = Evidence(of.stage, points, masks)
-        costs = of.refiner.costs(state.pose[None], evidence.full) + of.settings.silhouettes * evidence.differing(state.pose[None])
-        assert state.cost == pytest.approx(costs[0])
+        pose = state.pose[None]
+        costs = of.refiner.costs(pose, evidence.full) + of.settings.silhouettes * evidence.differing(pose)
+        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.usual.strain(pose)[0])
         assert state.overlap == evidence.overlap(state.pose)
         np.testing.assert_array_equal(state.velocity, state.pose - before.pose)
         np.testing.assert_array_equal(state.pose, state.particles.best)

@@ -10,13 +10,14 @@ import pytest
 import actor
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.proposals import GLOBAL, MOVED, REACH, Proposals
+from shadowpuppet.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
 from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.subspaces import Subspaces
+from shadowpuppet.usual import usual_arms
 
 SKELETON = actor.body().skeleton
 PLAIN = MultiviewSettings(method="particle_filter", velocity=0.0, defensive=0.25, keep=0.0)
-HYBRID = replace(PLAIN, method="hybrid")
+HYBRID = replace(PLAIN, method="hybrid", explore=0.0)
 D = len(SKELETON.dofs)
 POSE = actor.stance(SKELETON)
 ROOT = SKELETON.dof_indices(GLOBAL)
@@ -62,6 +63,24 @@ def test_what_is_refined_afterwards_is_moved_joint_by_joint_near_and_far():
     far = np.abs((drawn(settings, many()) - POSE)[1:, chest])
     assert far.max() > 2.5 * 0.01 * REACH[1]
     assert far.std() == pytest.approx(0.01 * np.sqrt(MOVED * np.mean(np.square(REACH))), rel=0.15)
+
+
+def test_a_share_tries_an_arm_in_a_usual_posture():
+    still = replace(HYBRID, explore=0.25, sigma_rotation=1e-6, sigma_translation=1e-6, sigma_heading=1e-6)
+    found = drawn(still, many(400))
+    changed = np.abs(found - POSE) > 1e-3
+    assert not changed[:300].any()
+    sides = {side: [d for d, dof in enumerate(SKELETON.dofs) if dof.joint in (f"{side}_shoulder", f"{side}_elbow")]
+             for side in ("left", "right")}
+    left, right = (changed[300:, dofs].any(1) for dofs in sides.values())
+    assert (left ^ right).all()
+    assert 30 < left.sum() < 70
+    assert not changed[:, np.setdiff1d(np.arange(D), sides["left"] + sides["right"])].any()
+    usual = np.stack(list(usual_arms(SKELETON, "left").values()), 1)
+    arms = found[300:][left][:, sides["left"]]
+    off = arms[:, None] - usual
+    assert np.median(np.sqrt((off**2).mean(2)).min(1)) < 1.5 * EXPLORED
+    assert not (np.abs(drawn(replace(still, method="particle_filter"), many(400)) - POSE) > 1e-3).any()
 
 
 @pytest.mark.parametrize("settings", [PLAIN, HYBRID], ids=["particle_filter", "hybrid"])

@@ -112,9 +112,9 @@ def test_gauss_newton_never_raises_what_it_minimises_and_keeps_limits(seed, pull
     pose = some_pose(body, rng)
     points, normals, weights = scan(body, pose, rng, 10)
     cloud = make_cloud(points + rng.normal(0, 0.02, points.shape), normals, weights)
-    poses = body.skeleton.clamp(pose + rng.normal(0, 0.2, (2, len(pose))))
+    poses = body.skeleton.clamp(pose + rng.normal(0, 0.5, (2, len(pose))))
     of, centre = Refiner(body, SURFACE), pose + rng.normal(0, 0.1, len(pose))
-    found = of.gauss_newton(poses, ((cloud, iterations, 0.06),), centre, np.full(len(pose), pull))
+    found = of.gauss_newton(poses, ((cloud, iterations, 0.06),), centre, np.full(len(pose), pull), 1e-4)  # hardly held back at first
 
     def held(poses):
         return of.costs(poses, cloud, 0.06) + pull * ((poses - centre) ** 2).sum(1)
@@ -127,6 +127,21 @@ def test_gauss_newton_never_raises_what_it_minimises_and_keeps_limits(seed, pull
     if iterations == 0:
         np.testing.assert_array_equal(found, poses)
         np.testing.assert_array_equal(forced, poses)
+
+
+@pytest.mark.kernels
+def test_a_step_that_makes_it_worse_is_not_taken():
+    """Hardly held back and far off, some first steps go wrong: the pose is then as it was."""
+    refused = 0
+    for seed in range(40):
+        rng, body = np.random.default_rng(seed), random_tree(seed % 7)
+        pose, of = some_pose(body, rng), Refiner(body)
+        cloud = make_cloud(*scan(body, pose, rng, 10))
+        start = body.skeleton.clamp((pose + rng.normal(0, 0.6, len(pose)))[None])
+        found = of.gauss_newton(start, ((cloud, 1, 0.06),), start, np.zeros(len(pose)), 1e-6)
+        refused += np.array_equal(found, start)
+        assert of.costs(found, cloud, 0.06) <= of.costs(start, cloud, 0.06)
+    assert 0 < refused < 40
 
 
 @pytest.mark.kernels

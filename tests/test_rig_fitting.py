@@ -12,7 +12,7 @@ import pytest
 import actor
 import made
 import made_rig
-from shadowpuppet import cli
+from shadowpuppet import cli, rig_fitting
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
@@ -143,7 +143,8 @@ def test_sizes_of_an_earlier_run_are_used_again(untaught, run, shell):
     assert errors(again).mean() < 0.04
 
 
-def test_without_training_sizes_come_from_the_height_or_from_what_is_seen(untaught, shell):
+def test_without_training_sizes_come_from_the_height_or_from_what_is_seen(untaught, shell, monkeypatch):
+    monkeypatch.setattr(rig_fitting, "AVERAGE_HEIGHT", 1.0)  # which is for those of whom nothing is seen
     found = tracked(shell, untaught, "--height", 1.75)
     assert json.loads(Path("run/look.json").read_text())["person"]["source"] == "the height, and the hulls of the first seconds"
     assert errors(found).mean() < 0.06

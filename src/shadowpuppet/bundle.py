@@ -47,8 +47,8 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
 
     Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull`, one or (F, D), holds poses to
-    `centre` (F, D), or to where they begin, and points count less the farther off they are, both as in `Refiner.gauss_newton`. `first`: sizes to begin with, if not
-    those expected.
+    `centre` (F, D), or to where they begin, and points count less the farther off they are, both as in `Refiner.gauss_newton`. `first`:
+    sizes to begin with, if not those expected.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)

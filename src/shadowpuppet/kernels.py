@@ -19,6 +19,6 @@ joined = numba.njit(**BARE, forceinline=True)
 part = numba.njit(inline="always")
 """A part of one or two kernels, compiled with them only."""
 LOOSE = {"reassoc", "contract", "nsz", "arcp", "nnan"}
-"""Freedom that lets sums and greatest values be taken in lanes; infinities keep their meaning, and what is not a number must not come in."""
+"""Freedom that lets sums and greatest values be taken in lanes; infinities keep their meaning, what is not a number must not come in."""
 summing = numba.njit(**BARE, fastmath=LOOSE)
 """A kernel of sums over finite numbers, which lanes add up in any order."""

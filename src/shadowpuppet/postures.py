@@ -38,8 +38,8 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, evidence: Evi
     """The `number` best poses (number, D) for a frame's surface points, weighed by `weigh`. `library`: poses (L, D) to begin with, of which
     place and heading do not count."""
     postures = usual_postures(body.skeleton)
-    if library is not None and len(library):
-        known = np.asarray(library, float)
+    known = np.asarray([] if library is None else library, float)
+    if len(known):
         postures = np.concatenate([known if len(known) <= MOST else known[np.sort(rng.choice(len(known), MOST, replace=False))], postures])
     poses = placed(body, postures, evidence.full.origin)
     poses = poses[refiner.costs(poses, evidence.cloud(ROUGH[0][0]), ROUGH[0][2]).argsort(kind="stable")[:BEGIN]]

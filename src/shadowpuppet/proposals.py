@@ -61,8 +61,8 @@ class Proposals:
         return self.skeleton.clamp(out)
 
     def _diffused(self, rng: np.random.Generator, poses: Array, scale: float) -> Array:
-        """Gaussian noise on all DOF (Table II's particle filter), or, where poses are refined afterwards, on some joints, near and far; some
-        poses get another arm."""
+        """Gaussian noise on all DOF (Table II's particle filter), or, where poses are refined afterwards, on some joints, near and far;
+        some poses get another arm."""
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
         if self.settings.method == "particle_filter":
             return poses + noise

@@ -147,6 +147,7 @@ class Skeleton:
 
     @cached_property
     def usual(self) -> tuple[Array, Array, Array]:
+        """Rest of every DOF, and how far below and above it is still usual, three arrays (D,)."""
         return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
 
     def strain(self, poses: ArrayLike) -> Array:
