@@ -294,8 +294,8 @@ class MultiviewSettings:
     """Particles that are refined, one that is refined from the last pose, or particles alone (Table II)."""
     refinement: Literal["gauss_newton", "forces"] = "gauss_newton"
     """How poses are refined."""
-    particles: Annotated[int, Field(ge=1, le=1_000_000)] = 16
-    """Particles, N."""
+    particles: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    """Particles, N. Left out: 16 with six cameras or more, 40 with fewer, which see less and are drawn sooner."""
     resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
     """How particles are selected by their weights."""
     defensive: Share = 0.5
@@ -308,13 +308,13 @@ class MultiviewSettings:
     """Noise of the place (m)."""
     sigma_heading: Positive = 0.05
     """Noise of the heading (rad)."""
-    explore: Share = 0.2
+    explore: Share = 0.3
     """Share of the defensive proposals in which an arm is tried in a usual posture: an arm that was lost is found again."""
     velocity: Share = 0.0
     """Share of the last frame's motion of place and heading with which proposals move on."""
     sigma_cost: Positive = 0.003
     """A pose worse than the best by its square (m^2) weighs 1/e (eq. 29)."""
-    silhouettes: NonNegative = 0.002
+    silhouettes: NonNegative = 0.1
     """Weight of the share of pixels in which drawn body and silhouettes differ (m^2), beside the distance of the surface points."""
     posture: NonNegative = 2e-6
     """Pull to usual postures, those of the training motion where there is any (m^2 for each squared deviation): it decides what the

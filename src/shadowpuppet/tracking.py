@@ -34,6 +34,8 @@ ABSENT, LOST, UNCERTAIN = 0.2, 0.5, 0.7
 uncertain. A cardbox that fits overlaps by 0.8 to 0.9."""
 FEW, SMALLEST = 50, 0.5
 """Surface points, and their extent (m), from which on somebody may be there."""
+MANY, FEWER, ENOUGH = 40, 16, 6
+"""Particles with few cameras, with many, and how many are that."""
 SETTLED = 10
 """Cycles on the first frame, after the search."""
 SETTLE = 10
@@ -255,7 +257,9 @@ class MultiviewTracker:
     @cached_property
     def number(self) -> int:
         """Particles."""
-        return 1 if self.settings.method == "image_force" else self.settings.particles
+        if self.settings.method == "image_force":
+            return 1
+        return self.settings.particles or (MANY if len(self.cameras) < ENOUGH else FEWER)
 
     @cached_property
     def stage(self) -> Stage:
