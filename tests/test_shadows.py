@@ -98,10 +98,11 @@ def test_nothing_asked_is_nothing_changed(rng):
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["brightness", "colour", "both"]), st.sampled_from([0.5, 1.0]))
 @settings(max_examples=30, deadline=None)
 def test_what_is_told_at_once_is_what_every_pixel_tells(seed, key, darkest):
-    """The box of sure background changes no label."""
+    """The box of sure background changes no label, and a pixel that is just the background is in it."""
     rng = np.random.default_rng(seed)
     _, _, mean, inverse_sigma = random_labels(rng, (24, 20))
     planes = np.clip(mean + rng.normal(0, 4, mean.shape), 0, 255).astype(np.uint8)
+    planes[0, 0] = mean[0, 0] = 100
     rule = KeyRule(key, mean, inverse_sigma, float(rng.uniform(0.5, 4)), darkest)
     plain = KeyRule(key, mean, inverse_sigma, rule.factor, darkest)
     plain.__dict__["surely_background"] = np.full_like(planes, 255), np.zeros_like(planes)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, PartialCost
+from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
 from shadowpuppet.members import coarse_limbs, dofs_of, limbs_of, parts_of
 from shadowpuppet.rasterize import Picture
 
@@ -38,9 +38,7 @@ def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
     skeleton = picture.body.skeleton
     arms, legs = ([limb for limb in limbs_of(skeleton) if limb.endswith(kind)] for kind in ("arm", "leg"))
     hidden = {arm: parts_of(picture.body, arm) for arm in arms}
-    sideways = skeleton.dof_indices([name for name in SIDEWAYS if name in skeleton.dof_names])
-    poses = np.zeros((161, len(skeleton.dofs)))
-    poses[:, sideways[0]] = np.linspace(-1, 1, 161) * _half_width(picture)
+    sideways, poses = _sideways(picture, np.zeros(len(skeleton.dofs)))
     torso = PartialCost(picture, sideways, hidden=sum(hidden.values(), []))
     pose = poses[np.argmin(torso.costs(Observation.without_legs(mask, picture, poses[80]), poses[80])(poses))]
     observation = Observation.without_legs(mask, picture, pose)
@@ -55,6 +53,24 @@ def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
         ranked = np.argsort(costs, kind="stable")
         tried[limb], pose, least = library[ranked], poses[ranked[0]], float(costs[ranked[0]])
     return FirstPose(pose, least, tried)
+
+
+def beside(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
+    """A pose (D,) moved sideways to where its silhouette has the least cost in a mask (H, W), whatever else is in the mask.
+
+    What is seen of the legs counts wherever the body is: it is the same for all places.
+    """
+    poses = _sideways(picture, pose)[1]
+    return poses[np.argmin(silhouette_costs(picture, Observation.of(mask, np.zeros_like(mask)), poses))]
+
+
+def _sideways(picture: Picture, pose: Array) -> tuple[NDArray[np.int64], Array]:
+    """The DOF that moves the body sideways, and a pose (D,) at places (161, D) all over the picture's width."""
+    skeleton = picture.body.skeleton
+    sideways = skeleton.dof_indices([name for name in SIDEWAYS if name in skeleton.dof_names])
+    poses = np.repeat(pose[None], 161, axis=0)
+    poses[:, sideways[0]] = np.linspace(-1, 1, len(poses)) * _half_width(picture)
+    return sideways, poses
 
 
 def _half_width(picture: Picture) -> float:

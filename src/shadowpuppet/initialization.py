@@ -12,7 +12,7 @@ from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_fr
 from shadowpuppet.bodies import make_body
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices, shown
-from shadowpuppet.first_pose import search
+from shadowpuppet.first_pose import beside, search
 from shadowpuppet.geometry import Array
 from shadowpuppet.hypotheses import Guess, Hypotheses
 from shadowpuppet.masks import NEARLY_ALL, Mask, check_mask, may_be_person
@@ -35,10 +35,6 @@ THICK = 1 / 60
 NEAREST, FARTHEST = 0.3, 2.0
 """A distance that is told, over that at which the upper body (nearest), or the whole person or their level arms (farthest), look as
 large as in a reference: outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
-
-ATTEMPTS, STUCK = 5, 0.5
-"""How often sizes are searched for in references at most: as long as an overlap is under this, where a search has run into a corner, as one
-in ten does in pictures of 160 x 120 pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,21 +65,10 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     guess = _first_guess(camera, names[0], masks[0], height, distance)
     skeleton = make_body("cardbox", guess.sizes).skeleton
     poses = np.array([skeleton.pose(**POSTURES[name]) for name in names])
+    picture = guess.picture(camera, body)
+    poses = np.array([beside(picture, mask, pose) for mask, pose in zip(masks, poses, strict=True)])
     side = skeleton.dof_indices(["torso_y"])
-    for k, mask in enumerate(masks):
-        head = np.flatnonzero(mask[: np.flatnonzero(mask.any(1))[0] + max(mask.shape[0] // 20, 3)].any(0))
-        poses[k, side] = (head.mean() - camera.matrix[0, 2]) / camera.matrix[0, 0] * guess.distance
-    fits = list[Fit]()
-    while len(fits) < ATTEMPTS and (not fits or min(fits[-1].overlaps.values()) < STUCK):
-        hypotheses = Hypotheses(camera, masks, poses.copy(), guess, SizePrior(guess.height), settings, body)
-        fits.append(_searched(rng, hypotheses, names, distance is None, settings))
-    return max(fits, key=lambda fit: min(fit.overlaps.values()))
-
-
-def _searched(rng: np.random.Generator, hypotheses: Hypotheses, names: list[str], free_distance: bool,
-              settings: InitializationSettings) -> Fit:
-    """Algorithm 1's loop over the subsets, some times over."""
-    side = make_body("cardbox", hypotheses.guess.sizes).skeleton.dof_indices(["torso_y"])
+    hypotheses = Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings, body)
     curves: dict[str, list[tuple[float, ...]]] = {}
     for sweep in range(settings.sweeps):
         for subset, sizes in SUBSETS.items():
@@ -94,7 +79,7 @@ def _searched(rng: np.random.Generator, hypotheses: Hypotheses, names: list[str]
                 continue
             k = names.index(view)
             free = [*sizes, *(SUBSETS["O3"] if subset == "O1" and sweep else ())]
-            columns = np.concatenate([hypotheses.columns(free, distance=free_distance and subset != "O2"),
+            columns = np.concatenate([hypotheses.columns(free, distance=distance is None and subset != "O2"),
                                       hypotheses.pose_columns(k, side)])
             curve = hypotheses.search(rng, columns, [k], settings, settings.sigma / 2**sweep)
             curves.setdefault(subset, []).append(tuple(curve))
