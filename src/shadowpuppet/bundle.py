@@ -24,7 +24,8 @@ Measured = TypeVar("Measured", bound=Sizes)
 NUDGE = 1e-3
 """Step (m) by which what a size does to the points is found."""
 NOISE, WORTH = 0.01, 30.0
-"""Deviation (m) of a surface point from its body, and how many points of a frame tell something of their own: neighbours err alike."""
+"""Deviation (m) of a surface point from its body, and how many points of a frame tell something of their own: neighbours err alike, and
+all points of a body of simple shape."""
 ROUNDS = 10
 FARTHEST, FARTHEST_TURN = 0.03, 0.3
 """No size (m) and no DOF (rad or m) goes farther in a round."""
@@ -43,7 +44,7 @@ class Bundle(Generic[Measured]):
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
-                 first: Measured | None = None) -> Bundle[Measured]:
+                 first: Measured | None = None, worth: float = WORTH) -> Bundle[Measured]:
     """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
 
     Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull`, one or (F, D), holds poses to
@@ -52,7 +53,7 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
-    free, scale = np.flatnonzero(spread > 0), WORTH / NOISE**2
+    free, scale = np.flatnonzero(spread > 0), worth / NOISE**2
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)

@@ -34,6 +34,8 @@ ROUNDS = 2
 """How often the first frames are tracked and the sizes solved for."""
 FRAMES, SHARE = 24, 4
 """Frames that are solved for together, at most, and every which of their points is taken."""
+WORTH = {"anatomical": 30.0, "cylinders": 0.2}
+"""What a frame's points are worth for the sizes (see `bundle.WORTH`): cylinders fit nobody, and would pay for it with wrong bones."""
 SIZE_PULL = 1e-5
 """Pull of the poses to where the tracker had them."""
 WORSE = 0.06
@@ -81,7 +83,8 @@ def measure(rng: np.random.Generator, make: Callable[[Measured], Body], expected
         clouds = [Evidence(tracker.stage, *first[found[i][0]]).cloud(SHARE) for i in chosen]
         rest = settings.posture * np.array([tracker.usual.pull(pose) for pose in poses])
         centre = (SIZE_PULL * poses + rest * tracker.usual.rest) / (SIZE_PULL + rest)
-        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=SIZE_PULL + rest, centre=centre, first=sizes)
+        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=SIZE_PULL + rest, centre=centre, first=sizes,
+                              worth=WORTH[settings.body])
         sizes, residual = bundle.sizes, bundle.residual
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library)
     found = _followed(rng, tracker, first)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -237,7 +237,9 @@ class MultiviewTracker:
         if s.method == "particle_filter":
             return None
         if s.refinement == "forces" or s.method == "image_force":
-            return lambda poses: self.refiner.forces(poses, evidence.full, s.forces)
+            some, half = evidence.cloud(g.share), s.forces.iterations // 2  # far from the goal, some of the points are enough
+            first, last = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
+            return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, first), evidence.full, last)
         clouds = (evidence.cloud(g.share), g.coarse, g.coarse_tau), (evidence.full, g.fine, g.fine_tau)
         rest = s.posture * self.usual.pull(last)
         centre = (g.pull * last + rest * self.usual.rest) / (g.pull + rest + 1e-30)
