@@ -12,7 +12,7 @@ from typing import Generic
 
 import numpy as np
 
-from shadowpuppet.anthropometry import shares_of, stature_of
+from shadowpuppet.anthropometry import AVERAGE_HEIGHT, shares_of, stature_of
 from shadowpuppet.body import Body
 from shadowpuppet.bundle import Measured, solve_bundle
 from shadowpuppet.camera import Camera
@@ -21,6 +21,7 @@ from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.masks import Mask
 from shadowpuppet.settings import MultiviewSettings
+from shadowpuppet.sizes import HEIGHTS
 from shadowpuppet.tracking import MultiviewState, MultiviewTracker
 from shadowpuppet.visual_hull import SurfacePoints
 from shadowpuppet.whole_sizes import BoneSizes
@@ -34,12 +35,16 @@ ROUNDS = 2
 """How often the first frames are tracked and the sizes solved for."""
 FRAMES, SHARE = 24, 4
 """Frames that are solved for together, at most, and every which of their points is taken."""
-WORTH = {"anatomical": 30.0, "cylinders": 0.2}
+WORTH = {"anatomical": 10.0, "cylinders": 0.2}
 """What a frame's points are worth for the sizes (see `bundle.WORTH`): cylinders fit nobody, and would pay for it with wrong bones."""
 SIZE_PULL = 1e-5
 """Pull of the poses to where the tracker had them."""
 WORSE = 0.06
 """A frame whose overlap is less than the best one's by this was misunderstood."""
+SHARES, TRIED = (0.8, 0.86, 0.93, 1.0, 1.08, 1.2), 5
+"""Heights that are tried, as shares of the extent, and frames in which they are."""
+UNUSUAL, DEVIATION = 0.02, 0.1
+"""What a height costs more for each squared deviation (m) from the average."""
 ENOUGH = 4
 """Frames in which the person must be found."""
 
@@ -92,6 +97,23 @@ def measure(rng: np.random.Generator, make: Callable[[Measured], Body], expected
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
     return Person(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found))
+
+
+def likely_height(rng: np.random.Generator, make: Callable[[float], Body], cameras: Sequence[Camera],
+                  first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings) -> float | None:
+    """How tall (m) whoever the `first` frames show may be: of bodies of several heights, `make` makes them, the one that is found best in
+    some frames. None where nobody is. Arms overhead look tall and who crouches looks small, so that the extent alone does not tell."""
+    seen = seen_height(first)
+    if seen is None:
+        return None
+    plain, chosen = replace(settings, method="hybrid", refinement="gauss_newton"), first[:: max(1, len(first) // TRIED)][:TRIED]
+    costs = []
+    for height in (heights := [seen * share for share in SHARES if HEIGHTS[0] <= seen * share <= HEIGHTS[1]]):
+        tracker = MultiviewTracker(make(height), tuple(cameras), plain)
+        found = [tracker.start(rng, points, masks) for points, masks in chosen]
+        unusual = 1 + UNUSUAL * ((height - AVERAGE_HEIGHT) / DEVIATION) ** 2
+        costs.append(unusual * np.mean([state.cost for state in found if state.status != "absent"] or [np.inf]))
+    return heights[int(np.argmin(costs))] if heights else None
 
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,

@@ -12,7 +12,7 @@ from shadowpuppet.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.measuring import measure, seen_height, spread_of
+from shadowpuppet.measuring import likely_height, measure, spread_of
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options
 from shadowpuppet.priors import familiar
@@ -41,7 +41,8 @@ def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options
     elif known.sizes is not None:
         sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", spread_of(known.sizes, shown=True)
     else:
-        seen = height or seen_height(first) or AVERAGE_HEIGHT
+        seen = height or likely_height(rng, lambda tall: make_body(settings.body, average_sizes(settings.body, tall)), rig.cameras, first,
+                                       settings) or AVERAGE_HEIGHT
         sizes = average_sizes(settings.body, seen)
         source = f"{'the height' if height else f'a height of {seen:.2f} m as seen'}, and the hulls of the first seconds"
         assert isinstance(sizes, BoneSizes)
