@@ -238,8 +238,8 @@ class MultiviewTracker:
             return None
         if s.refinement == "forces" or s.method == "image_force":
             some, half = evidence.cloud(g.share), s.forces.iterations // 2  # far from the goal, some of the points are enough
-            first, last = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
-            return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, first), evidence.full, last)
+            coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
+            return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), evidence.full, fine)
         clouds = (evidence.cloud(g.share), g.coarse, g.coarse_tau), (evidence.full, g.fine, g.fine_tau)
         rest = s.posture * self.usual.pull(last)
         centre = (g.pull * last + rest * self.usual.rest) / (g.pull + rest + 1e-30)
