@@ -96,7 +96,9 @@ def test_hybrid_keeps_what_image_forces_lose():
 
     hybrid, forces = np.array([away("hybrid", seed) for seed in range(3)]), away("image_force")
     assert np.median(hybrid) < 0.02
-    assert forces[:2].max() < 0.08 and forces.max() > 0.15 and np.median(forces) > 2 * np.median(hybrid)
+    assert forces[:2].max() < 0.08
+    assert forces.max() > 0.15
+    assert np.median(forces) > 2 * np.median(hybrid)
     assert forces[3] > 0.1
     assert forces.mean() > 1.5 * hybrid.mean()
 
