@@ -86,9 +86,8 @@ def measure(rng: np.random.Generator, make: Callable[[Measured], Body], expected
         chosen = np.unique(np.linspace(0, len(found) - 1, FRAMES).astype(int))
         poses = np.array([found[i][1].pose for i in chosen])
         clouds = [Evidence(tracker.stage, *first[found[i][0]]).cloud(SHARE) for i in chosen]
-        rest = settings.posture * np.array([tracker.usual.pull(pose) for pose in poses])
-        centre = (SIZE_PULL * poses + rest * tracker.usual.rest) / (SIZE_PULL + rest)
-        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=SIZE_PULL + rest, centre=centre, first=sizes,
+        centre, pull = map(np.array, zip(*(tracker.usual.held(pose, SIZE_PULL, settings.posture) for pose in poses), strict=True))
+        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
                               worth=WORTH[settings.body])
         sizes, residual = bundle.sizes, bundle.residual
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library)

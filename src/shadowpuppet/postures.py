@@ -14,9 +14,9 @@ from shadowpuppet.body import Body
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.particle_filter import Particles, Weigh, evaluate
-from shadowpuppet.proposals import GLOBAL
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.usual import usual_arms, usual_postures
+from shadowpuppet.whole_skeleton import GLOBAL
 
 HEADINGS = 16
 """Directions that are tried."""

@@ -10,9 +10,8 @@ from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.usual import usual_arms
+from shadowpuppet.whole_skeleton import GLOBAL
 
-GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
-"""Degrees of freedom that a prior of articulation leaves to a walk."""
 REACH = (0.3, 1.0, 2.0)
 """What the noise of a defensive proposal is multiplied by, one of these each."""
 EXPLORED = 0.4

@@ -42,6 +42,11 @@ SETTLE = 10
 """Frames' worth of cycles on the first mask, after the search."""
 
 
+def _status(overlap: float) -> str:
+    """What an overlap says of an estimate."""
+    return "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
+
+
 class State(NamedTuple):
     """What a tracker knows after a frame; all that the next one needs."""
 
@@ -126,8 +131,7 @@ class MonocularTracker:
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
         """The state with its cost, overlap and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
-        status = "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
-        return State(pose, tuple(particles), cost, overlap, status)
+        return State(pose, tuple(particles), cost, overlap, _status(overlap))
 
     def is_absent(self, mask: NDArray[np.bool_], pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
@@ -241,15 +245,13 @@ class MultiviewTracker:
             coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
             return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), evidence.full, fine)
         clouds = (evidence.cloud(g.share), g.coarse, g.coarse_tau), (evidence.full, g.fine, g.fine_tau)
-        rest = s.posture * self.usual.pull(last)
-        centre = (g.pull * last + rest * self.usual.rest) / (g.pull + rest + 1e-30)
-        return lambda poses: self.refiner.gauss_newton(poses, clouds, centre, g.pull + rest, g.damping)
+        centre, pull = self.usual.held(last, g.pull, s.posture)
+        return lambda poses: self.refiner.gauss_newton(poses, clouds, centre, pull, g.damping)
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
         """The state with its cost, overlap and status."""
         overlap = evidence.overlap(pose)
-        status = "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
-        return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, status)
+        return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, _status(overlap))
 
     def is_present(self, evidence: Evidence) -> bool:
         """Whether there is enough of a person: points on a hull of a size that a person has."""

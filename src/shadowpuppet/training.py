@@ -20,9 +20,8 @@ from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.settings import PriorSettings
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.vqpca import Choice, Fit, choose_regions, fit_prior
+from shadowpuppet.whole_skeleton import GLOBAL
 
-GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
-"""What `articulation` leaves out: where a person is, and whither they look."""
 RATE = 60.0
 """Frames/s that are learnt where nothing else is wanted: HumanEva's, and the recordings' of the paper."""
 DOUBTFUL, WRONG = 0.03, 0.1

@@ -53,6 +53,11 @@ class Usual:
         fade = 1 + self._squared(pose[None])[0] / BOUND
         return 1 / (np.where(pose < self.rest, self.below, self.above) * fade) ** 2
 
+    def held(self, pose: Array, pull: float, weight: float) -> tuple[Array, Array]:
+        """Where a pose (D,) is held that is pulled to itself, and by the `weight` of its strain to rest: centre and pull, each (D,)."""
+        rest = weight * self.pull(pose)
+        return (pull * pose + rest * self.rest) / (pull + rest + 1e-30), pull + rest
+
     def _squared(self, poses: Array) -> Array:
         off = poses - self.rest
         return (off / np.where(off < 0, self.below, self.above)) ** 2

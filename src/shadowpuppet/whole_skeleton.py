@@ -15,6 +15,8 @@ SIDES = ("left", "right")
 Bounds = tuple[float, float]
 Three = tuple[float, float, float]
 FREE = (-np.inf, np.inf)
+GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
+"""Degrees of freedom that say where a person is and whither they look, which no prior of articulation models."""
 SWING = {"left": ("-y", "x", "z"), "right": ("-y", "-x", "-z")}
 """Axes about which a hanging limb swings forward, swings outward, and twists outward."""
 
