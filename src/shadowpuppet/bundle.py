@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
-from shadowpuppet.closest import LANES, Cloud, Single, constants, measure, nearest, place_parts
+from shadowpuppet.closest import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel
 from shadowpuppet.screws import Chain, make_chain, place_one
@@ -191,10 +191,8 @@ def _tangents(T, joints, rotations, starts, parts, rows, spheres, origin, epsilo
             for i in range(LANES):
                 if own[LANES + i] != s:
                     continue
-                f0, f1, f2, at = room[2 * LANES + i], room[3 * LANES + i], room[4 * LANES + i], group * LANES + i
-                x = q[0] * f0 + q[3] * f1 + q[6] * f2 + q[9]
-                y = q[1] * f0 + q[4] * f1 + q[7] * f2 + q[10]
-                z = q[2] * f0 + q[5] * f1 + q[8] * f2 + q[11]
+                at = group * LANES + i
+                x, y, z = foot(q, room, i)
                 nx, ny, nz = points[3 * LANES + i], points[4 * LANES + i], points[5 * LANES + i]
                 share = own[i] / tau
                 fade = one / (one + share * share)

@@ -153,6 +153,13 @@ def _greatest(near):  # pragma: no cover
 
 
 @part
+def foot(q, out, i):  # pragma: no cover
+    """The closest point that `measure` found for point number i, metres from the cloud's origin."""
+    u, v, w = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
+    return (q[0] * u + q[3] * v + q[6] * w + q[9], q[1] * u + q[4] * v + q[7] * w + q[10], q[2] * u + q[5] * v + q[8] * w + q[11])
+
+
+@part
 def _load(rows, i):  # pragma: no cover
     """Point and normal number i of a group."""
     return rows[i], rows[LANES + i], rows[2 * LANES + i], rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]

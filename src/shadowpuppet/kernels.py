@@ -18,7 +18,8 @@ joined = numba.njit(**BARE, forceinline=True)
 """A kernel that another calls so often that the call itself would take time: LLVM puts it in its place."""
 part = numba.njit(inline="always")
 """A part of one or two kernels, compiled with them only."""
-LOOSE = {"reassoc", "contract", "nsz", "arcp", "nnan"}
-"""Freedom that lets sums and greatest values be taken in lanes; infinities keep their meaning, what is not a number must not come in."""
+LOOSE = {"contract", "nsz", "arcp", "nnan"}
+"""Freedom that lets a loop over lanes become one of vectors; infinities keep their meaning, what is not a number must not come in. Sums
+keep their order: what is compiled now and what is loaded from the cache next time are optimised apart, and would differ in the last bit."""
 summing = numba.njit(**BARE, fastmath=LOOSE)
-"""A kernel of sums over finite numbers, which lanes add up in any order."""
+"""A kernel of sums over finite numbers, lane by lane."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
-from shadowpuppet.closest import LANES, Cloud, constants, measure, nearest, place_parts
+from shadowpuppet.closest import LANES, Cloud, constants, foot, measure, nearest, place_parts
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel, part, summing
@@ -132,10 +132,7 @@ def _add_equations(q, number, rows, near, tau, out, lanes):  # pragma: no cover
     measures, multiplied with one another (21, by rows of the upper triangle) and with the distance to the tangent plane (6)."""
     one, nil = np.float32(1), np.float32(0)
     for i in range(LANES):
-        f0, f1, f2 = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
-        x = q[0] * f0 + q[3] * f1 + q[6] * f2 + q[9]
-        y = q[1] * f0 + q[4] * f1 + q[7] * f2 + q[10]
-        z = q[2] * f0 + q[5] * f1 + q[8] * f2 + q[11]
+        x, y, z = foot(q, out, i)
         nx, ny, nz = rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
         r = (rows[i] - x) * nx + (rows[LANES + i] - y) * ny + (rows[2 * LANES + i] - z) * nz
         share = near[i] / tau
@@ -308,10 +305,7 @@ def _add_forces(q, number, rows, near, tau, mode, out, lanes):  # pragma: no cov
     nil = np.float32(0)
     bounded, modulated = mode & ROBUST, mode & MODULATED
     for i in range(LANES):
-        f0, f1, f2 = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
-        x = q[0] * f0 + q[3] * f1 + q[6] * f2 + q[9]
-        y = q[1] * f0 + q[4] * f1 + q[7] * f2 + q[10]
-        z = q[2] * f0 + q[5] * f1 + q[8] * f2 + q[11]
+        x, y, z = foot(q, out, i)
         dx, dy, dz = rows[i] - x, rows[LANES + i] - y, rows[2 * LANES + i] - z
         distance = np.sqrt(dx * dx + dy * dy + dz * dz) + np.float32(1e-9)
         size = max(out[LANES + i], nil) * distance if modulated else distance
