@@ -8,7 +8,7 @@ import numba
 
 BLOCK = 32
 """Poses side by side in memory, so that one instruction works on eight (AVX-512) or four (AVX2) of them."""
-BARE: dict[str, Any] = {"cache": True, "_nrt": False, "error_model": "numpy"}
+BARE: dict[str, Any] = {"cache": True, "nogil": True, "_nrt": False, "error_model": "numpy"}
 """A kernel gets all its arrays and makes none, so that Numba counts no references: where arrays are sliced in inner loops, that took more
 time than the work. Nor are divisions checked, which would keep loops from being vectorised: no kernel divides by zero.
 

@@ -120,14 +120,14 @@ def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = Fa
 
     Pictures belong to one set that are nearest to its time, within half the time from set to set. A camera whose film breaks off or
     ends is missing from there on, which is said once. `ready`: the recording's ready silhouettes are read too. `every`: of so many sets
-    one is given, and only in its pictures silhouettes are made. The cameras of a set
-    are worked on side by side, by `threads` (the processor's cores, if left out), while the one before is used; the sets are the
-    same for any number. A set is held at a time, and the next.
+    one is given, and only in its pictures silhouettes are made. The cameras of a set are worked on side by side, while the one before is
+    used, by `threads`: if left out, as many as the processor has cores, less one that tracks. The sets are the same for any number. A set
+    is held at a time, and the next.
     """
     reels = [_Reel(footage, see, ready) for footage, see in zip(rig.footage, seen)]
     leaders, step = rig.leaders, 1 / rig.rate
     with contextlib.ExitStack() as stack:
-        pool = ThreadPoolExecutor(threads or usable_cores(), "camera")
+        pool = ThreadPoolExecutor(threads or max(1, usable_cores() - 1), "camera")
         stack.callback(pool.shutdown, cancel_futures=True)
         for future in [pool.submit(reel.advance) for reel in reels]:
             future.result()

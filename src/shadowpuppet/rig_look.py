@@ -124,7 +124,7 @@ def open_with(rig: Rig, seen: Sequence[Silhouettes], ready: bool) -> Opening:
     every = max(1, round(OPENING * rig.rate / OPENED))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when the run comes to it
-        sets = [(each.time, each.masks) for each in islice(follow(rig, seen, ready=ready, every=every), OPENED)]
+        sets = [(each.time, each.masks) for each in islice(follow(rig, seen, ready=ready, every=every, threads=usable_cores()), OPENED)]
     sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
     return Opening([time for time, _ in sets], [masks for _, masks in sets])
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -133,12 +134,12 @@ def _follow(run: RunWriter, prepared: PreparedRig, puppet: Puppet, options: Opti
     began = time.perf_counter()
     try:
         with (_overlay(run.folder, rig, puppet.body, options.overlay) as overlay,
-              contextlib.closing(follow(rig, prepared.silhouettes, ready=options.masks)) as sets):  # fmt: skip
-            for seen in watch.each("wait", sets):
+              contextlib.closing(follow(rig, prepared.silhouettes, ready=options.masks)) as sets,
+              contextlib.closing(_ahead(sets, puppet.hull)) as hulls):  # fmt: skip
+            for seen, points, carving in watch.each("wait", hulls):
                 watch.add("decode", seen.decoding)
                 watch.add("segment", seen.segmenting)
-                with watch.time("hull"):
-                    points = puppet.hull.points(seen.masks)
+                watch.add("hull", carving)
                 with watch.time("track"):
                     state = next_state(puppet.tracker, rng, state, points, seen.masks)
                 with watch.time("write"):
@@ -150,6 +151,22 @@ def _follow(run: RunWriter, prepared: PreparedRig, puppet: Puppet, options: Opti
                 listener.advance(frames)
     finally:
         run.metrics |= timings(watch, frames, time.perf_counter() - began)
+
+
+def _ahead(sets: Iterable[FrameSet], hull: VisualHull) -> Generator[tuple[FrameSet, SurfacePoints, float]]:
+    """Each set with its surface points and the seconds these took: the next is made by another thread while one is tracked."""
+    source = iter(sets)
+
+    def carved() -> tuple[FrameSet, SurfacePoints, float] | None:
+        seen = next(source, None)
+        start = time.perf_counter()
+        return None if seen is None else (seen, hull.points(seen.masks), time.perf_counter() - start)
+
+    with ThreadPoolExecutor(1, "hull") as thread:
+        coming = thread.submit(carved)
+        while (found := coming.result()) is not None:
+            coming = thread.submit(carved)
+            yield found
 
 
 def next_state(tracker: RigTracker, rng: np.random.Generator, state: Any, points: SurfacePoints, masks: Sequence[Mask | None]) -> Any:
