@@ -96,7 +96,7 @@ def _upright(path: Path, table: JointTable) -> JointTable:
 
 def up_axis(table: JointTable) -> str:
     """The axis along which a person is upright, such as `+y`; `+z` where none is clearly."""
-    low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip"), ("neck", "head", "shoulder")))
+    low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip", "pelvis"), ("neck", "head", "shoulder")))
     up = high - low
     lengths = np.linalg.norm(up, axis=1, keepdims=True)
     known = np.isfinite(lengths[:, 0]) & (lengths[:, 0] > 0)
