@@ -147,7 +147,7 @@ class RunWriter:
                 table.close()
         motion = self._motion.build()
         # What matters most is written first: where the disk is full, it is the rest that is missing.
-        write_whole(self.folder / "motion.npz", _npz(motion))
+        write_whole(self.folder / "motion.npz", motion_bytes(motion))
         counts = {"complete": complete, "frames": len(motion), "status": motion.status_counts}
         write_metrics(self.folder, counts | self.metrics)
         self._write_info(complete)
@@ -207,7 +207,7 @@ def _check_folder(folder: Path) -> bool:
     return True
 
 
-def _npz(motion: Motion) -> bytes:
+def motion_bytes(motion: Motion) -> bytes:
     """The motion's fields as an archive of arrays."""
     out = io.BytesIO()
     np.savez_compressed(out, allow_pickle=False, **{f.name: np.asarray(getattr(motion, f.name)) for f in fields(motion)})
