@@ -51,7 +51,7 @@ class Animation:
                 raise ShadowPuppetError(f"{name}: found shape {getattr(self, name).shape}, expected {shape}")
         roots = [j for j, parent in enumerate(self.parents) if parent < 0]
         if roots != [0] or len(self.parents) != J or any(parent >= j for j, parent in enumerate(self.parents)):
-            raise ShadowPuppetError(f"parents: found {self.parents} of {J} joints, expected -1 for the first and earlier ones for the others")
+            raise ShadowPuppetError(f"parents: found {self.parents} of {J} joints, expected -1 for the first, earlier ones for others")
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:

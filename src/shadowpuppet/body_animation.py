@@ -23,6 +23,7 @@ SAME = 1e-4
 SHORTEST = 0.01
 """Metres; of a bone's end."""
 Three = tuple[float, float, float]
+Known = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class BodyTree:
 
     def animation(self, times: Array, poses: Array, roots: Array) -> Animation:
         """The tree in poses (T, D) at times (T,), seconds; `roots` (4, 4) or (T, 4, 4): the body's frame to the world."""
-        known = np.isfinite(poses).all(1)
+        known: Known = np.asarray(np.isfinite(poses).all(1))
         frames = self.body.skeleton.forward(np.where(known[:, None], poses, 0.0))
         rotations, shifts = (np.empty((len(poses), len(self.nodes), *shape)) for shape in ((3, 3), (3,)))
         for n, node in enumerate(self.nodes):
@@ -127,7 +128,8 @@ class BodyTree:
         skeleton = self.body.skeleton
         moved = {coupling.joint for coupling in skeleton.couplings} | {dof.joint for dof in skeleton.dofs if dof.kind == "translation"}
         for j, other in enumerate(skeleton.joints):
-            if other.parent == skeleton.joints[joint].name and other.name not in moved and np.abs(np.subtract(other.offset, place)).max() < NEAR:
+            near = np.abs(np.subtract(other.offset, place)).max() < NEAR
+            if near and other.parent == skeleton.joints[joint].name and other.name not in moved:
                 return j
         return None
 
@@ -148,7 +150,7 @@ class BodyTree:
         """How far the body's shapes reach beyond a leaf, along its bone; from a joint, toward the farthest of them."""
         start = np.zeros(3) if leaf.place is None else np.array(leaf.place)
         shapes = self.body.shapes
-        joints = np.broadcast_to(shapes.joints, shapes.joints.shape[:1] + (4,)) if isinstance(shapes, Quads) else shapes.joints
+        joints = np.broadcast_to(shapes.joints, (*shapes.joints.shape[:1], 4)) if isinstance(shapes, Quads) else shapes.joints
         centres = shapes.corners if isinstance(shapes, Quads) else shapes.centres
         radii = np.zeros_like(centres) if isinstance(shapes, Quads) else shapes.radii
         own = joints == leaf.joint
@@ -168,7 +170,7 @@ def motion_animation(body: Body, motion: Motion) -> tuple[Animation, float]:
     Where the body's frame stands in the world is found from the joints: the same in all frames, as with cameras that stay; where that does
     not fit, as after somebody was measured anew in a live run, in each frame. Raises `ShadowPuppetError` where no frame is known.
     """
-    known = np.isfinite(motion.poses).all(1) & np.isfinite(motion.joints).all((1, 2))
+    known: Known = np.asarray(np.isfinite(motion.poses).all(1) & np.isfinite(motion.joints).all((1, 2)))
     if not known.any():
         raise ShadowPuppetError("found no frame with a pose, expected one at least")
     names = [name for name in motion.joint_names if name in body.landmark_names]

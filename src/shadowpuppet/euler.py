@@ -20,8 +20,8 @@ SINGULAR = 1e-7
 def continuous_angles(rotations: Array, order: str, limits: ArrayLike | None = None) -> Array:
     """Angles (T, 3), rad, of turns about the axes of `order` that make rotations (T, 3, 3), each about the axes as turned by those before.
 
-    Every rotation is made by two triples, and by more of whole turns: the path of least steps is taken, so that angles may pass half a turn;
-    of such paths the one that strays least from `limits` (3, 2), rad, where they are given.
+    Every rotation is made by two triples, and by more of whole turns: the path of least steps is taken, so that angles may pass half a
+    turn; of such paths the one that strays least from `limits` (3, 2), rad, where they are given.
     """
     axes = ["XYZ".index(axis) for axis in order]
     low, high = np.reshape([-np.pi, np.pi] * 3 if limits is None else limits, (3, 2)).T

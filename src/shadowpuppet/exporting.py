@@ -46,8 +46,8 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
     """Write a run's motion in each of `formats`, names of `EXPORTS`, as `<run>.<format>` in `out` (default: export/ in the run folder).
 
     unit: of BVH files, m, cm or mm. What a format cannot hold is said as a warning. A killed run is exported as far as it came. Raises a
-    `ShadowPuppetError` for an unknown format, a run that cannot be read or has no frame, or has no person.toml where a format needs the body;
-    files that were written before stay.
+    `ShadowPuppetError` for an unknown format, a run that cannot be read or has no frame, or has no person.toml where a format needs the
+    body; files that were written before stay.
     """
     unknown = [name for name in formats if name not in EXPORTS]
     if unknown or not formats:
@@ -106,7 +106,8 @@ def _fitted(source: Path, target: Path, table: JointTable, unit: str) -> str:
         write_mot(target, animation.times, coordinates(animation))
     else:
         _write_skeleton(target, animation, body_mesh(found.body), unit)
-    return f"a body's poses fitted to {len(table.names)} joints, {len(table.times)} frames, {1000 * found.residual:.1f} mm beside them (rms)"
+    off = f"{1000 * found.residual:.1f} mm beside them (rms)"
+    return f"a body's poses fitted to {len(table.names)} joints, {len(table.times)} frames, {off}"
 
 
 def _write_skeleton(target: Path, animation: Animation, mesh: Mesh, unit: str) -> None:
@@ -128,7 +129,7 @@ class _Export:
         """Of the sizes in person.toml."""
         path, name = self.run.folder / "person.toml", self.run.motion.body_name
         if not path.exists():
-            raise FormatError(f"{path}: found no such file, expected the person's sizes, which BVH, GLB and MOT need; the other formats do not")
+            raise FormatError(f"{path}: found no such file, expected the person's sizes, which BVH, GLB and MOT need; other formats do not")
         return make_body(name, read_person(path, name).sizes)
 
     @cached_property
@@ -138,8 +139,8 @@ class _Export:
             raise FormatError(f"{self.run.folder}: found degrees of freedom that are not those of the body {self.body.name!r}")
         animation, off = motion_animation(self.body, self.run.motion)
         if off > STRAY:
-            warn(f"{self.run.folder}: the joints of the body in person.toml lie up to {1000 * off:.0f} mm off the run's: the person was measured "
-                 "anew while it was made", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+            warn(f"{self.run.folder}: the joints of the body in person.toml lie up to {1000 * off:.0f} mm off the run's: the person was "
+                 "measured anew while it was made", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
         return animation
 
     @property
@@ -150,8 +151,8 @@ class _Export:
     @property
     def angles(self) -> dict[str, tuple[str, Array]]:
         """Degrees of freedom as files for people have them: unit and values (T,)."""
-        motion = self.run.motion
-        return {name: ("m", column) if dof_unit(name) == "m" else ("deg", np.degrees(column)) for name, column in zip(motion.dof_names, motion.poses.T)}
+        columns = zip(self.run.motion.dof_names, self.run.motion.poses.T)
+        return {name: ("m", column) if dof_unit(name) == "m" else ("deg", np.degrees(column)) for name, column in columns}
 
 
 def _made(folder: Path) -> Path:

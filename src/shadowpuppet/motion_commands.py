@@ -12,7 +12,8 @@ from shadowpuppet.flags import PriorFlags, given, output
 ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 
 
-def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, or .amc beside its .asf.")], /, *,
+def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, .npz, .parquet, or .amc "
+                                                                             "beside its .asf.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
               rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
               flags: ForPrior = None) -> None:  # fmt: skip

@@ -1,7 +1,7 @@
 """What OpenSim calls our joints, and a skeleton's motion as the coordinates of its full-body model.
 
-Markers are called as Pose2Sim's marker sets for OpenSim call them; coordinates are those of the full-body model of Rajagopal et al. (2016), which
-has arms. Its world and its bodies have X forward, Y up, Z to the right, and ball joints turn about Z, then X, then Y.
+Markers are called as Pose2Sim's marker sets for OpenSim call them; coordinates are those of the full-body model of Rajagopal et al.
+(2016), which has arms. Its world and its bodies have X forward, Y up, Z to the right, and ball joints turn about Z, then X, then Y.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError
@@ -63,8 +64,9 @@ COORDINATES: tuple[Ball | Hinge, ...] = (
         Hinge(f"{side}_elbow", f"elbow_flex_{s}", -1),
     )),
 )  # fmt: skip
-"""In the order of the file. A knee bends by positive angles, an ankle bends up; hips and arms are positive forward, inward, and turned inward.
-The upper body's `torso` is the chest. The turn of the head, and an ankle's inversion about an axis that is not the model's, are left out."""
+"""In the order of the file. A knee bends by positive angles, an ankle bends up; hips and arms are positive forward, inward, and turned
+inward. The upper body's `torso` is the chest. The turn of the head, and an ankle's inversion, about an axis that is not the model's, are
+left out."""
 PLACES = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 TO_MODEL = np.array([[0.0, 0, 1], [0, 1.0, 0], [-1.0, 0, 0]])
 """From a skeleton's axes at rest (left, up, forward) to the model's (forward, up, right)."""
@@ -85,9 +87,10 @@ def coordinates(animation: Animation) -> dict[str, Array]:
     if animation.names[0] != "pelvis" or not len(known):
         raise ShadowPuppetError(f"found {len(known)} known frames of a skeleton from {animation.names[0]!r}, expected some, from 'pelvis'")
     turns = {name: animation.rotations[known][:, n] for n, name in enumerate(animation.names)}
-    turns = {"chest": turns[name] for name in ("torso",) if name in turns} | turns
+    if "torso" in turns:
+        turns["chest"] = turns["torso"]
     turns["pelvis"] = Y_UP @ turns["pelvis"] @ TO_MODEL.T
-    found = dict(zip(PLACES, (animation.shifts[known, 0] @ Y_UP.T).T))
+    found: dict[str, Array] = dict(zip(PLACES, (animation.shifts[known, 0] @ Y_UP.T).T))
     for part in COORDINATES:
         if part.joint not in turns or not _turns(turns[part.joint]):
             continue
@@ -128,7 +131,7 @@ def _hinge(R: Array, first: bool) -> Array:
     return np.unwrap(np.arctan2(-R[:, 1, 2], R[:, 2, 2] if first else R[:, 1, 1]))
 
 
-def _spread(values: Array, known: Array, frames: int) -> Array:
+def _spread(values: Array, known: NDArray[np.int64], frames: int) -> Array:
     out = np.full(frames, np.nan)
     out[known] = values
     return out

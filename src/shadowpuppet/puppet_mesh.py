@@ -75,8 +75,8 @@ def bone_mesh(animation: Animation) -> Mesh:
     for joint, along in bones:
         length = float(np.linalg.norm(along))
         if length > 1e-6:
-            radius = min(STICK * length, THICKEST)
-            points, triangles = _tube(np.array([[radius, radius], [0.4 * radius] * 2]), length, np.zeros(2), np.array([radius, 0.4 * radius]))
+            wide = min(STICK * length, THICKEST) * np.array([1.0, 0.4])
+            points, triangles = _tube(np.stack([wide, wide], 1), length, np.zeros(2), wide)
             turned = points @ _toward(along / length).T + rest[joint]
             patches.append(_Patch(turned, triangles, np.full(len(points), joint), _colour(animation.names[joint])))
     if not patches:  # one joint alone

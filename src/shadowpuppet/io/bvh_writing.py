@@ -7,6 +7,7 @@ from pathlib import Path
 from warnings import warn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
@@ -25,10 +26,10 @@ LEAST_END = (0.0, 0.0, 0.0)
 def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     """Write an animated skeleton: constant offsets, Euler angles in degrees, Y up.
 
-    The format has no gaps and no times: frames that are not known are carried over from those before and after them, and where frames do not
-    come at a constant rate they are found anew at one; either is said as a warning. A joint has the channels Z, X, Y where these stay away from
-    the posture in which they are singular, and others where they do not; places only where they change. `unit`: m (as Blender takes it), cm
-    or mm. Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
+    The format has no gaps and no times: frames that are not known are bridged from those before and after them, and where frames do not
+    come at a constant rate they are found anew at one; either is said as a warning. A joint turns about Z, X, Y where these stay away from
+    the posture in which they are singular, and in another order where they do not; it has places only where they change. `unit`: m (as
+    Blender takes it), cm or mm. Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
     """
     path = Path(path)
     if unit not in METRES:
@@ -58,12 +59,12 @@ def in_step(path: Path, animation: Animation) -> tuple[float, Animation]:
              ShadowPuppetWarning, stacklevel=3)  # fmt: skip
     unknown = int((~animation.known).sum()) + (0 if grid.frames is None else int((grid.frames < 0).sum()))
     if unknown:
-        warn(f"{path}: {unknown} of {len(grid.times)} frames are not known, which this format cannot tell: the person is moved on evenly from "
-             "the frame before to the one after", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+        warn(f"{path}: {unknown} of {len(grid.times)} frames are not known, which this format cannot tell: the person is moved on evenly "
+             "from the frame before to the one after", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
     return grid.rate, made
 
 
-def _own_times(animation: Animation, times: Array, frames: Array) -> Array:
+def _own_times(animation: Animation, times: Array, frames: NDArray[np.int64]) -> Array:
     """The frames' own times where there is one, so that nothing is interpolated that is known."""
     return np.where(frames >= 0, animation.times[np.maximum(frames, 0)], times)
 

@@ -1,4 +1,4 @@
-"""C3D files written: points as floats with residuals, and beside them values such as angles as analog channels; `c3d.py` has the reading."""
+"""C3D files written: points as floats with residuals, and angles as analog channels; `c3d.py` has the reading."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from warnings import warn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.clips import resampled
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
@@ -26,14 +27,16 @@ UNSEEN = -1.0
 """The residual of a place that is not known."""
 Parameter = tuple[str, int, Sequence[int], bytes]
 """Name, kind, shape and value."""
+Angles = Mapping[str, tuple[str, Array]]
+"""Names to units and values (T,)."""
 
 
-def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Mapping[str, tuple[str, Array]] | None = None) -> None:
+def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None) -> None:
     """Write joints as points in millimetres, axes as they stand, and `angles` as analog channels, one value a frame.
 
-    spread: standard deviations (T, J), metres, as the points' residuals, whole millimetres; left out or not a number: 0. An unknown place has
-    the residual -1, as the format wants it. angles: a name to its unit and values (T,), not a number where unknown. Times become frames at
-    one rate: missing ones are unknown; where frames do not come at a constant rate they are found anew, which is said as a warning.
+    spread: standard deviations (T, J), metres, as the points' residuals, whole millimetres; left out or not a number: 0. An unknown place
+    has the residual -1, as the format wants it. angles: not a number where unknown. Times become frames at one rate: missing ones are
+    unknown; where frames do not come at a constant rate they are found anew, which is said as a warning.
     Raises `ShadowPuppetError` where there is no frame, a name is too long, or the file cannot be written.
     """
     path, angles = Path(path), angles or {}
@@ -41,9 +44,10 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
     if bad or not table.names:
         raise ShadowPuppetError(f"{path}: found the name {shorten(bad, 60)!r}, expected points with names of at most {LONGEST} letters")
     deviations = np.full(table.positions.shape[:2], np.nan) if spread is None else spread
-    columns = np.concatenate([table.positions.reshape(len(table.times), -1), deviations, *(values[:, None] for _, values in angles.values())], 1)
-    rate, columns = _in_step(path, table.times, columns)
-    count, points = len(columns), len(table.names)
+    count, points = len(table.times), len(table.names)
+    columns = [table.positions.reshape(count, 3 * points), deviations, *(values[:, None] for _, values in angles.values())]
+    rate, columns = _in_step(path, table.times, np.concatenate(columns, 1))
+    count = len(columns)
     places, deviations, analog = np.split(columns, [3 * points, 4 * points], 1)
     data = np.concatenate([_points(places.reshape(count, points, 3), deviations).reshape(count, -1), analog], 1).astype("<f4")
     blocks, section = 0, b""
@@ -73,7 +77,7 @@ def _in_step(path: Path, times: Array, values: Array) -> tuple[float, Array]:
 
 def _points(places: Array, deviations: Array) -> Array:
     """Points (T, J, 4) in the file's unit, with their residuals."""
-    known = np.isfinite(places).all(2)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(2))
     residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), 255)), 0.0)
     return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNSEEN)[..., None]], 2)
 
@@ -84,7 +88,7 @@ def _header(points: int, analog: int, count: int, start: int, rate: float) -> by
     return head.ljust(BYTES, b"\0")
 
 
-def _groups(names: Sequence[str], angles: Mapping[str, tuple[str, Array]], rate: float, count: int, start: int) -> dict[str, list[Parameter]]:
+def _groups(names: Sequence[str], angles: Angles, rate: float, count: int, start: int) -> dict[str, list[Parameter]]:
     end = (count & 0xFFFF, count >> 16)
     point = [_whole("USED", len(names)), _whole("FRAMES", min(count, 0xFFFF)), _whole("DATA_START", start), _real("SCALE", -1.0),
              _real("RATE", rate), _real("LONG_FRAMES", count), *_words("LABELS", names), *_words("DESCRIPTIONS", [" "] * len(names)),
@@ -92,7 +96,8 @@ def _groups(names: Sequence[str], angles: Mapping[str, tuple[str, Array]], rate:
     used = len(angles)
     analog = [_whole("USED", used), _real("RATE", rate), _real("GEN_SCALE", 1.0), _word("FORMAT", "SIGNED"), _whole("BITS", 16)]
     if used:
-        analog += [*_words("LABELS", tuple(angles)), *_words("DESCRIPTIONS", [" "] * used), *_words("UNITS", [unit for unit, _ in angles.values()]),
+        units = [unit for unit, _ in angles.values()]
+        analog += [*_words("LABELS", tuple(angles)), *_words("DESCRIPTIONS", [" "] * used), *_words("UNITS", units),
                    ("SCALE", FLOAT, (used,), np.ones(used, "<f4").tobytes()), ("OFFSET", INT, (used,), np.zeros(used, "<i2").tobytes())]
     trial = [("ACTUAL_START_FIELD", INT, (2,), struct.pack("<2H", 1, 0)), ("ACTUAL_END_FIELD", INT, (2,), struct.pack("<2H", *end)),
              _real("CAMERA_RATE", rate)]

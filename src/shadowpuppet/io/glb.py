@@ -29,16 +29,17 @@ TURN = 1e-7
 def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
     """Write a skinned mesh and its animation: metres, Y up, times from 0.
 
-    Frames that are not known have no keys: there the puppet has no size, so that it is not to be seen, and `extras.unknown` of the animation
-    lists them as pairs of seconds, from and to. That is said as a warning. Raises `ShadowPuppetError` where no frame is known or the file cannot be
-    written.
+    Frames that are not known have no keys: there the puppet has no size, so that it is not to be seen, and `extras.unknown` of the
+    animation lists them as pairs of seconds, from and to. That is said as a warning. Raises `ShadowPuppetError` where no frame is known or
+    the file cannot be written.
     """
     path, known = Path(path), np.flatnonzero(animation.known)
     if not len(known):
         raise ShadowPuppetError(f"{path}: found no frame in which the whole skeleton is known, expected one at least")
     gaps = len(animation.times) - len(known)
     if gaps:
-        warn(f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them", ShadowPuppetWarning, stacklevel=2)
+        told = f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them"
+        warn(told, ShadowPuppetWarning, stacklevel=2)
     buffer = _Buffer()
     primitive = _primitive(buffer, mesh)
     skin = buffer.add(_inverse_bind(animation), "MAT4", FLOAT)

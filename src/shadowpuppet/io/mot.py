@@ -39,7 +39,8 @@ def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> No
     table = table[np.isfinite(table).all(1)]
     if not len(table) or not values:
         raise ShadowPuppetError(f"{path}: found no frame in which all of {len(values)} coordinates are known, expected one at least")
-    head = [path.stem, "version=1", f"nRows={len(table)}", f"nColumns={table.shape[1]}", "inDegrees=yes", "endheader", "\t".join(["time", *values])]
+    sizes = [f"nRows={len(table)}", f"nColumns={table.shape[1]}"]
+    head = [path.stem, "version=1", *sizes, "inDegrees=yes", "endheader", "\t".join(["time", *values])]
     rows = ("\t".join(f"{value + 0.0:.6f}" for value in row) for row in table.round(6).tolist())
     write_whole(path, "\n".join([*head, *rows, ""]))
 
@@ -63,7 +64,8 @@ def read_mot(path: str | Path) -> Coordinates:
     table = table.reshape(-1, len(columns))
     check_times(path, table[:, 0], [n for n, _ in numbered])
     if header.get("nRows", str(len(table))).strip() != str(len(table)):
-        warn(f"{path}: nRows: found {header['nRows']}, but the file has {len(table)} rows; those are used", ShadowPuppetWarning, stacklevel=2)
-    degrees = header.get("inDegrees", "no").strip().lower() == "yes"
-    angle = np.pi / 180 if degrees else 1.0
-    return Coordinates(table[:, 0], {name: column * (1.0 if name.endswith(LENGTHS) else angle) for name, column in zip(columns[1:], table.T[1:])})
+        told = f"{path}: nRows: found {header['nRows']}, but the file has {len(table)} rows; those are used"
+        warn(told, ShadowPuppetWarning, stacklevel=2)
+    angle = np.pi / 180 if header.get("inDegrees", "no").strip().lower() == "yes" else 1.0
+    values = zip(columns[1:], table.T[1:])
+    return Coordinates(table[:, 0], {name: column * (1.0 if name.endswith(LENGTHS) else angle) for name, column in values})

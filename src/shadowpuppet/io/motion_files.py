@@ -39,10 +39,10 @@ TURNS = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0), (
 def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None) -> JointTable:
     """Joints from a file of motion: .csv or .trc (`read_joints`), .bvh, .c3d, .npz, .parquet, or .amc with its .asf beside it.
 
-    Joints have our names, metres, Z up, whatever the file's names, unit and axes are; joints of other names are left out, or all are kept as
-    they are called there (`own_names`). What the file does not tell, its unit (BVH) or which axis is up, is found from the person's legs and
-    posture, and said as a warning. `unit`: metres of a BVH file's unit, where that is known. `rate`: frames/s of an .amc file, which tells
-    none (default 120). Raises `FormatError`, naming the file.
+    Joints have our names, metres, Z up, whatever the file's names, unit and axes are; joints of other names are left out, or all are kept
+    as they are called there (`own_names`). What the file does not tell, its unit (BVH) or which axis is up, is found from the person's legs
+    and posture, and said as a warning. `unit`: metres of a BVH file's unit, where that is known. `rate`: frames/s of an .amc file, which
+    tells none (default 120). Raises `FormatError`, naming the file.
     """
     path = Path(path)
     ending = path.suffix.lower()

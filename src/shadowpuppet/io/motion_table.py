@@ -20,11 +20,13 @@ Columns = dict[str, Array | NDArray[np.str_]]
 
 
 def motion_columns(motion: Motion) -> Columns:
-    """`time`, each joint's `_x`, `_y`, `_z` (world, metres) and `_sd_x`, ..., `status`, `cost`, `overlap`, then degrees of freedom, whose names
-    have their unit behind them, `chest_x [rad]`, so that none is taken for a joint's. What is not known in any frame has no column.
+    """`time`, each joint's `_x`, `_y`, `_z` (world, metres) and `_sd_x`, ..., `status`, `cost`, `overlap`, then degrees of freedom.
+
+    The names of these have their unit behind them, `chest_x [rad]`, so that none is taken for a joint's. What is not known in any frame has
+    no column.
     """
     found: Columns = table_columns(motion.table)
-    spread = motion.joint_sd.reshape(len(motion), -1).T
+    spread = motion.joint_sd.reshape(len(motion), 3 * len(motion.joint_names)).T
     found |= dict(zip(joint_columns(motion.joint_names, "_sd"), spread))
     found |= {"status": motion.status, "cost": motion.cost, "overlap": motion.overlap}
     for values, suffix in ((motion.poses, ""), (motion.pose_sd, "_sd")):
@@ -35,7 +37,8 @@ def motion_columns(motion: Motion) -> Columns:
 
 def table_columns(table: JointTable) -> Columns:
     """`time`, and each joint's `_x`, `_y`, `_z`."""
-    return {"time": table.times} | dict(zip(joint_columns(table.names), table.positions.reshape(len(table.times), -1).T))
+    found: Columns = {"time": table.times}
+    return found | dict(zip(joint_columns(table.names), table.positions.reshape(len(table.times), 3 * len(table.names)).T))
 
 
 def dof_unit(name: str) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import lzma
+import struct
 import zipfile
 import zlib
 from pathlib import Path
@@ -15,6 +17,10 @@ from shadowpuppet.motion import JointTable
 
 ARRAYS = ("times", "joint_names", "joints")
 """Seconds (T,), names (J,), and places (T, J, 3) in the world, metres, not a number where unknown."""
+
+BROKEN = (EOFError, ValueError, TypeError, KeyError, OverflowError, MemoryError, RuntimeError, SyntaxError, struct.error, zlib.error,
+          lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
+"""What reading raises, beside `OSError`, where an archive is damaged, encrypted or none."""
 
 
 def write_npz(path: str | Path, table: JointTable) -> None:
@@ -36,6 +42,6 @@ def read_npz(path: str | Path) -> JointTable:
         return JointTable(times, tuple(names.astype(str).ravel().tolist()), joints)
     except OSError as error:
         problem = error.strerror or str(error)
-    except (EOFError, ValueError, TypeError, AttributeError, zlib.error, zipfile.BadZipFile, ShadowPuppetError, NotImplementedError) as error:
+    except (*BROKEN, AttributeError, ShadowPuppetError) as error:
         problem = str(error)
     raise FormatError(f"{path}: no joints ({problem.lower()}), expected an archive with the arrays {', '.join(ARRAYS)}")

@@ -22,7 +22,8 @@ TOLD = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up;
 def write_parquet(path: str | Path, columns: Columns) -> None:
     """Write columns; null where not a number. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
     arrow, parquet = _arrow(path)
-    arrays = {name: arrow.array(column.tolist() if column.dtype.kind == "U" else column, from_pandas=True) for name, column in columns.items()}
+    values = {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()}
+    arrays = {name: arrow.array(column, from_pandas=True) for name, column in values.items()}
     out = io.BytesIO()
     parquet.write_table(arrow.table(arrays).replace_schema_metadata(TOLD), out)
     write_whole(Path(path), out.getvalue())

@@ -18,9 +18,9 @@ ENDINGS = (".amc", ".bvh")
 CMU = {"root": "Hips", "lowerback": "LowerBack", "upperback": "Spine", "thorax": "Spine1", "lowerneck": "Neck", "upperneck": "Neck1",
        "head": "Head", **{f"{side[0].lower()}{bone}": f"{side}{name}" for side in ("Left", "Right") for bone, name in (
            ("hipjoint", "HipJoint"), ("femur", "UpLeg"), ("tibia", "Leg"), ("foot", "Foot"), ("toes", "ToeBase"), ("clavicle", "Shoulder"),
-           ("humerus", "Arm"), ("radius", "ForeArm"), ("wrist", "Hand"), ("hand", "FingerBase"), ("fingers", "HandIndex1"),
+           ("humerus", "Arm"), ("radius", "ForeArm"), ("wrist", "ForeArmTwist"), ("hand", "Hand"), ("fingers", "FingerBase"),
            ("thumb", "Thumb"))}}  # fmt: skip
-"""What the joint at which a bone of the CMU database begins is called in BVH files."""
+"""What the joint at which a bone of the CMU database begins is called as in BVH files; wrists and fingers where `amc.ENDS` has them."""
 
 
 def read_animation(path: str | Path, rate: float | None = None, unit: float | None = None) -> Animation:
@@ -74,7 +74,7 @@ def _of_capture(capture: Capture, rate: float) -> Animation:
     """A joint where each bone begins, which is where the one above it ends."""
     bones = capture.skeleton.bones
     along = np.array([bone.direction * bone.length for bone in bones])
-    parents = tuple([-1, *(bone.parent + 1 for bone in bones)])
+    parents = (-1, *(bone.parent + 1 for bone in bones))
     offsets = np.array([np.zeros(3), *(along[bone.parent] if bone.parent >= 0 else np.zeros(3) for bone in bones)])
     T, world = len(capture.root), capture.rotations
     rotations, shifts = np.empty((T, len(parents), 3, 3)), np.tile(offsets, (T, 1, 1))
