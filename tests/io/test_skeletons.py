@@ -7,6 +7,7 @@ import pytest
 
 import acclaim
 import biovision
+from damage import told_or_read
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.amc import ENDS, read_mocap
 from shadowpuppet.io.bvh_writing import write_bvh
@@ -99,6 +100,20 @@ def test_places_that_move_within_the_skeleton_stay(tmp_path):
     with pytest.warns(ShadowPuppetWarning):
         again = read_animation(tmp_path / "b.bvh")
     np.testing.assert_allclose(again.table.positions, animation.table.positions, atol=2e-5)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("ending", ["bvh", "amc"])
+def test_damaged_files_are_read_or_told(tmp_path, rng, ending):
+    acclaim.write(tmp_path, 2)
+    whole = biovision.person(3) if ending == "bvh" else (tmp_path / "01_01.amc").read_text()
+    path = tmp_path / f"01_02.{ending}"
+    for n in range(50):
+        letters = list(whole)
+        for place in rng.integers(0, len(letters), 3):
+            letters[place] = str(rng.choice(list("0123456789.-e {}\nx")))
+        path.write_text("".join(letters[: rng.integers(0, len(letters))] if n % 4 == 0 else letters))
+        assert told_or_read(lambda: read_animation(path).table, path.name), n
 
 
 def test_other_files_are_refused(tmp_path):
