@@ -164,16 +164,16 @@ def _made(folder: Path) -> Path:
 
 
 EXPORTS: dict[str, Callable[[_Export, Path], None]] = {
-    "bvh": lambda export, path: write_bvh(path, export.animation, export.unit),
     "c3d": lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles),
     "trc": lambda export, path: write_trc(path, marker_names(export.run.motion.table)),
-    "mot": lambda export, path: write_mot(path, export.run.motion.times, coordinates(export.animation)),
     "csv": lambda export, path: write_columns_csv(path, motion_columns(export.run.motion)),
-    "parquet": lambda export, path: write_parquet(path, motion_columns(export.run.motion)),
-    "glb": lambda export, path: write_glb(path, export.animation, body_mesh(export.body)),
     "npz": lambda export, path: write_whole(path, motion_bytes(export.run.motion)),
+    "bvh": lambda export, path: write_bvh(path, export.animation, export.unit),
+    "glb": lambda export, path: write_glb(path, export.animation, body_mesh(export.body)),
+    "mot": lambda export, path: write_mot(path, export.run.motion.times, coordinates(export.animation)),
+    "parquet": lambda export, path: write_parquet(path, motion_columns(export.run.motion)),
 }
-"""How a run is written in each format."""
+"""How a run is written in each format; those that need person.toml come later, and pyarrow last."""
 TABLES: dict[str, Callable[[Path, JointTable], None]] = {
     ".c3d": write_c3d, ".csv": write_joints, ".npz": write_npz, ".parquet": lambda path, table: write_parquet(path, table_columns(table)),
     ".trc": lambda path, table: write_trc(path, marker_names(table)),

@@ -68,6 +68,19 @@ def test_an_independent_reader_finds_points_residuals_rate_units_and_angles(tmp_
     np.testing.assert_allclose(analog, np.stack([values for _, values in angles.values()], 1), rtol=1e-6)
 
 
+def test_ezc3d_finds_the_same(tmp_path, rng):
+    ezc3d = pytest.importorskip("ezc3d")
+    made = table(rng)
+    made.positions[4] = np.nan
+    bends = rng.uniform(-90, 90, 20)
+    write_c3d(tmp_path / "a.c3d", made, angles={"left_knee_flexion": ("deg", bends)})
+    found = ezc3d.c3d(str(tmp_path / "a.c3d"))
+    assert found["parameters"]["POINT"]["LABELS"]["value"] == list(made.names)
+    assert found["parameters"]["ANALOG"]["LABELS"]["value"] == ["left_knee_flexion"]
+    np.testing.assert_allclose(found["data"]["points"][:3].transpose(2, 1, 0) / 1000, made.positions, atol=1e-6)
+    np.testing.assert_allclose(found["data"]["analogs"][0, 0], bends, rtol=1e-6)
+
+
 def test_long_motions_have_more_frames_than_16_bits_tell(tmp_path, rng):
     made = table(rng, 70_000, ("neck",), 100.0)
     write_c3d(tmp_path / "long.c3d", made)

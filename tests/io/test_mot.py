@@ -98,6 +98,22 @@ def test_markers_have_names_of_opensim_and_y_up_and_come_back(tmp_path, rng):
     np.testing.assert_allclose(back.select(motion.joint_names).positions, motion.joints, atol=1e-6)
 
 
+def test_opensim_reads_both_files(tmp_path):
+    opensim = pytest.importorskip("opensim")
+    motion = read_run(runs.make_run(tmp_path / "run", lost=(3,))).motion
+    values = coordinates(motion_animation(runs.body_of("anatomical"), motion)[0])
+    write_mot(tmp_path / "a.mot", motion.times, values)
+    write_trc(tmp_path / "a.trc", marker_names(motion.table))
+    table, markers = opensim.TimeSeriesTable(str(tmp_path / "a.mot")), opensim.TimeSeriesTableVec3(str(tmp_path / "a.trc"))
+    assert (table.getNumRows(), markers.getNumRows()) == (39, 40)
+    knee = table.getDependentColumn("knee_angle_r").to_numpy()
+    np.testing.assert_allclose(knee, np.degrees(np.delete(values["knee_angle_r"], 3)), atol=1e-5)
+    row = markers.getRowAtIndex(9)
+    place = [row[markers.getColumnIndex("LKnee")][axis] for axis in range(3)]
+    assert np.isnan(markers.getRowAtIndex(3)[markers.getColumnIndex("RAnkle")][2])
+    np.testing.assert_allclose(place, 1000 * motion.joints[9, motion.joint_names.index("left_knee")] @ MODEL.T, atol=1e-3)
+
+
 def test_frames_that_are_not_known_have_no_row(tmp_path):
     motion = read_run(runs.make_run(tmp_path / "run", lost=(0, 5, 6))).motion
     write_mot(tmp_path / "a.mot", motion.times, coordinates(motion_animation(runs.body_of("anatomical"), motion)[0]))
