@@ -100,6 +100,12 @@ def test_a_killed_run_is_exported_as_far_as_it_came(shell, whole, tmp_path):
     np.testing.assert_allclose(found, motion.joints[:11], atol=1e-4)
 
 
+def test_without_pyarrow_all_others_are_written(shell, whole, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "Parquet needs pyarrow" in refused(shell, "export", whole, "--to", "all", "-o", tmp_path / "out")
+    assert {path.suffix[1:] for path in (tmp_path / "out").iterdir()} == set(EXPORTS) - {"parquet"}
+
+
 def test_units_of_bvh(shell, whole, tmp_path):
     assert shell("export", whole, "--to", "bvh", "--unit", "cm", "-o", tmp_path)[0] == 0
     hips = read_bvh(tmp_path / "walk.bvh").joints().select(["pelvis"]).positions
