@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from shadowpuppet.camera import Camera
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+    from shadowpuppet.exporting import convert_motion, export_run
     from shadowpuppet.initialization import find_person, fit_references
     from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.io.calibration import read_calibration, write_calibration
@@ -61,7 +62,7 @@ _HOMES = {
     "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
     "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
     "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking", "MultiviewSettings": "settings",
-    "make_multiview_settings": "settings",
+    "make_multiview_settings": "settings", "export_run": "exporting", "convert_motion": "exporting",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -73,7 +74,8 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "write_calibration", "write_frames", "write_joints", "write_person",
     "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
     "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
-    "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings",
+    "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings", "export_run",
+    "convert_motion",
 ]  # fmt: skip
 
 

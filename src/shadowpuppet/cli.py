@@ -270,6 +270,8 @@ def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool 
 
 app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
+app.command(motion_commands.export)
+app.command(motion_commands.convert)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:

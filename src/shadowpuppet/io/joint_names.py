@@ -16,7 +16,7 @@ JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
 CENTRAL = {
     "pelvis": ("pelvis", "hips", "midhip", "chip", "spinebase", "hip", "pelo"),
     "neck": ("neck", "trxo"),
-    "head": ("head", "hedo"),
+    "head": ("head", "hedo", "headbase"),
 }
 """Joints without a side and what they are called, in the order of preference; letters and digits only, small.
 
