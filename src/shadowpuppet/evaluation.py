@@ -194,8 +194,8 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTa
         return replace(truth, positions=back.apply(truth.positions)), told | {"moved": True}
     if told.get("apart"):
         warn(f"the run's joints are {told['mean_mm']:.0f} mm from the truth's, but {told['aligned_mm']:.0f} mm once the run is turned by "
-             f"{told['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(told['moved_mm']):.0f} mm as a whole: are they in two worlds, "
-             "or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
+             f"{told['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(told['moved_mm']):.0f} mm as a whole: are they in two "
+             "worlds, or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
     return truth, told | ({"moved": False} if told else {})
 
 

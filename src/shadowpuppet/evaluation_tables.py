@@ -12,8 +12,8 @@ from rich.console import RenderableType
 from shadowpuppet.intervals import LEVELS
 from shadowpuppet.tables import angle_table, error_table, measures_table, pairs, plain_table
 
-WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved", "root": "from the {root}",
-        "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled"}
+WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved",
+        "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled"}
 """The ways in which runs are laid over truths (`measures.aligned_errors`), in words."""
 FEW = 3
 """Degrees of freedom in a row of a list of them."""
@@ -57,8 +57,8 @@ def losses_words(losses: Mapping[str, Any]) -> str:
     """How many frames have no pose, and how long that lasted."""
     if not losses["frames"]:
         return "no frame"
-    return (f"{losses['frames']} frames ({100 * losses['share']:.1f} %) in {losses['gaps']} gaps; the longest {losses['longest_frames']} frames, "
-            f"{losses['longest_s']:.2f} s, from {losses['longest_from_s']:.2f} s")
+    return (f"{losses['frames']} frames ({100 * losses['share']:.1f} %) in {losses['gaps']} gaps; the longest {losses['longest_frames']} "
+            f"frames, {losses['longest_s']:.2f} s, from {losses['longest_from_s']:.2f} s")
 
 
 def world_words(world: Mapping[str, Any]) -> str:
@@ -74,7 +74,8 @@ def clock_words(clock: Mapping[str, Any]) -> str:
         return rates + (f"; {clock['offset_s']:+.3f} s added to the truth's times" if clock["offset_s"] else "")
     before = clock["speed_error_before_m_s"]
     was = f", {before:.2f} before" if np.isfinite(before) else ""
-    return f"{rates}; {clock['offset_s']:+.3f} s found and added to the truth's times (speeds differ by {clock['speed_error_m_s']:.2f} m/s{was})"
+    return (f"{rates}; {clock['offset_s']:+.3f} s found and added to the truth's times (speeds differ by "
+            f"{clock['speed_error_m_s']:.2f} m/s{was})")
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -86,7 +87,8 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "world", world_words(measured["world"])
     axes = measured["axes_mm"]
     if axes:
-        yield "axes", ", ".join(f"{axis} {axes[axis]['mean']:+.1f}, rmse {axes[axis]['rmse']:.1f}" for axis in "xyz") + " (mm, run less truth)"
+        said = (f"{axis} {axes[axis]['mean']:+.1f} (rmse {axes[axis]['rmse']:.1f})" for axis in "xyz")
+        yield "axes", ", ".join(said) + " mm, run less truth"
     human = measured["humaneva"]
     if "mean_mm" in human:
         yield "HumanEva", f"{human['mean_mm']:.1f} mm (sd {human['sd_mm']:.1f}) over its 15 joints"

@@ -26,10 +26,11 @@ def axis_errors(errors: JointErrors) -> dict[str, Any]:
     """Signed mean (run less truth), its standard deviation and root mean square along the world's axes, mm, of all joints and each; what is
     lost is left out."""
     def along(delta: Array) -> dict[str, dict[str, float]]:
-        told = {axis: 1000 * delta[..., k][np.isfinite(delta[..., k])] for k, axis in enumerate("xyz")}
+        known = delta[np.isfinite(delta).all(-1)]
+        told = {axis: 1000 * known[:, k] for k, axis in enumerate("xyz")}
         return {axis: {"mean": float(d.mean()), "sd": float(d.std()), "rmse": float(np.sqrt((d**2).mean()))} for axis, d in told.items()}
 
-    seen = np.isfinite(errors.delta).all(2)
+    seen = np.asarray(np.isfinite(errors.delta).all(2))
     joints = {name: along(errors.delta[:, j]) for j, name in enumerate(errors.names) if seen[:, j].any()}
     return {**along(errors.delta), "joints": joints} if joints else {}
 
@@ -73,8 +74,8 @@ def whole_alignment(run: JointTable, truth: JointTable, errors: JointErrors) -> 
 
 
 def worlds(errors: JointErrors, run: JointTable, truth: JointTable) -> dict[str, Any]:
-    """How far run and truth are apart as a whole: the mean error (mm) as they stand and after one rigid motion of the whole, which turns the
-    run by `rotation_deg` about `axis` and moves its middle by `moved_mm`; `apart` where that makes nearly all of a large error good.
+    """How far run and truth are apart as a whole: the mean error (mm) as they stand and after one rigid motion of the whole, which turns
+    the run by `rotation_deg` about `axis` and moves its middle by `moved_mm`; `apart` where that makes most of a large error good.
 
     Empty where no joint is known of both.
     """
@@ -143,8 +144,8 @@ def bone_errors(run: JointTable, truth: JointTable) -> dict[str, dict[str, float
 
 
 def losses(motion: Motion) -> dict[str, Any]:
-    """Frames without a pose while somebody is there or may be: how many, what share, in how many gaps; and the longest, which lasts from the
-    frame before it to the one after."""
+    """Frames without a pose, lost or absent: how many, what share, in how many gaps; and the longest, which lasts from the frame before it
+    to the one after."""
     blank = np.isin(motion.status, BLANK)
     gaps = runs_of(blank)
     said: dict[str, Any] = {"frames": int(blank.sum()), "share": float(blank.mean()) if len(motion) else 0.0, "gaps": len(gaps)}

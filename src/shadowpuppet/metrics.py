@@ -83,7 +83,7 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
     across = delta @ (LEVEL if camera is None else camera.T_camera_world[:3, :3]).T
     distances = (np.linalg.norm(delta, axis=2), np.linalg.norm(across[..., :2], axis=2), np.abs(across[..., 2]),
                  np.linalg.norm(delta - _offsets(delta), axis=2))
-    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances), delta)
+    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances), delta=delta)
 
 
 def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:

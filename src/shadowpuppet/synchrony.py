@@ -19,6 +19,8 @@ DENSER = 0.75
 """A truth whose steps are less than so much of the run's is interpolated, not the run."""
 SHARED, LEAST = 0.5, 12
 """Share of the shorter motion's speeds that must meet for an offset to count, and how many at least."""
+SPAN = 0.25
+"""Seconds over which a speed is taken: over a frame it would be mostly the run's jitter."""
 CLEAR = 0.7
 """An offset is found where the error of speed is less than so much of the usual one."""
 ELSEWHERE, RIVAL = 0.3, 1.15
@@ -98,11 +100,11 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
     the other; between whole steps by trying. Raises `ShadowPuppetError` where no offset stands out.
     """
     names = [name for name in run.names if name in truth.names]
+    ours, theirs = run.select(names), truth.select(names)
     step = max(step_of(run.times), step_of(truth.times))
     if not names or not np.isfinite(step):
         raise ShadowPuppetError("sync: found no joint that run and truth share in two frames or more, so the clocks cannot be compared")
-    ours, theirs = (_speeds(table.select(names), step) for table in (run, truth))
-    lags, errors = _by_lag(ours, theirs)
+    lags, errors = _by_lag(*(_speeds(table, _steps(table, step)) for table in (ours, theirs)))
     if not np.isfinite(errors).any():
         raise ShadowPuppetError(f"sync: run and truth share fewer than {LEAST} speeds at every offset, so the clocks cannot be compared")
     offsets = run.times[0] - truth.times[0] + lags * step
@@ -110,30 +112,34 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
     elsewhere = np.where(np.abs(offsets - offsets[best]) > ELSEWHERE, errors, np.nan)
     usual = np.nanmedian(elsewhere) if np.isfinite(elsewhere).any() else np.inf
     if not errors[best] < CLEAR * usual:
-        raise ShadowPuppetError(f"sync: the best offset, {offsets[best]:.3f} s, leaves {errors[best]:.3f} m/s of speed error, the usual one "
-                                f"{usual:.3f}: none stands out; give --offset")
-    seconds = _refined(run, truth, names, float(offsets[best]), step)
+        raise ShadowPuppetError(f"sync: the best offset, {offsets[best]:.3f} s, leaves {errors[best]:.3f} m/s of speed error, the usual "
+                                f"one {usual:.3f}: none stands out; give --offset")
+    tried = offsets[best] + step * np.linspace(-1, 1, 41)
+    around = np.array([speed_error(ours, theirs, float(seconds)) for seconds in tried])
+    seconds = float(tried[np.nanargmin(around)]) if np.isfinite(around).any() else float(offsets[best])
     rival = int(np.nanargmin(elsewhere)) if np.isfinite(elsewhere).any() else best
     close = rival != best and errors[rival] < RIVAL * errors[best]
-    return Offset(seconds, speed_error(run, truth, names, seconds, step), speed_error(run, truth, names, 0.0, step),
-                  float(offsets[rival]) if close else None)
+    return Offset(seconds, speed_error(ours, theirs, seconds), speed_error(ours, theirs, 0.0), float(offsets[rival]) if close else None)
 
 
-def speed_error(run: JointTable, truth: JointTable, names: list[str], offset: float, step: float) -> float:
-    """Root mean square difference of speeds, m/s, with `offset` seconds added to the truth's times; not a number where nothing meets."""
-    moved = JointTable(truth.times + offset, truth.names, truth.positions).select(names)
-    start, end = max(run.times[0], moved.times[0]), min(run.times[-1], moved.times[-1])
-    times = start + step * np.arange(int(max(end - start, 0) / step) + 1)
-    both = [np.linalg.norm(np.diff(at_times(table, times).positions, axis=0), axis=2) / step for table in (run.select(names), moved)]
-    off = both[0] - both[1]
+def speed_error(run: JointTable, truth: JointTable, offset: float) -> float:
+    """Root mean square difference of speeds, m/s, of two tables of the same joints with `offset` seconds added to the truth's times; not a
+    number where nothing meets."""
+    times = _steps(run, max(step_of(run.times), step_of(truth.times)))
+    off = _speeds(run, times) - _speeds(truth, times - offset)
     off = off[np.isfinite(off)]
     return float(np.sqrt((off**2).mean())) if len(off) else np.nan
 
 
-def _speeds(table: JointTable, step: float) -> Array:
-    """Speeds (K, J), m/s, from `step` to `step` on."""
-    times = table.times[0] + step * np.arange(int((table.times[-1] - table.times[0]) / step + 1e-6) + 1)
-    return np.linalg.norm(np.diff(at_times(table, times).positions, axis=0), axis=2) / step
+def _steps(table: JointTable, step: float) -> Array:
+    """Times from a table's first to its last, `step` apart."""
+    return table.times[0] + step * np.arange(int((table.times[-1] - table.times[0]) / step + 1e-6) + 1)
+
+
+def _speeds(table: JointTable, times: Array) -> Array:
+    """Speeds (T, J), m/s, over `SPAN` around each time."""
+    before, after = (at_times(table, times + sign * SPAN / 2).positions for sign in (-1, 1))
+    return np.linalg.norm(after - before, axis=2) / SPAN
 
 
 def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
@@ -150,13 +156,6 @@ def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
     enough = count >= max(LEAST, SHARED * min(known_a.sum(), known_b.sum()))
     errors = np.sqrt(np.maximum(squares, 0) / np.maximum(count, 1))
     return np.arange(len(count)) - (len(theirs) - 1), np.where(enough, errors, np.nan)
-
-
-def _refined(run: JointTable, truth: JointTable, names: list[str], offset: float, step: float) -> float:
-    """The best offset within a step of one, seconds."""
-    tried = offset + step * np.linspace(-1, 1, 41)
-    errors = np.array([speed_error(run, truth, names, float(seconds), step) for seconds in tried])
-    return float(tried[np.nanargmin(errors)]) if np.isfinite(errors).any() else offset
 
 
 def _nearest(times: Array, wanted: Array) -> NDArray[np.int64]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.geometry import Array
@@ -24,7 +25,8 @@ POINTS = 1200
 INK = "#2b2f36"
 STYLE = {"svg.fonttype": "none", "font.size": 9.5, "axes.edgecolor": "#c4c9d0", "axes.labelcolor": INK, "text.color": INK,
          "xtick.color": "#5b6470", "ytick.color": "#5b6470", "axes.grid": True, "grid.color": "#e6e9ed", "grid.linewidth": 0.8,
-         "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False, "lines.linewidth": 1.5}  # fmt: skip
+         "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False, "legend.fontsize": 9,
+         "lines.linewidth": 1.5}  # fmt: skip
 
 
 def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
@@ -34,7 +36,7 @@ def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
     errors, times = 1000 * np.where(of.errors.known, of.errors.distance, np.nan), of.table.times
     seen = np.isfinite(errors).any(1)
     t, low, quarter, middle, high, top = _binned(times[seen], _spread(errors[seen]))
-    with _drawing("time", (10, 3.3), rows=2, ratios=(12, 1)) as (figure, (axes, strip)):
+    with _drawing("time", (10, 3.7), rows=2, ratios=(14, 1)) as (figure, (axes, strip)):
         axes.fill_between(t, low, top, color=BLUE, alpha=0.13, lw=0, label="all joints")
         axes.fill_between(t, quarter, high, color=BLUE, alpha=0.25, lw=0, label="middle half")
         axes.plot(t, middle, color=BLUE, label="mean")
@@ -44,9 +46,9 @@ def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
             axes.annotate(letter, (when, ceiling), ha="center", va="top", color="white", fontsize=8.5, fontweight="bold",
                           bbox={"boxstyle": "circle,pad=0.18", "fc": ORANGE, "ec": "none"})
         axes.set(ylim=(0, ceiling), ylabel="error, mm")
-        axes.legend(loc="upper left", ncols=3, fontsize=8.5, bbox_to_anchor=(0, 1.12), borderaxespad=0)
         axes.tick_params(labelbottom=False)
-        _statuses(strip, of)
+        drawn = dict(zip(*reversed(axes.get_legend_handles_labels()))) | _statuses(strip, of)
+        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
         for each in (axes, strip):
             each.set_xlim(*_span(times, of.run.motion.times))
         return _svg(figure, "time")
@@ -97,7 +99,7 @@ def by_joint(of: Evaluation) -> str:
         return _svg(figure, "joints")
 
 
-def shares(distances: Mapping[str, Array], known: Array) -> str:
+def shares(distances: Mapping[str, Array], known: NDArray[np.bool_]) -> str:
     """Which share of joints is nearer to the truth than so much, in each way of laying them over it."""
     with _drawing("shares", (5.2, 3.5)) as (figure, axes):
         far = max(float(np.percentile(1000 * distances["none"][known], 98)), 1.0)
@@ -125,7 +127,7 @@ def path_of(of: Evaluation, joint: str) -> str:
             axes.set_ylabel(f"{name}, m")
             axes.set_xlim(t[0], t[-1])
             axes.tick_params(labelbottom=k == 2)
-        panels[0].legend(loc="upper left", ncols=2, bbox_to_anchor=(0, 1.28), borderaxespad=0)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         panels[2].set_xlabel("time, s")
         return _svg(figure, "path")
 
@@ -146,7 +148,7 @@ def jitter_by_joint(of: Evaluation) -> str:
         axes.invert_yaxis()
         axes.grid(axis="y", visible=False)
         axes.set(xlabel="acceleration, m/s² (rms)", xlim=(0, None))
-        axes.legend(loc="upper left", ncols=2, bbox_to_anchor=(0, 1.1), borderaxespad=0)
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
         return _svg(figure, "jitter")
 
 
@@ -185,7 +187,8 @@ class _drawing:
     def __init__(self, name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,)) -> None:
         from matplotlib import rc_context
 
-        self._context = rc_context({**STYLE, "svg.hashsalt": name})
+        style: dict[Any, Any] = {**STYLE, "svg.hashsalt": name}
+        self._context = rc_context(style)
         self._size, self._rows, self._ratios = size, rows, ratios
 
     def __enter__(self) -> tuple[Any, Any]:
@@ -233,7 +236,8 @@ def _binned(times: Array, series: Sequence[Array]) -> tuple[Array, ...]:
     return (mean(times), *(mean(np.asarray(values)) for values in series))
 
 
-def _statuses(axes: Any, of: Evaluation) -> None:
+def _statuses(axes: Any, of: Evaluation) -> dict[str, Any]:
+    """Draw the statuses as a strip; what stands for each."""
     motion = of.run.motion
     step = float(np.median(np.diff(motion.times))) if len(motion) > 1 else 1.0
     handles = {}
@@ -243,8 +247,7 @@ def _statuses(axes: Any, of: Evaluation) -> None:
     axes.set(ylim=(0, 1), yticks=[], xlabel="time, s")
     axes.grid(False)
     axes.spines["left"].set_visible(False)
-    axes.legend(handles.values(), handles.keys(), loc="upper right", ncols=5, fontsize=8.5, bbox_to_anchor=(1, 14.6), borderaxespad=0,
-                handlelength=1.2)  # fmt: skip
+    return handles
 
 
 def _span(*times: Array) -> tuple[float, float]:

@@ -59,13 +59,20 @@ def _parts(of: Evaluation, name: str) -> Iterator[str]:
         yield from _joints(of)
         yield from _motion(of)
         yield body_tables(of)
-    yield '<h2>Silhouettes</h2><p class="said">How well the drawn body matches the silhouettes, as the run recorded it: no truth is needed.</p>'
-    yield figure(charts.fit_over_time(of), "Above the overlap (intersection over union), below the cost: in how many pixels, or what area, model "
-                                           "and silhouette differ.") if len(of.run.motion) else "<p>The run has no frames.</p>"
+    yield _silhouettes(of)
     if of.errors is not None:
         yield _intervals(of)
     yield meanings(of)
     yield facts(of)
+
+
+def _silhouettes(of: Evaluation) -> str:
+    head = ("<h2>Silhouettes</h2><p class=said>How well the drawn body matches the silhouettes, as the run recorded it; for this no truth "
+            "is needed.</p>")
+    if not len(of.run.motion):
+        return head + "<p>The run has no frames.</p>"
+    said = "Above the overlap (intersection over union), below the cost: the area in which model and silhouette differ."
+    return head + figure(charts.fit_over_time(of), said)
 
 
 def _under(of: Evaluation) -> str:
@@ -75,11 +82,12 @@ def _under(of: Evaluation) -> str:
 
 
 def _errors(of: Evaluation, chosen: Sequence[Chosen]) -> Iterator[str]:
-    marks = {each.letter: each.time for each in chosen[:6]}
+    marks = {each.letter: each.time for each in chosen if not each.usual}
     yield "<h2>Error over time</h2>"
-    yield figure(charts.over_time(of, marks), "Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, "
-                                              "and all of them. Letters are the worst frames, shown below; the strip tells the run's own status.")
-    yield figure(charts.by_joint_and_time(of), "The same by joint, darker where it is farther off; grey where the run has no such joint.")
+    said = ("Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, and all of them. Letters "
+            "are the worst frames, shown below; the strip tells the run's own status.")
+    yield figure(charts.over_time(of, marks), said)
+    yield figure(charts.by_joint_and_time(of), "The same by joint, darker where it is farther off; grey where the run has no pose.")
 
 
 def _frames(of: Evaluation, chosen: Sequence[Chosen], shots: Mapping[str, bytes], source: str) -> str:
@@ -87,20 +95,20 @@ def _frames(of: Evaluation, chosen: Sequence[Chosen], shots: Mapping[str, bytes]
     wide = " wide" if len(of.cameras) != 1 or source == "overlay.mp4" else ""
     tiles = "".join(_shot(of, each, shots[each.letter]) for each in chosen if each.letter in shots)
     worst = "largest error" if of.errors is not None else "least overlap"
-    return (f'<h2>Worst frames</h2><p class="said">The frames of {worst}, at least half a second apart in all but short runs, and two usual '
-            f'ones. From {source}{white}.</p><div class="shots{wide}">{tiles}</div>')
+    usual = ", and two usual ones" if any(each.usual for each in chosen) else ""
+    return (f'<h2>Worst frames</h2><p class="said">The frames of {worst}, some time apart{usual}. From {source}{white}.</p>'
+            f'<div class="shots{wide}">{tiles}</div>')
 
 
 def _shot(of: Evaluation, each: Chosen, image: bytes) -> str:
     motion = of.run.motion
-    usual = of.errors is not None and each.letter in "GH"
     said = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
     said += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
     worst = ", ".join(f"{plain(name.replace('_', ' '))} {off:.0f}" for name, off in each.worst)
     error = f"<b>{each.error:.0f} mm</b> in the mean; farthest off: {worst}. " if each.error == each.error else ""
     data = base64.b64encode(image).decode()
     return (f'<figure><img alt="frame {each.frame}" src="data:image/jpeg;base64,{data}"><figcaption><span class="badge'
-            f'{" usual" if usual else ""}">{each.letter}</span> {error}{", ".join(said)}{", a usual frame" if usual else ""}'
+            f'{" usual" if each.usual else ""}">{each.letter}</span> {error}{", ".join(said)}{", a usual frame" if each.usual else ""}'
             "</figcaption></figure>")
 
 
@@ -110,9 +118,10 @@ def _joints(of: Evaluation) -> Iterator[str]:
     assert of.errors is not None
     yield "<h2>Joints</h2>" + joint_table(of)
     distances = aligned_distances(of.errors, of.table, of.truth)
-    left = figure(charts.by_joint(of), "Half of the frames lie in the box, nine tenths on the line; the stroke is the median, the ring the mean. Green "
-                                       "is the person's left, pink the right.")
-    right = figure(charts.shares(distances, of.errors.known), "How many joints are nearer than so much, as they stand and in posture alone.")
+    left = figure(charts.by_joint(of), "Half of the frames lie in the box, nine tenths on the line; the stroke is the median, the ring the "
+                                       "mean. Green is the person's left, pink the right.")
+    right = figure(charts.shares(distances, of.errors.known), "How many joints are nearer than so much, as they stand and in posture "
+                                                              "alone.")
     yield f'<div class="pair">{left}{right}</div>'
     yield f'<div class="pair"><div><h3>Laid over each other</h3>{ways(of)}</div><div><h3>Along the world\'s axes, run less truth</h3>' \
           f"{axes_table(of)}</div></div>"
@@ -123,11 +132,13 @@ def _motion(of: Evaluation) -> Iterator[str]:
     joints = of.measured["errors"]["joints"]
     worst = max(joints, key=lambda name: joints[name]["mean_mm"])
     yield "<h2>Motion</h2>"
-    yield figure(charts.path_of(of, worst), f"Where the joint that is farthest off, {plain(worst.replace('_', ' '))}, was over time, run and truth.")
+    name = plain(worst.replace("_", " "))
+    yield figure(charts.path_of(of, worst), f"Where the joint that is farthest off, {name}, was over time, run and truth.")
     moves = of.measured["acceleration"]
     if moves:
-        text = (f"<p>The run's joints accelerate by {moves['run_m_s2']:.1f} m/s² (root mean square), the truth's by {moves['truth_m_s2']:.1f}: what "
-                "is more is jitter, what is less has been smoothed away. Compare runs of one film, at one frame rate.</p>")
+        text = (f"<p>The run's joints accelerate by {moves['run_m_s2']:.1f} m/s² (root mean square), the truth's by "
+                f"{moves['truth_m_s2']:.1f}. What is more is jitter, what is less has been smoothed away. The difference between the two, "
+                f"as vectors, is {moves['difference_m_s2']:.1f} m/s² in the mean. Compare runs of one film, at one frame rate.</p>")
         yield f'<div class="pair">{figure(charts.jitter_by_joint(of), "Accelerations by joint.")}<div>{text}</div></div>'
 
 
@@ -136,9 +147,9 @@ def _intervals(of: Evaluation) -> str:
     text = f"<h2>Stated uncertainty</h2><p>{plain(coverage_words(coverage)).capitalize()}.</p>"
     if coverage is None:
         return text
-    by_joint = table(["joint", *(f"{level} %" for level in LEVELS), "rms z", "mean sd, mm"], rows(
-        (name.replace("_", " "), *(f"{100 * row[f'within_{level}']:.0f}" for level in LEVELS), f"{row['rms_z']:.2f}", f"{row['sd_mean_mm']:.1f}")
-        for name, row in coverage["joints"].items()))  # fmt: skip
+    cells = ((name.replace("_", " "), *(f"{100 * row[f'within_{level}']:.0f}" for level in LEVELS), f"{row['rms_z']:.2f}",
+              f"{row['sd_mean_mm']:.1f}") for name, row in coverage["joints"].items())  # fmt: skip
+    by_joint = table(["joint", *(f"{level} %" for level in LEVELS), "rms z", "mean sd, mm"], rows(cells))
     said = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
     return f'{text}<div class="pair">{figure(charts.honesty(coverage, list(LEVELS)), said)}<div>{by_joint}</div></div>'
 

@@ -34,6 +34,8 @@ VIEWS = 4
 """Cameras that are drawn where there is no overlay."""
 WIDEST = 1280
 """Pixels of a picture's width in the page."""
+SHARP = 440
+"""Pixels of height from which on thin lines are drawn well."""
 QUALITY = 82
 
 
@@ -50,6 +52,8 @@ class Chosen:
     """Mean over the joints, mm; not a number without a truth."""
     worst: tuple[tuple[str, float], ...]
     """The joints that are farthest off, and by how many mm."""
+    usual: bool
+    """Whether it is shown for being usual, not bad."""
 
 
 def chosen_frames(of: Evaluation) -> list[Chosen]:
@@ -67,8 +71,8 @@ def chosen_frames(of: Evaluation) -> list[Chosen]:
     blank = np.isin(motion.status[index], BLANK)
     badness = np.where(there, badness, np.nan)
     letters = iter("ABCDEFGHIJKLMNOP")
-    frames = [*_worst(badness, times, blank), *_usual(badness, times, blank)]
-    return [Chosen(next(letters), int(index[n]), float(times[n]), float(1000 * means[n]), _off(of, n)) for n in frames]
+    frames = [(n, False) for n in _worst(badness, times, blank)] + [(n, True) for n in _usual(badness, times, blank)]
+    return [Chosen(next(letters), int(index[n]), float(times[n]), float(1000 * means[n]), _off(of, n), usual) for n, usual in frames]
 
 
 def pictures(of: Evaluation, chosen: Sequence[Chosen]) -> tuple[dict[str, bytes], str]:
@@ -96,7 +100,7 @@ def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterat
         if n in wanted:
             image, places = np.array(in_colour(frame.image)), _truth_at(of, n)
             if len(cameras) <= 1:
-                rows = np.split(image[: len(image) // 3 * 3], 3)
+                rows = [_scaled(row, height=max(len(row), SHARP)) for row in np.split(image[: len(image) // 3 * 3], 3)]
                 if cameras and places is not None:
                     draw_bones(rows[2], cameras[0], places)
                 image = np.concatenate(rows, axis=1)
@@ -154,8 +158,8 @@ def _at(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int,
 
 
 def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False) -> None:
-    """Draw a table of one frame's bones into a picture (H, W, 3) of a camera, at whatever size; the run's `own` in the colours of the sides,
-    the truth's thin and white."""
+    """Draw a table of one frame's bones into a picture (H, W, 3) of a camera, at whatever size; the run's `own` in the sides' colours, the
+    truth's thin and white."""
     import cv2
 
     scale = min(image.shape[1] / camera.size[0], image.shape[0] / camera.size[1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.evaluation_tables import WAYS, bones_words, clock_words, losses_words, said_root, world_words
@@ -31,7 +31,8 @@ def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
         if moves:
             yield "Acceleration", f"{moves['run_m_s2']:.1f}", "m/s²", f"the truth's {moves['truth_m_s2']:.1f}: more is jitter"
     if measured["overlap"]["count"]:
-        yield "Overlap", f"{measured['overlap']['mean']:.3f}", "", f"with the silhouettes; 5 % of frames under {measured['overlap']['p5']:.3f}"
+        fit = measured["overlap"]
+        yield "Overlap", f"{fit['mean']:.3f}", "", f"with the silhouettes; 5 % of frames under {fit['p5']:.3f}"
     lost = measured["losses"]
     yield "Without a pose", str(lost["frames"]), "frames", (f"{100 * lost['share']:.1f} %, the longest {lost['longest_s']:.2f} s"
                                                             if lost["frames"] else "none was lost")
@@ -54,11 +55,11 @@ def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
         if world.get("moved"):
             yield False, world_words(world)[0].upper() + world_words(world)[1:] + "."
         elif world.get("apart"):
-            yield True, (f"The run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run is moved "
-                         "and turned as a whole: are they in two worlds, or is the distance wrong? (--align)")
+            yield True, (f"The run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run "
+                         "is moved and turned as a whole: are they in two worlds, or is the distance wrong? (--align)")
         if errors["lost"]:
-            yield True, (f"{errors['lost']} of {errors['frames']} frames of the truth have no pose of the run; each joint counts {1000 * LOST:.0f} "
-                         "mm there.")
+            yield True, (f"{errors['lost']} of {errors['frames']} frames of the truth have no pose of the run; each joint counts "
+                         f"{1000 * LOST:.0f} mm there.")
         if clock["offset_s"]:
             yield False, "Clock: " + clock_words(clock) + "."
         if clock.get("rival_s") is not None:
@@ -89,8 +90,8 @@ def axes_table(of: Evaluation) -> str:
     axes = of.measured["axes_mm"]
     if not axes:
         return "<p>No joint is known in both.</p>"
-    return table(["", "mean, mm", "sd", "rmse"], rows((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}")
-                                                      for axis in "xyz"))
+    said = ((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}") for axis in "xyz")
+    return table(["", "mean, mm", "sd", "rmse"], rows(said))
 
 
 def body_tables(of: Evaluation) -> str:
@@ -104,14 +105,18 @@ def body_tables(of: Evaluation) -> str:
         parts.append(f"<h3>Bones, mm</h3><p class=said>{plain(words[0].upper() + words[1:])}.</p>"
                      + table(["", "run", "truth", "longer", "run's sd", "truth's sd"], bones))
     if measured["bends_deg"]:
-        bends = rows((name.replace("_", " "), f"{b['bias']:+.1f}", f"{b['mean']:.1f}", f"{b['rmse']:.1f}") for name, b in measured["bends_deg"].items())
-        parts.append("<h3>How far elbows and knees are bent, degrees</h3>" + table(["", "run less truth", "mean size", "rmse"], bends))
+        parts.append("<h3>How far elbows and knees are bent, degrees</h3>" + _angles(measured["bends_deg"]))
     if "angles_deg" in measured:
         turns = rows(((name.replace("_", " "), f"{value:.1f}") for name, value in measured["angles_deg"].items()), sums=1)
-        dofs = rows((name.replace("_", " "), f"{v['bias']:+.1f}", f"{v['mean']:.1f}", f"{v['rmse']:.1f}") for name, v in measured["dofs_deg"].items())
         parts.append(f'<div class="pair"><div><h3>Turns of joints, degrees</h3>{table(["", "rmse"], turns)}</div><div><h3>Single angles, '
-                     f'degrees</h3>{table(["", "run less truth", "mean size", "rmse"], dofs)}</div></div>')
+                     f'degrees</h3>{_angles(measured["dofs_deg"])}</div></div>')
     return "<h2>Body</h2>" + "".join(parts) if parts else ""
+
+
+def _angles(angles: Mapping[str, Mapping[str, float]]) -> str:
+    """A table of errors of angles."""
+    said = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
+    return table(["", "run less truth", "mean size", "rmse"], rows(said))
 
 
 def meanings(of: Evaluation) -> str:
@@ -121,18 +126,18 @@ def meanings(of: Evaluation) -> str:
     if of.errors is not None:
         root = plain(said_root(of.measured["aligned_mm"]))
         said = [
-            ("Joint error", f"Euclidean distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run has "
-                            f"no pose, each joint counts {1000 * LOST:.0f} mm, so that leaving out bad frames never helps. "
+            ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
+                            f"has no pose, each joint counts {1000 * LOST:.0f} mm, so that leaving out bad frames never helps. "
                             "<span class=formula>rmse = √(mean of d²)</span>."),
-            ("HumanEva", "The mean distance over 15 joints (pelvis, neck, head; shoulders, elbows, wrists, hips, knees, ankles) in each frame, then over "
-                         "the frames (Sigal, Balan and Black 2010)."),
-            ("Laid over each other", "Run and truth compared after less and less is asked of the run: one rigid motion of the whole; each frame's mean "
-                                     f"offset; distances from the {root}; the best rigid motion of each frame (Procrustes); that with a scale, which "
-                                     "papers call PA-MPJPE. The first alone says where the person was."),
+            ("HumanEva", "The mean distance over 15 joints (pelvis, neck, head; shoulders, elbows, wrists, hips, knees, ankles) in each "
+                         "frame, then over the frames (Sigal, Balan and Black 2010)."),
+            ("Laid over each other", "Run and truth compared after less and less is asked of the run: one rigid motion of the whole; each "
+                                     f"frame's mean offset; distances from the {root}; the best rigid motion of each frame (Procrustes); "
+                                     "that with a scale, which papers call PA-MPJPE. The first alone says where the person was."),
             ("Acceleration", "Root mean square of second differences of the joints' places, of run and truth at the same times."),
             ("Bent", "The angle between the bones before and after an elbow or knee; 0 is straight."),
-            ("Times", "Run and truth are compared at the times of the slower one; the other is interpolated between frames at most one and a half steps "
-                      "apart, and never beyond its ends."),
+            ("Times", "Run and truth are compared at the times of the slower one; the other is interpolated between frames at most one and "
+                      "a half steps apart, and never beyond its ends."),
             *said,
         ]
     return "<h2>What the figures mean</h2>" + definitions(said)
@@ -142,9 +147,11 @@ def facts(of: Evaluation) -> str:
     """What the run was."""
     info, measured = of.run.info, of.measured
     settings = of.run.settings
-    said = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")), ("Body", of.run.motion.body_name),
+    said = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")),
+            ("Body", of.run.motion.body_name),
             ("Preset and seed", f"{settings.get('preset', 'default')}, {settings.get('seed', 'unknown')}" if settings else None),
-            ("Frames", ", ".join(f"{count} {status}" for status, count in measured["status"].items())), ("No pose", losses_words(measured["losses"])),
+            ("Frames", ", ".join(f"{count} {status}" for status, count in measured["status"].items())),
+            ("No pose", losses_words(measured["losses"])),
             ("Clock", clock_words(measured["clock"]) if "clock" in measured else None),
             ("World", world_words(measured["world"]) if measured.get("world") else None),
             ("Made with", ", ".join(f"{name} {version}" for name, version in info.get("versions", {}).items()))]
