@@ -10,7 +10,7 @@ from pathlib import Path
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation, check_output
-from shadowpuppet.evaluation_tables import coverage_words
+from shadowpuppet.evaluation_words import coverage_words
 from shadowpuppet.intervals import LEVELS
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.measures import aligned_distances
@@ -92,7 +92,7 @@ def _errors(of: Evaluation, chosen: Sequence[Chosen]) -> Iterator[str]:
 
 def _frames(of: Evaluation, chosen: Sequence[Chosen], shots: Mapping[str, bytes], source: str) -> str:
     white = ", with the truth's bones in white" if of.truth is not None else ""
-    wide = " wide" if len(of.cameras) != 1 or source == "overlay.mp4" else ""
+    wide = " wide" if len(of.cameras) <= 1 and source == "overlay.mp4" else ""
     tiles = "".join(_shot(of, each, shots[each.letter]) for each in chosen if each.letter in shots)
     worst = "largest error" if of.errors is not None else "least overlap"
     usual = ", and two usual ones" if any(each.usual for each in chosen) else ""

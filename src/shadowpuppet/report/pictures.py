@@ -104,8 +104,10 @@ def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterat
                 if cameras and places is not None:
                     draw_bones(rows[2], cameras[0], places)
                 image = np.concatenate(rows, axis=1)
-            elif places is not None:
-                _draw_on_grid(image, cameras, places)
+            else:
+                image = _scaled(image, width=max(image.shape[1], WIDEST))
+                if places is not None:
+                    _draw_on_grid(image, cameras, places)
             yield wanted[n], image
         if n >= last:
             return
@@ -132,15 +134,14 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
     for view in views:
         footage = footage_of(recording, view, options)
         for frame, image in _at(footage.shots(False), motion.times, sorted(wanted)):
-            image = np.array(in_colour(image))
-            for places, own in ((_truth_at(of, frame), False), (_run_at(of, frame), True)):
-                if places is not None:
-                    draw_bones(image, footage.camera, places, own)
-            seen[frame].append(image)
+            image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * SHARP))
+            tables = [(table, own) for table, own in ((_run_at(of, frame), True), (_truth_at(of, frame), False)) if table is not None]
+            for places, own in tables:
+                draw_bones(image, footage.camera, places, own)
+            seen[frame].append(_cut_out(image, footage.camera, [table for table, _ in tables]) if len(views) > 1 else image)
     for frame, images in seen.items():
         if images:
-            height = min(len(image) for image in images)
-            yield wanted[frame], np.concatenate([_scaled(image, height=height) for image in images], axis=1)
+            yield wanted[frame], np.concatenate([_scaled(image, height=SHARP) for image in images], axis=1)
 
 
 def _at(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int, Image]]:
@@ -162,9 +163,8 @@ def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = Fal
     truth's thin and white."""
     import cv2
 
-    scale = min(image.shape[1] / camera.size[0], image.shape[0] / camera.size[1])
-    pixels = dict(zip(places.names, (camera.project(places.positions[0]) + 0.5) * scale - 0.5))
-    unit = max(1.0, image.shape[0] / 240)
+    pixels = dict(zip(places.names, _pixels(image, camera, places)))
+    unit = image.shape[0] / 400
     for a, b in BONES:
         ends = [pixels[name] for name in (a, b) if name in pixels]
         if len(ends) < 2 or not np.isfinite(ends).all():
@@ -172,7 +172,27 @@ def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = Fal
         start, end = (tuple(np.clip(np.round(point * (1 << SUBPIXEL)), -(1 << 20), 1 << 20).astype(int).tolist()) for point in ends)
         colour = SIDES.get(b.split("_")[0], MIDDLE) if own else WHITE
         for ink, extra in ((BLACK, 2), (colour, 0)):
-            cv2.line(image, start, end, ink, max(1, round((2 if own else 1) * unit)) + extra, cv2.LINE_AA, SUBPIXEL)
+            cv2.line(image, start, end, ink, max(1, round((4 if own else 1.6) * unit)) + extra, cv2.LINE_AA, SUBPIXEL)
+
+
+def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:
+    """Where one frame's joints (J, 2) are in a camera's picture, at whatever size."""
+    scale = min(image.shape[1] / camera.size[0], image.shape[0] / camera.size[1])
+    return (camera.project(places.positions[0]) + 0.5) * scale - 0.5
+
+
+def _cut_out(image: Image, camera: Camera, tables: Sequence[JointTable]) -> Image:
+    """The part of a picture around the person, as wide as three quarters of its height at least; all of it where nobody is known."""
+    pixels = np.concatenate([_pixels(image, camera, table) for table in tables])
+    pixels = np.clip(pixels[np.isfinite(pixels).all(1)], 0, [image.shape[1], image.shape[0]])
+    if len(pixels) < 3:
+        return image
+    (left, top), (right, bottom) = pixels.min(0), pixels.max(0)
+    half_high = min(0.64 * max(bottom - top, right - left, 0.25 * image.shape[0]), image.shape[0] / 2)
+    half_wide = min(max(0.75 * half_high, 0.6 * (right - left)), image.shape[1] / 2)
+    y = np.clip((top + bottom) / 2, half_high, image.shape[0] - half_high)
+    x = np.clip((left + right) / 2, half_wide, image.shape[1] - half_wide)
+    return np.ascontiguousarray(image[round(y - half_high) : round(y + half_high), round(x - half_wide) : round(x + half_wide)])
 
 
 def _worst(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from shadowpuppet.evaluation import Evaluation
-from shadowpuppet.evaluation_tables import WAYS, bones_words, clock_words, losses_words, said_root, world_words
+from shadowpuppet.evaluation_words import WAYS, bones_words, clock_words, losses_words, said_root, world_words
 from shadowpuppet.metrics import FAR, LOST
 from shadowpuppet.report.html import definitions, plain, rows, table
 
