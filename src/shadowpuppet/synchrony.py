@@ -23,8 +23,8 @@ SPAN = 0.25
 """Seconds over which a speed is taken: over a frame it would be mostly the run's jitter."""
 CLEAR = 0.7
 """An offset is found where the error of speed is less than so much of the usual one."""
-ELSEWHERE, RIVAL = 0.3, 1.15
-"""Seconds beyond which an offset is another one, and by what factor its error may be larger and still in doubt."""
+ELSEWHERE, RIVAL, ALIKE = 0.3, 1.15, 0.01
+"""Seconds beyond which an offset is another one, and by what factor, and m/s more, its error may be larger and still in doubt."""
 
 
 def match(times: ArrayLike, truth_times: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -97,7 +97,8 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
     """What must be added to the truth's times so that joints are equally fast at the same time, whatever worlds they are in.
 
     The least mean square difference of the speeds of the joints that both have, over offsets by which half of the shorter motion meets
-    the other; between whole steps by trying. Raises `ShadowPuppetError` where no offset stands out.
+    the other; between whole steps by trying; of several as good, as where a motion repeats itself, the smallest. Raises
+    `ShadowPuppetError` where no offset stands out.
     """
     names = [name for name in run.names if name in truth.names]
     ours, theirs = run.select(names), truth.select(names)
@@ -108,7 +109,9 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
     if not np.isfinite(errors).any():
         raise ShadowPuppetError(f"sync: run and truth share fewer than {LEAST} speeds at every offset, so the clocks cannot be compared")
     offsets = run.times[0] - truth.times[0] + lags * step
-    best = int(np.nanargmin(errors))
+    good = RIVAL * np.nanmin(errors) + ALIKE
+    smallest = np.nanmin(np.abs(offsets[errors <= good]))
+    best = int(np.nanargmin(np.where(np.abs(offsets) <= smallest + ELSEWHERE, errors, np.nan)))
     elsewhere = np.where(np.abs(offsets - offsets[best]) > ELSEWHERE, errors, np.nan)
     usual = np.nanmedian(elsewhere) if np.isfinite(elsewhere).any() else np.inf
     if not errors[best] < CLEAR * usual:
@@ -118,7 +121,7 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
     around = np.array([speed_error(ours, theirs, float(seconds)) for seconds in tried])
     seconds = float(tried[np.nanargmin(around)]) if np.isfinite(around).any() else float(offsets[best])
     rival = int(np.nanargmin(elsewhere)) if np.isfinite(elsewhere).any() else best
-    close = rival != best and errors[rival] < RIVAL * errors[best]
+    close = rival != best and errors[rival] <= good
     return Offset(seconds, speed_error(ours, theirs, seconds), speed_error(ours, theirs, 0.0), float(offsets[rival]) if close else None)
 
 

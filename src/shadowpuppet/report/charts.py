@@ -125,7 +125,7 @@ def path_of(of: Evaluation, joint: str) -> str:
             axes.plot(t, truth, color=INK, lw=1.2, label="truth")
             axes.plot(t, run, color=BLUE, lw=1.4, label="run")
             axes.set_ylabel(f"{name}, m")
-            axes.set_xlim(t[0], t[-1])
+            axes.set_xlim(*_span(t))
             axes.tick_params(labelbottom=k == 2)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         panels[2].set_xlabel("time, s")

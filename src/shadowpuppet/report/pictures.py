@@ -82,13 +82,10 @@ def pictures(of: Evaluation, chosen: Sequence[Chosen]) -> tuple[dict[str, bytes]
     if not wanted:
         return {}, "no frame to show"
     try:
-        if film.exists():
-            found, source = _of_overlay(film, of, wanted), "overlay.mp4"
-        else:
-            found, source = _of_recording(of, wanted), "the recording"
+        found = _of_overlay(film, of, wanted) if film.exists() else _of_recording(of, wanted)
+        return {letter: _jpeg(image) for letter, image in found}, "overlay.mp4" if film.exists() else "the recording"
     except ShadowPuppetError as error:
         return {}, f"no pictures: {error}"
-    return {letter: _jpeg(image) for letter, image in found}, source
 
 
 def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
