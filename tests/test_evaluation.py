@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import biovision
 from measured import NAMES, moved, person, write_run
 from shadowpuppet import cli
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.evaluation import Comparison, evaluate_run, measure_run
 from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.io.joints import write_joints
+from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion import JointTable
 from vicon import c3d
@@ -144,6 +147,17 @@ def test_other_formats_names_and_rates_give_the_same(folder, tmp_path, ending):
     assert found["errors"]["lost"] == 0
     assert found["errors"]["mean_mm"] == pytest.approx(expected["errors"]["mean_mm"], abs=0.2)
     assert found["humaneva"]["mean_mm"] == pytest.approx(expected["humaneva"]["mean_mm"], abs=0.2)
+
+
+def test_a_skeleton_of_another_program_is_a_truth(tmp_path):
+    (tmp_path / "truth.bvh").write_text(biovision.person(8), "utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # its unit and which axis is up
+        table = read_motion(tmp_path / "truth.bvh")
+        write_run(tmp_path / "run", moved(table, [0.03, 0, 0.04]))
+        measured = evaluate_run(tmp_path / "run", tmp_path / "truth.bvh")
+    assert (measured["errors"]["frames"], measured["errors"]["lost"]) == (8, 0)
+    assert measured["errors"]["mean_mm"] == pytest.approx(50, abs=0.01)
 
 
 def test_names_that_are_missing_are_told_as_the_file_has_them(shell, folder, tmp_path):

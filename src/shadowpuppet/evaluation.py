@@ -110,7 +110,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     errors = joint_errors(ours, theirs, list(measured["errors"]["joints"]))
     measured |= lost | {"clock": clock | {"frames_compared": len(theirs.times)}, "world": world} | _wider(run, ours, theirs, errors)
     if how.angles:
-        poses = compared_poses(run.motion, reference)
+        poses = compared_poses(run.motion, theirs)
         measured |= {"angles_deg": turn_errors(*poses), "dofs_deg": dof_errors(*poses)}
     return Evaluation(run, said | measured, cameras, ours, theirs, errors)
 
