@@ -22,6 +22,7 @@ from shadowpuppet.io.joints import write_joints
 from shadowpuppet.motion import JointTable
 from shadowpuppet.report.page import page, write_report
 from shadowpuppet.report.pictures import chosen_frames, draw_bones, pictures
+from shadowpuppet.rig_overlay import grid_of
 
 TRUTH = person(4, 15)
 SIZE = (160, 120)
@@ -220,6 +221,25 @@ def test_frames_of_a_camera_s_overlay_are_shown_side_by_side_with_the_truth(tmp_
         assert np.median(tiles[0]) == pytest.approx(40 + 2 * each.frame, abs=4)  # the right frame
         assert tiles[0].max() < 200
         assert tiles[2].max() > 220  # the truth's bones
+
+
+def test_of_several_cameras_overlay_the_person_is_cut_out(tmp_path):
+    """Of seven tiles five are shown; in each the middle of the person is in the middle, and the truth's bones are there."""
+    cameras = [camera(f"cam{n}", 0.8 * n) for n in range(7)]
+    run = run_that_errs(tmp_path)
+    write_calibration(run / "calibration.toml", cameras)
+    columns, rows, (width, height) = grid_of([each.size for each in cameras])
+    grids = [np.full((rows * height, columns * width, 3), 40 + 2 * n, np.uint8) for n in range(len(TRUTH.times))]
+    write_film(run / "overlay.mp4", grids, 15)
+    of = measure_run(run)
+    shots, source = pictures(of, chosen_frames(of))
+    assert (len(shots), source) == (8, "overlay.mp4")
+    image = cv2.imdecode(np.frombuffer(shots["B"], np.uint8), cv2.IMREAD_COLOR)
+    assert image.shape[1] == pytest.approx(5 * 0.75 * image.shape[0], rel=0.05)
+    for tile in np.array_split(image, 5, axis=1):
+        white = np.argwhere(tile[len(tile) // 10 :].min(2) > 200)
+        assert len(white) > 50
+        assert abs(white[:, 1].mean() / tile.shape[1] - 0.5) < 0.2
 
 
 def test_frames_of_several_cameras_are_drawn_from_the_recording(tmp_path):

@@ -11,7 +11,7 @@ from rich.console import RenderableType
 from shadowpuppet.evaluation_words import WAYS, bones_words, clock_words, coverage_words, losses_words, said_root, world_words
 from shadowpuppet.tables import angle_table, error_table, measures_table, pairs, plain_table
 
-FEW = 3
+FEW = 2
 """Degrees of freedom in a row of a list of them."""
 
 

@@ -11,6 +11,9 @@ from shadowpuppet.motion import JointTable, Motion
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.synchrony import match
 
+UNTOLD = ("head", "_ankle")
+"""Joints of whose turns the places of joints tell little or nothing."""
+
 
 def angle_errors(motion: Motion, truth: JointTable, start: int = 0) -> dict[str, float]:
     """By what angle each joint of a whole body is turned otherwise than in the poses that fit the truth best: root mean square, degrees,
@@ -40,7 +43,7 @@ def compared_poses(motion: Motion, truth: JointTable, start: int = 0) -> tuple[S
 def turn_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, float]:
     """Angles between the turns of each joint in poses (N, D); see `angle_errors`."""
     turns = [_own_turns(skeleton, poses) for poses in (ours, theirs)]
-    told = [j for j, joint in enumerate(skeleton.joints) if not joint.name.endswith(("head", "_ankle"))]
+    told = [j for j, joint in enumerate(skeleton.joints) if not joint.name.endswith(UNTOLD)]
     cosine = (np.einsum("njab,njab->nj", *turns)[:, told] - 1) / 2
     squares = np.degrees(np.arccos(np.clip(cosine, -1, 1))) ** 2
     by_joint = dict(zip((skeleton.joints[j].name for j in told), np.sqrt(squares.mean(0)).tolist(), strict=True))
@@ -49,10 +52,10 @@ def turn_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, flo
 
 def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict[str, float]]:
     """Errors of each angle of poses (N, D), degrees, the short way round (`wrapped`), as Ni 2008 shows them (Fig. 7): signed mean, mean
-    size, root mean square. Shifts, and components of rotation vectors, which are no angles of their own, are left out."""
+    size, root mean square. Shifts, components of rotation vectors, which are no angles of their own, heads and ankles are left out."""
     found = {}
     for d, dof in enumerate(skeleton.dofs):
-        if dof.kind == "rotation":
+        if dof.kind == "rotation" and not dof.joint.endswith(UNTOLD):
             off = np.degrees(wrapped(ours[:, d] - theirs[:, d]))
             found[dof.name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean()))}
     return found

@@ -92,7 +92,7 @@ def _errors(of: Evaluation, chosen: Sequence[Chosen]) -> Iterator[str]:
 
 def _frames(of: Evaluation, chosen: Sequence[Chosen], shots: Mapping[str, bytes], source: str) -> str:
     white = ", with the truth's bones in white" if of.truth is not None else ""
-    wide = " wide" if len(of.cameras) <= 1 and source == "overlay.mp4" else ""
+    wide = " wide" if len(of.cameras) > 1 or source == "overlay.mp4" else ""
     tiles = "".join(_shot(of, each, shots[each.letter]) for each in chosen if each.letter in shots)
     worst = "largest error" if of.errors is not None else "least overlap"
     usual = ", and two usual ones" if any(each.usual for each in chosen) else ""

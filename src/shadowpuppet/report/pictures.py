@@ -18,7 +18,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.metrics import LOST
 from shadowpuppet.motion import BLANK, BONES, JointTable
 from shadowpuppet.options import Options, make_options
-from shadowpuppet.overlay import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour
+from shadowpuppet.overlay import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.rig import chosen_views
 from shadowpuppet.rig_overlay import grid_of
 from shadowpuppet.synchrony import at_times, match, step_of
@@ -30,8 +30,8 @@ WORST, TYPICAL, MOST_LOST = 6, 2, 2
 """Frames that are shown, and how many of them may be without a pose."""
 BETWEEN = 0.5
 """Seconds between the worst frames, less in short runs: neighbours show the same."""
-VIEWS = 4
-"""Cameras that are drawn where there is no overlay."""
+VIEWS = 5
+"""Cameras that are shown side by side, of several those that see the person largest."""
 WIDEST = 1280
 """Pixels of a picture's width in the page."""
 SHARP = 440
@@ -102,20 +102,36 @@ def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterat
                     draw_bones(rows[2], cameras[0], places)
                 image = np.concatenate(rows, axis=1)
             else:
-                image = _scaled(image, width=max(image.shape[1], WIDEST))
-                if places is not None:
-                    _draw_on_grid(image, cameras, places)
+                image = _of_grid(image, of, n)
             yield wanted[n], image
         if n >= last:
             return
 
 
-def _draw_on_grid(image: Image, cameras: Sequence[Camera], places: JointTable) -> None:
-    columns, rows, _ = grid_of([camera.size for camera in cameras])
+def _of_grid(image: Image, of: Evaluation, frame: int) -> Image:
+    """The person in the tiles of an overlay of several cameras, with the truth's bones."""
+    columns, rows, _ = grid_of([camera.size for camera in of.cameras])
+    image = _scaled(image, height=max(image.shape[0], 2 * SHARP * rows))  # so that lines are thin
     height, width = image.shape[0] // rows, image.shape[1] // columns
-    for n, camera in enumerate(cameras):
-        y, x = divmod(n, columns)
-        draw_bones(image[y * height : (y + 1) * height, x * width : (x + 1) * width], camera, places)
+    tiles = [image[y * height : (y + 1) * height, x * width : (x + 1) * width] for y in range(rows) for x in range(columns)]
+    truth = _truth_at(of, frame)
+    for tile, camera in zip(tiles, of.cameras):
+        if truth is not None:
+            draw_bones(tile, camera, truth)
+    return _side_by_side(tiles[: len(of.cameras)], of.cameras, [table for table, _ in _tables(of, frame)])
+
+
+def _side_by_side(images: Sequence[Image], cameras: Sequence[Camera], tables: Sequence[JointTable]) -> Image:
+    """The person cut out of the pictures of several cameras, those that see them largest."""
+    boxes = [_box(image, camera, tables) for image, camera in zip(images, cameras)]
+    shares = [(box[0].stop - box[0].start) / len(image) if box else 0.0 for image, box in zip(images, boxes)]
+    chosen = sorted(sorted(range(len(images)), key=lambda n: -shares[n])[:VIEWS])
+    cut = []
+    for n in chosen:
+        image = _scaled(np.ascontiguousarray(images[n][boxes[n] or ...]), height=SHARP)
+        write_text(image, cameras[n].name, 0, WHITE, size=SHARP)
+        cut.append(image)
+    return np.concatenate(cut, axis=1)
 
 
 def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
@@ -125,20 +141,21 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
         raise ShadowPuppetError(f"the run has no overlay.mp4, and its recording, {path}, is not there")
     options = make_options(settings) if settings else Options()
     recording = opened(path, options)
-    views = chosen_views(recording, options.camera)[:VIEWS]
+    views = chosen_views(recording, options.camera)
     motion = of.run.motion
-    seen: dict[int, list[Image]] = {frame: [] for frame in wanted}
+    seen: dict[int, dict[Camera, Image]] = {frame: {} for frame in wanted}
     for view in views:
         footage = footage_of(recording, view, options)
         for frame, image in _at(footage.shots(False), motion.times, sorted(wanted)):
             image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * SHARP))
-            tables = [(table, own) for table, own in ((_run_at(of, frame), True), (_truth_at(of, frame), False)) if table is not None]
-            for places, own in tables:
+            for places, own in _tables(of, frame):
                 draw_bones(image, footage.camera, places, own)
-            seen[frame].append(_cut_out(image, footage.camera, [table for table, _ in tables]) if len(views) > 1 else image)
+            seen[frame][footage.camera] = image
     for frame, images in seen.items():
-        if images:
-            yield wanted[frame], np.concatenate([_scaled(image, height=SHARP) for image in images], axis=1)
+        if len(views) == 1:
+            yield from ((wanted[frame], image) for image in images.values())
+        elif images:
+            yield wanted[frame], _side_by_side([*images.values()], [*images], [table for table, _ in _tables(of, frame)])
 
 
 def _at(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int, Image]]:
@@ -178,18 +195,18 @@ def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:
     return (camera.project(places.positions[0]) + 0.5) * scale - 0.5
 
 
-def _cut_out(image: Image, camera: Camera, tables: Sequence[JointTable]) -> Image:
-    """The part of a picture around the person, as wide as three quarters of its height at least; all of it where nobody is known."""
+def _box(image: Image, camera: Camera, tables: Sequence[JointTable]) -> tuple[slice, slice] | None:
+    """Rows and columns around the person, three by four; None where nobody is known."""
     pixels = np.concatenate([_pixels(image, camera, table) for table in tables])
     pixels = np.clip(pixels[np.isfinite(pixels).all(1)], 0, [image.shape[1], image.shape[0]])
     if len(pixels) < 3:
-        return image
+        return None
     (left, top), (right, bottom) = pixels.min(0), pixels.max(0)
-    half_high = min(0.64 * max(bottom - top, right - left, 0.25 * image.shape[0]), image.shape[0] / 2)
-    half_wide = min(max(0.75 * half_high, 0.6 * (right - left)), image.shape[1] / 2)
+    half_high = min(max(0.64 * (bottom - top), 0.8 * (right - left), 0.12 * image.shape[0]), image.shape[0] / 2)
+    half_wide = min(0.75 * half_high, image.shape[1] / 2)
     y = np.clip((top + bottom) / 2, half_high, image.shape[0] - half_high)
     x = np.clip((left + right) / 2, half_wide, image.shape[1] - half_wide)
-    return np.ascontiguousarray(image[round(y - half_high) : round(y + half_high), round(x - half_wide) : round(x + half_wide)])
+    return slice(round(y - half_high), round(y + half_high)), slice(round(x - half_wide), round(x + half_wide))
 
 
 def _worst(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
@@ -227,6 +244,12 @@ def _off(of: Evaluation, n: int) -> tuple[tuple[str, float], ...]:
     distance = np.where(of.errors.known[n], of.errors.distance[n], -1)
     order = [int(j) for j in np.argsort(-distance)[:3] if distance[j] >= 0]
     return tuple((of.errors.names[j], LOST * 1000 if of.errors.lost[n, j] else float(1000 * distance[j])) for j in order)
+
+
+def _tables(of: Evaluation, frame: int) -> list[tuple[JointTable, bool]]:
+    """The run's joints in a frame, and the truth's where it is known; with whether they are the run's own."""
+    truth = _truth_at(of, frame)
+    return [(_run_at(of, frame), True)] + ([(truth, False)] if truth is not None else [])
 
 
 def _truth_at(of: Evaluation, frame: int) -> JointTable | None:
