@@ -86,12 +86,15 @@ def test_frames_that_a_run_leaves_out_are_not_forgotten():
 
 
 @settings(max_examples=12, deadline=None)
-@given(st.floats(-1.5, 1.5), st.sampled_from([25.0, 60.0, 100.0]), st.integers(0, 9))
-def test_an_offset_is_found_whatever_the_world_and_the_rate(offset, rate, seed):
+@given(st.floats(-1.5, 1.5), st.sampled_from([25.0, 60.0, 100.0]), st.integers(0, 9), st.integers(0, 60), st.integers(0, 60))
+def test_an_offset_is_found_whatever_the_world_and_the_rate(offset, rate, seed, later, earlier):
+    """Of a run that begins some frames later, and a truth that does."""
     truth = person(8, rate, seed=seed)
+    truth = JointTable(truth.times[earlier:], truth.names, truth.positions[earlier:])
     R = rotation_from_vector([0.2, seed / 3, 1.0])
     truth = JointTable(truth.times - offset, truth.names, truth.positions @ R.T + [1.0, 2.0, 0.3])
     run = person(8, 30, seed=seed)
+    run = JointTable(run.times[later:], run.names, run.positions[later:])
     noise = np.random.default_rng(seed).normal(size=run.positions.shape) * 0.004
     found = find_offset(moved(run, noise), truth)
     assert found.seconds == pytest.approx(offset, abs=0.012)
