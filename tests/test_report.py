@@ -20,6 +20,7 @@ from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.motion import JointTable
+from shadowpuppet.report.charts import by_joint_and_time
 from shadowpuppet.report.page import page, write_report
 from shadowpuppet.report.pictures import chosen_frames, draw_bones, pictures
 from shadowpuppet.rig_overlay import grid_of
@@ -202,6 +203,15 @@ def test_frames_without_a_pose_do_not_push_the_others_out(tmp_path):
     worst = [each for each in chosen_frames(of) if not each.usual]
     assert sum(10 <= each.frame < 50 for each in worst) == 2
     assert len(worst) > 3
+    assert grey_share(by_joint_and_time(of)) == pytest.approx(40 / 60, abs=0.03)
+
+
+def grey_share(svg: str) -> float:
+    """Which share of the map of errors is of the colour of what is lost."""
+    found = re.search(r'href="data:image/png;base64,([^"]+)"', svg)
+    assert found is not None
+    image = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
+    return float((np.abs(image.astype(int) - [0x78, 0x70, 0x6B]).max(2) < 6).mean())
 
 
 def test_frames_of_a_camera_s_overlay_are_shown_side_by_side_with_the_truth(tmp_path, quick):
@@ -287,8 +297,11 @@ def test_where_no_report_can_be_made_that_is_said(tmp_path, monkeypatch, quick):
     of = measure_run(tmp_path / "run")
     with pytest.raises(ShadowPuppetError, match=r"page\.pdf: found the ending '\.pdf', expected \.html"):
         write_report(tmp_path / "page.pdf", of)
-    with pytest.raises(ShadowPuppetError, match="cannot be written"):
+    with pytest.raises(ShadowPuppetError, match=r"page\.html: cannot be written \(there is no folder .*no\)"):
         write_report(tmp_path / "no" / "page.html", of)
+    (tmp_path / "taken.html").mkdir()
+    with pytest.raises(ShadowPuppetError, match=r"taken\.html: cannot be written"):
+        write_report(tmp_path / "taken.html", of)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(ShadowPuppetError, match=r"a report needs matplotlib: pip install 'shadowpuppet\[report\]'"):
         write_report(tmp_path / "page.html", of)

@@ -123,8 +123,10 @@ def write_evaluation(path: str | Path, measured: Mapping[str, Any], folder: str 
 
 
 def check_output(path: str | Path, folder: str | Path, ending: str) -> None:
-    """Raise `ShadowPuppetError` where a file that is to be written has another ending or is the run's own."""
+    """Raise `ShadowPuppetError` where a file that is to be written has another ending, no folder, or is the run's own."""
     path = Path(path)
+    if not path.parent.is_dir():
+        raise ShadowPuppetError(f"{path}: cannot be written (there is no folder {path.parent})")
     if path.suffix.lower() != ending:
         raise ShadowPuppetError(f"{path}: found the ending {path.suffix!r}, expected {ending}")
     if path.resolve().parent == Path(folder).resolve() and path.name in (*FILES, "run.toml", "look.json"):

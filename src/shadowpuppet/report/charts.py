@@ -63,11 +63,11 @@ def by_joint_and_time(of: Evaluation) -> str:
     with _drawing("map", (10, 0.6 + 0.21 * len(rows))) as (figure, axes):
         from matplotlib import colormaps
 
-        shown = np.array(rows)
-        top = float(np.nanpercentile(shown, 99)) if np.isfinite(shown).any() else 1.0
+        shown = np.ma.masked_invalid(rows)
+        top = float(np.percentile(shown.compressed(), 99)) if shown.count() else 1.0
         edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:] + 1e-9])
-        axes.set_facecolor("#6b7078")
-        image = axes.pcolormesh(edges, np.arange(len(rows) + 1), shown, cmap=colormaps["YlOrBr"], vmin=0, vmax=top, rasterized=True)
+        colours = colormaps["YlOrBr"].with_extremes(bad="#6b7078")
+        image = axes.pcolormesh(edges, np.arange(len(rows) + 1), shown, cmap=colours, vmin=0, vmax=top, rasterized=True)
         axes.set_yticks(np.arange(len(rows)) + 0.5, [name.replace("_", " ") for name in of.errors.names], fontsize=8.5)
         axes.invert_yaxis()
         axes.grid(False)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 WORST, TYPICAL, MOST_LOST = 6, 2, 2
 """Frames that are shown, and how many of them may be without a pose."""
 BETWEEN = 0.5
-"""Seconds between the worst frames, less in short runs: neighbours show the same."""
+"""Seconds between the worst frames, less in short runs and more in long ones: neighbours show the same."""
 VIEWS = 5
 """Cameras that are shown side by side, of several those that see the person largest."""
 WIDEST = 1280
@@ -211,7 +211,8 @@ def _box(image: Image, camera: Camera, tables: Sequence[JointTable]) -> tuple[sl
 
 def _worst(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
     """The worst frames, in the order of time."""
-    apart = min(BETWEEN, float(times[-1] - times[0]) / (2 * WORST)) if len(times) > 1 else 0.0
+    length = float(times[-1] - times[0])
+    apart = max(min(BETWEEN, length / (2 * WORST)), length / (10 * WORST))
     found: list[int] = []
     for n in np.argsort(-np.nan_to_num(badness, nan=-np.inf), kind="stable"):
         if len(found) == WORST or not np.isfinite(badness[n]):
