@@ -49,13 +49,14 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     from shadowpuppet.report.page import check_report, write_report
     from shadowpuppet.terminal import show, show_json, terminal
 
+    names = [name.strip() for name in joints.split(",")] if joints else None
     if file is not None:
         check_output(file, run, ".json")
     if report is not None:
         check_report(report, run)
     written = {}
     with terminal(quiet=as_json) as shown:
-        found = measure_run(run, truth, Comparison(joints.split(",") if joints else None, start, end, offset, sync, align, angles))
+        found = measure_run(run, truth, Comparison(names, start, end, offset, sync, align, angles))
         if file is not None:
             write_evaluation(file, found.measured, run)
             written["figures"] = file
