@@ -77,7 +77,7 @@ def _silhouettes(of: Evaluation) -> str:
 
 def _under(of: Evaluation) -> str:
     truth = of.measured["truth"]
-    against = f" against <b>{plain(truth)}</b>" if truth else ", without a truth"
+    against = f" against <b>{plain('/'.join(Path(truth).parts[-2:]))}</b>" if truth else ", without a truth"
     return f'<p class="under">{plain(str(of.run.info.get("method", "a run")))}; {len(of.run.motion)} frames{against}</p>'
 
 
