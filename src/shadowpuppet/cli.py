@@ -10,7 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import motion_commands
+from shadowpuppet import evaluation_commands, motion_commands
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.flags import (
     OTHER,
@@ -120,37 +120,6 @@ def info(recording: Recording, /, *, config: Config = None, as_json: AsJson = Fa
         show_json(look)
     if look.refusal:
         raise ShadowPuppetError(f"{recording}: {look.refusal}")
-
-
-@app.command
-def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0,
-             angles: Annotated[bool, Parameter(negative=(), show_default=False)] = False, as_json: AsJson = False) -> None:
-    """Measure a run: joint errors against a truth, overlap, cost, jitter.
-
-    Parameters
-    ----------
-    run
-        Folder that `track` made.
-    truth
-        Joints (.csv or .trc) to compare with. [default: the recording's truth]
-    joints
-        Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
-    start
-        First frame of the truth that counts.
-    angles
-        Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
-    """
-    from shadowpuppet.evaluation import evaluate_run
-    from shadowpuppet.tables import angle_table, error_table, measures_table
-    from shadowpuppet.terminal import show, show_json, terminal
-
-    with terminal():
-        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start, angles)
-    if as_json:
-        show_json(metrics)
-    else:
-        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []),
-             *([angle_table(metrics["angles_deg"])] if angles else []))
 
 
 @app.command
@@ -268,6 +237,7 @@ def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool 
         show(*bench_tables(found))
 
 
+app.command(evaluation_commands.evaluate)
 app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
 app.command(motion_commands.export)

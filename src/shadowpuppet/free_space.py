@@ -1,7 +1,7 @@
 """Where nobody is: what silhouettes rule out, which surface points do not tell.
 
-A limb that reaches out of a silhouette has nothing there to be drawn to, and what draws the body to surface points looks the other way. Here
-spheres along the limbs' axes are pushed into the silhouettes, of every camera, along the way that is shortest in its picture.
+A limb that reaches out of a silhouette has nothing there to be drawn to, and what draws the body to surface points looks the other way.
+Here spheres along the limbs' axes are pushed into the silhouettes, of every camera, along the way that is shortest in its picture.
 """
 
 from __future__ import annotations
