@@ -84,7 +84,7 @@ class Agreement:
 def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan) -> Agreement:
     """How well the cameras' silhouettes fit together: `masks` (H, W) by set and camera, None where there is none.
 
-    `seconds`: from set to set, by which it is told how late a film is.
+    `seconds`: from set to set, by which it is told how late a film is; if left out, sets do not follow one another, and that is not asked.
     """
     scene = _Scene(tuple(cameras), [list(row) for row in masks])
     limit = DISAGREES * max(max(camera.size) for camera in cameras)
@@ -195,6 +195,8 @@ def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: f
     yield (replace(scene, cameras=turned),
            "the calibration says where cameras stand (camera to world), it seems, instead of how the world lies to them; invert every "
            "rotation and translation in calibration.toml")
+    if not np.isfinite(seconds):
+        return
     for n in range(C) if blamed is None and C < 4 else [blamed] if blamed is not None else []:
         for steps in range(-MOVED, MOVED + 1):
             if steps:

@@ -3,8 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.flags import OTHER, LookFlags, options_from
+
+ForCheck = Annotated[LookFlags | None, Parameter(name="*")]
+Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it.")]
+AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
+
+
+def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a calibration, of two cameras or more.")], /, *,
+          config: Config = None, as_json: AsJson = False, flags: ForCheck = None) -> None:
+    """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
+    turned; and by how many frames each film is late."""
+    from shadowpuppet.calibration_tables import check_table
+    from shadowpuppet.rig import open_rig
+    from shadowpuppet.rig_check import check_rig
+    from shadowpuppet.terminal import show, show_json, terminal
+
+    options = options_from(flags, config)
+    with terminal(quiet=as_json) as shown:
+        found = check_rig(open_rig(recording, options), options, shown)
+    if as_json:
+        show_json(found)
+    else:
+        show(check_table(found))
 
 
 def is_explained(path: Path) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from shadowpuppet.rig_check import RigCheck
 from shadowpuppet.standing import SIDE, CalibrationLook, Standpoint
 from shadowpuppet.tables import pairs, plain_table
 
@@ -86,3 +87,23 @@ def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
                          "cameras with arrows the way they look, × the place they look at")
     yield "figures", (f"how many cameras see somebody of 1.80 m whole who stands there: {most} over {whole:.1f} m²" if most
                       else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
+
+
+def check_table(check: RigCheck) -> RenderableType:
+    """What silhouettes say of a calibration."""
+    found, late = check.agreement, check.lateness
+    table = plain_table("", ("camera", "disagrees by", "with", "late by", "sure to", ""), right=(1, 3, 4))
+    for n, name in enumerate(found.names):
+        apart, pairs_of = found.apart[n], [pair for pair in found.pairs[n] if pair is not None]
+        frames, spread = (None, None) if late is None else (late.frames[n], late.spread[n])
+        wrong = [word for word, here in (("place", name in found.wrong or name in check.turns), ("time", name in check.late)) if here]
+        table.add_row(name, "unknown" if apart is None else f"{apart:.1f} px", f"{len(pairs_of)} others",
+                      "unknown" if frames is None else f"{frames + 0:.1f} frames", "" if spread is None else f"{spread:.1f}",
+                      f"wrong: {' and '.join(wrong)}" if wrong else "")
+    rows = [("recording", check.recording),
+            ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
+            ("limit", f"{found.limit:.1f} px; cameras that fit are apart by about one")]
+    if found.height is not None:
+        rows.append(("height", f"{found.height:.2f} m from end to end, as the cameras see it"))
+    verdict = "all cameras agree" if check.good else "\n".join(check.doubts)
+    return Group(pairs(rows), "", table, "", pairs([("verdict", verdict)]))

@@ -280,6 +280,7 @@ def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool 
         show(*bench_tables(found))
 
 
+app.command(calibration_commands.check)
 app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
 
