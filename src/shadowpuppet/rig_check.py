@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.agreement import Agreement, agreement
+from shadowpuppet.agreement import DISAGREES, Agreement, agreement
+from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
 from shadowpuppet.lateness import Lateness, lateness
@@ -20,7 +21,7 @@ from shadowpuppet.options import Options
 from shadowpuppet.rig import Rig, follow, usable_cores
 from shadowpuppet.running import Listener
 from shadowpuppet.tangency import Outline, Outlines
-from shadowpuppet.turning import Turn, turning
+from shadowpuppet.turning import Turn, turned_outline, turning
 
 SETS, LONGEST = 240, 3000
 """Sets of silhouettes that are compared, and among how many they are looked for."""
@@ -34,8 +35,18 @@ LATE, SURE = 0.5, 3.0
 """Frames from which on a film is said to be late, and how many times its pairs' spread."""
 SLIGHT = 0.004
 """Pixels, over the picture's longer side, from which on a camera is looked into that agrees on the whole (2.6 of 640)."""
+ALONE = 3.0
+"""... and how many times as much as the middle one it must disagree, to be named where no turn explains it."""
 MENDS = 0.5
 """A turn is told where no more than this of the disagreement is left."""
+
+
+class Mended(NamedTuple):
+    """What turning a camera back does."""
+
+    turn: Turn
+    apart: float
+    """Pixels by which it then disagrees with the others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +69,7 @@ class RigCheck:
     """Cameras whose films are late or early for certain."""
     starts: dict[str, float]
     """What [start] of recording.toml should say, seconds, where films are late; empty where none is."""
-    turns: dict[str, Turn]
+    turns: dict[str, Mended]
     """By how much cameras that disagree were turned, where that explains it."""
     doubts: tuple[str, ...] = ()
     """What is wrong, and the remedy, a sentence each."""
@@ -85,23 +96,59 @@ def check_rig(rig: Rig, options: Options, listener: Listener | None = None) -> R
     if sum(sum(outline is not None for outline in row) > 1 for row in seen.outlines) < 2:
         raise RecordingError(f"{rig.recording.path}: no two cameras see a person at the same time: do the films belong together?")
     listener.begin("comparing")
-    cameras = rig.cameras
-    found = agreement(cameras, _spread(rig, seen))
-    late = None if found.remedy is not None else lateness(cameras, seen.outlines)
-    shifts = _certain(late)
-    if late is not None and any(shifts):
-        aligned = agreement(cameras, _spread(rig, seen, shifts))
-        if _mean(aligned) < _mean(found):
-            found = aligned
-        else:
-            shifts = [0.0] * len(cameras)
-    turns = _turns(rig, found, _spread(rig, seen, shifts)) if found.remedy is None else {}
+    found, late, shifts, turns = _judged(rig, seen)
     check = RigCheck(
         recording=str(rig.recording.path), sets=len(seen.outlines), rate=rig.rate / every, frame_rate=rig.rate, agreement=found,
         lateness=None if late is None else _in_frames(late, every), turns=turns,
         late=tuple(name for name, shift in zip(rig.names, shifts) if shift), starts=_starts(rig, shifts, every),
     )  # fmt: skip
     return replace(check, doubts=tuple(_doubts(check)))
+
+
+class _Judgement(NamedTuple):
+    agreement: Agreement
+    lateness: Lateness | None
+    shifts: list[float]
+    """Sets by which each film is late for certain."""
+    turns: dict[str, Mended]
+
+
+def _judged(rig: Rig, seen: _Seen) -> _Judgement:
+    """Places and times. A camera that was turned is turned back before times are asked for, and asked again once they are right."""
+    still, rows = [0.0] * len(rig.cameras), _spread(rig, seen)
+    found = agreement(rig.cameras, rows)
+    if found.remedy is not None:
+        return _Judgement(found, None, still, {})
+    turns = _turns(rig, found, rows)
+    late = _late(rig, seen, turns)
+    shifts = _certain(late)
+    if not any(shifts):
+        return _Judgement(found, late, still, turns)
+    aligned = _spread(rig, seen, shifts)
+    later = agreement(rig.cameras, aligned, remedies=False)
+    then = _turns(rig, later, aligned)
+    if _left(later, then) >= _left(found, turns):
+        return _Judgement(found, late, still, turns)  # what differs is not time
+    late = _late(rig, seen, then)
+    return _Judgement(later, late, _certain(late), then)
+
+
+def _left(found: Agreement, turns: dict[str, Mended]) -> float:
+    """Pixels by which cameras disagree, mean, once those that were turned are turned back."""
+    known = [turns[name].apart if name in turns else apart for name, apart in zip(found.names, found.apart) if apart is not None]
+    return float(np.mean(known)) if known else np.inf
+
+
+def _mended(rig: Rig, turns: dict[str, Mended]) -> tuple[Camera, ...]:
+    return tuple(turns[camera.name].turn.of(camera) if camera.name in turns else camera for camera in rig.cameras)
+
+
+def _late(rig: Rig, seen: _Seen, turns: dict[str, Mended]) -> Lateness:
+    """How late films are, with cameras that were turned turned back."""
+    mended = _mended(rig, turns)
+    rows = [[turned_outline(outline, before, after) if outline is not None and before is not after else outline
+             for outline, before, after in zip(row, rig.cameras, mended)] for row in seen.outlines]
+    return lateness(mended, rows)
 
 
 def _gathered(rig: Rig, options: Options, every: int, listener: Listener) -> _Seen:
@@ -151,19 +198,26 @@ def _certain(late: Lateness | None) -> list[float]:
             for frames, spread in zip(late.frames, late.spread)]
 
 
-def _mean(found: Agreement) -> float:
-    known = [apart for apart in found.apart if apart is not None]
-    return float(np.mean(known)) if known else np.inf
-
-
-def _turns(rig: Rig, found: Agreement, rows: Sequence[Sequence[Mask | None]]) -> dict[str, Turn]:
+def _turns(rig: Rig, found: Agreement, rows: Sequence[Sequence[Mask | None]]) -> dict[str, Mended]:
     """Turns of cameras that disagree, or of the worst one, where they mend it."""
-    slight = SLIGHT * max(max(camera.size) for camera in rig.cameras)
+    turns = {}
+    for name in found.wrong or _standing_out(found, 1.0):
+        n = rig.names.index(name)
+        turn, apart = turning(rig.cameras, rows, n), found.apart[n]
+        if turn is not None and apart is not None:
+            after = agreement([turn.of(camera) if k == n else camera for k, camera in enumerate(rig.cameras)], rows,
+                              remedies=False).apart[n]
+            if after is not None and after < MENDS * apart and after < found.limit:
+                turns[name] = Mended(turn, after)
+    return turns
+
+
+def _standing_out(found: Agreement, times: float) -> tuple[str, ...]:
+    """The camera that disagrees most, where it does by more than good ones do, and so many times as much as the middle one."""
     apart = {name: value for name, value in zip(found.names, found.apart) if value is not None}
-    worst = max(apart, key=lambda name: apart[name], default=None)
-    asked = found.wrong or ((worst,) if worst is not None and apart[worst] > slight else ())
-    turns = {name: turn for name in asked if (turn := turning(rig.cameras, rows, rig.names.index(name))) is not None}
-    return {name: turn for name, turn in turns.items() if turn.after < MENDS * turn.before and turn.after < found.limit}
+    worst = max(apart, key=lambda name: apart[name], default="")
+    least = max(SLIGHT / DISAGREES * found.limit, times * float(np.median(list(apart.values()))) if apart else 0.0)
+    return (worst,) if worst and len(apart) > 2 and apart[worst] > least else ()
 
 
 def _in_frames(late: Lateness, every: int) -> Lateness:
@@ -192,11 +246,15 @@ def _doubts(check: RigCheck) -> list[str]:
     if found.hopeless and found.remedy is not None:
         return [*said, found.remedy]
     said += [doubt for doubt in found.doubts() if not any(f"camera {name!r} disagrees" in doubt for name in check.turns)]
-    for name, turn in check.turns.items():
-        apart = found.apart[found.names.index(name)]
-        said.append(f"camera {name!r} disagrees with the others by {apart:.1f} pixels, as if it had been turned by {turn.degrees:.1f} degrees "
-                    f"({_ways(turn)}) since it was calibrated; turned back, it would by {turn.after:.1f} instead of {turn.before:.1f}: calibrate "
-                    f"it again, or leave it out: --camera {','.join(other for other in found.names if other != name)}")
+    for name in check.turns or (() if found.doubts() else _standing_out(found, ALONE)):
+        others = [other for other in found.names if other != name]
+        rest = max(value for other, value in zip(found.names, found.apart) if other != name and value is not None)
+        told = f"camera {name!r} disagrees with the others by {found.apart[found.names.index(name)]:.1f} pixels, they by {rest:.1f} at most"
+        if name in check.turns:
+            turn, after = check.turns[name]
+            told += (f"; it is as if it had been turned by {turn.degrees:.1f} degrees ({_ways(turn)}) since it was calibrated: turned back, "
+                     f"{after:.1f} pixels would be left")
+        said.append(f"{told}; calibrate it again, or leave it out: --camera {','.join(others)}")
     return said
 
 
