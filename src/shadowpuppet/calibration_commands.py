@@ -67,5 +67,5 @@ def refuse_for_recordings(path: Path, to: Path | None, unit: str | None, up: str
     """Raise `SettingsError` for flags that serve calibrations only."""
     for name, value in (("to", to), ("unit", unit), ("up", up)):
         if value is not None:
-            raise SettingsError(f"flags: {name}: found {str(value)!r} for {path}, which is no calibration file; a recording has unit and up in "
-                                "its recording.toml")
+            raise SettingsError(f"flags: {name}: found {str(value)!r} for {path}, which is no calibration file; a recording has unit and "
+                                "up in its recording.toml")

@@ -83,8 +83,8 @@ def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
     most = max((count for row in look.seen for count in row), default=0)
     cell = (x1 - x0) * (y1 - y0) / sum(map(len, look.seen))
     whole = sum(count == most for row in look.seen for count in row) * cell
-    yield "from above", (f"{x1 - x0:.1f} m to a side, x to the right from {x0:.1f} to {x1:.1f}, y up from {y0:.1f} to {y1:.1f}; letters are "
-                         "cameras with arrows the way they look, × the place they look at")
+    yield "from above", (f"{x1 - x0:.1f} m to a side, x to the right from {x0:.1f} to {x1:.1f}, y up from {y0:.1f} to {y1:.1f}; "
+                         "letters are cameras with arrows the way they look, × the place they look at")
     yield "figures", (f"how many cameras see somebody of 1.80 m whole who stands there: {most} over {whole:.1f} m²" if most
                       else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
 

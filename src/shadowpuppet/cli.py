@@ -51,11 +51,12 @@ ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
 ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
-To = Annotated[Path | None, Parameter(group=CAMERAS, help="Write the calibration there: NAME.toml for Pose2Sim, Anipose and this program, or "
-                                                          "a folder for EasyMocap's intri.yml and extri.yml.")]
+To = Annotated[Path | None, Parameter(group=CAMERAS, help="Write the calibration there: NAME.toml for Pose2Sim, Anipose and this program, "
+                                                          "or a folder for EasyMocap's intri.yml and extri.yml.")]
 Unit = Annotated[str | None, Parameter(group=CAMERAS, help="What the calibration's lengths are in, where it does not say: m, cm or mm.")]
-Up = Annotated[str | None, Parameter(group=CAMERAS, allow_leading_hyphen=True, help="What is up in the calibration's world: z, y, x, -z, -y, -x, or cameras (as their "
-                                                         "pictures say, on the whole).")]
+Up = Annotated[str | None, Parameter(group=CAMERAS, allow_leading_hyphen=True,
+                                     help="What is up in the calibration's world: z, y, x, -z, -y, -x, or cameras (as their pictures say, "
+                                          "on the whole).")]
 SpecPath = Annotated[Path | None, Parameter(help="File that describes it, TOML, as --show-spec prints it, or the spec.toml of a made "
                                                  "recording.")]
 Like = Annotated[str | None, Parameter(group=RUN, help="Begin with a named spec; --list names them.")]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
@@ -75,9 +76,8 @@ def tangent_signals(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline |
     signals, reference = np.full((2, 2, len(rows)), np.nan), None
     levers = []
     for f, row in enumerate(rows):
-        if row[i] is None or row[j] is None:
-            continue
-        found = tangent_angles((cameras[i], cameras[j]), (row[i], row[j]), reference)
+        a, b = row[i], row[j]
+        found = None if a is None or b is None else tangent_angles((cameras[i], cameras[j]), (a, b), reference)
         if found is not None:
             reference = found.reference if reference is None else reference
             signals[:, :, f] = found.angles
@@ -88,7 +88,7 @@ def tangent_signals(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline |
 def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
     """The shift at which two cameras' signals differ least; None where none does markedly."""
     shifts = np.arange(-most, most + 1)
-    cost = np.array([_difference(signals, s) for s in shifts])
+    cost = np.array([_difference(signals, s) for s in shifts.tolist()])
     if np.isfinite(cost).sum() < 5:
         return None
     usual, k = float(np.nanmedian(cost)), int(np.nanargmin(cost))
@@ -114,7 +114,7 @@ def _difference(signals: Array, shift: int) -> float:
     return total / tangents if tangents else np.nan
 
 
-def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, np.ndarray]:
+def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, NDArray[np.bool_]]:
     """Sets (C,) by which each is late against most others, least absolute differences; and which of them are known (C,)."""
     late, known = np.zeros(count), np.zeros(count, bool)
     for pair in pairs:
@@ -125,7 +125,7 @@ def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, np.ndarray]:
         for n, (pair, weight) in enumerate(zip(pairs, np.sqrt(weights))):
             A[n, [pair.first, pair.second]], b[n] = (-weight, weight), weight * pair.shift
         A[-1] = 1e-3  # all may be shifted together
-        late = np.linalg.lstsq(A, b, rcond=None)[0]
+        late = np.asarray(np.linalg.lstsq(A, b, rcond=None)[0], float)
         off = np.array([abs(late[pair.second] - late[pair.first] - pair.shift) for pair in pairs])
         weights = np.array([pair.weight for pair in pairs]) / np.maximum(off, 0.05)
     if known.sum() == 2:

@@ -252,8 +252,8 @@ def _doubts(check: RigCheck) -> list[str]:
         told = f"camera {name!r} disagrees with the others by {found.apart[found.names.index(name)]:.1f} pixels, they by {rest:.1f} at most"
         if name in check.turns:
             turn, after = check.turns[name]
-            told += (f"; it is as if it had been turned by {turn.degrees:.1f} degrees ({_ways(turn)}) since it was calibrated: turned back, "
-                     f"{after:.1f} pixels would be left")
+            told += (f"; it is as if it had been turned by {turn.degrees:.1f} degrees ({_ways(turn)}) since it was calibrated: turned "
+                     f"back, {after:.1f} pixels would be left")
         said.append(f"{told}; calibrate it again, or leave it out: --camera {','.join(others)}")
     return said
 

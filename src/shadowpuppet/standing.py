@@ -209,8 +209,8 @@ def _lens_doubts(camera: Camera) -> Iterator[str]:
     aside = np.abs(camera.matrix[:2, 2] / (np.array(camera.size) - 1) - 0.5)
     if (aside > ASIDE).any():
         x, y = camera.matrix[:2, 2]
-        yield (f"camera {camera.name!r}: the principal point {x:.0f}, {y:.0f} is far from the middle of {camera.size[0]} x {camera.size[1]} "
-               "pixels: was it calibrated in pictures of another size?")
+        yield (f"camera {camera.name!r}: the principal point {x:.0f}, {y:.0f} is far from the middle of {camera.size[0]} x "
+               f"{camera.size[1]} pixels: was it calibrated in pictures of another size?")
     corner = np.abs(np.array([[0, 0], np.array(camera.size) - 1]) - camera.matrix[:2, 2]).max(0) / np.diag(camera.matrix)[:2]
     if camera.reach < 0.9 * float(np.linalg.norm(corner)) and not camera.fisheye:
         share = camera.reach / float(np.linalg.norm(corner))

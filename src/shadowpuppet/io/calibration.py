@@ -33,6 +33,8 @@ SIZES = ((640, 480), (848, 480), (800, 600), (1024, 768), (1280, 720), (1280, 96
 """Pictures that there are; what a file without sizes is held against, with twice the principal point."""
 NEAR = 0.08
 """How far twice the principal point may be from such a size, relatively."""
+PARALLEL, BORNE_OUT = 0.02, 0.8
+"""How much rows of pictures must differ in direction, and agree with what is up in them, to tell what is level."""
 HEAD = 4096
 """Bytes by which a format is known."""
 
@@ -63,16 +65,20 @@ class Calibration:
     """What a user should know of how it was read, a sentence each."""
 
 
-FORMATS = (
-    Format("Qualisys (.qca.txt)", lambda path, text: "<calibration" in text and "<camera" in text, read_qualisys),
-    Format("Vicon (.xcp)", lambda path, text: "<Cameras" in text or path.suffix.lower() == ".xcp", read_vicon),
-    Format("EasyMocap (intri.yml, extri.yml)", lambda path, text: path.stem in ("intri", "extri") and path.suffix in SUFFIXES, read_opencv),
-    Format("OpenCV (YAML, XML)", lambda path, text: path.suffix.lower() in SUFFIXES or "<opencv_storage" in text or "!!opencv-matrix" in text,
-           read_opencv),
-    Format("HumanEva (.cal)", lambda path, text: path.suffix.lower() == ".cal", read_bouguet),
-    Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
-           lambda path, text: path.suffix.lower() == ".toml" or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables),
-)  # fmt: skip
+def _ends(path: Path, *endings: str) -> bool:
+    return path.suffix.lower() in endings
+
+
+QUALISYS = Format("Qualisys (.qca.txt)", lambda path, text: "<calibration" in text and "<camera" in text, read_qualisys)
+VICON = Format("Vicon (.xcp)", lambda path, text: "<Cameras" in text or _ends(path, ".xcp"), read_vicon)
+EASYMOCAP = Format("EasyMocap (intri.yml, extri.yml)",
+                   lambda path, text: path.stem in ("intri", "extri") and _ends(path, *SUFFIXES), read_opencv)
+OPENCV = Format("OpenCV (YAML, XML)",
+                lambda path, text: _ends(path, *SUFFIXES) or "<opencv_storage" in text or "!!opencv-matrix" in text, read_opencv)
+HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
+TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
+                lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
+FORMATS = (QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
 """By what they are known, in this order."""
 
 
@@ -116,19 +122,19 @@ def format_of(path: Path) -> Format:
     """The kind of calibration that a file or folder is. Raises `CalibrationError` where it is none that is known."""
     if path.is_dir():
         if any(path.glob("*.cal")):
-            return FORMATS[4]
+            return HUMANEVA
         if not files_of(path):
             raise CalibrationError(f"{path}: is a directory, and no calibration is in it that takes a whole one, expected a file, a folder "
                                    "with EasyMocap's intri.yml and extri.yml, or one with a .cal or OpenCV file a camera")
-        return FORMATS[2 if any(map(pair_of, files_of(path))) else 3]
+        return EASYMOCAP if any(file.stem in ("intri", "extri") for file in files_of(path)) else OPENCV
     try:
         with path.open("rb") as file:
             head = file.read(HEAD)
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be read ({reason(error)})") from None
     if path.suffix.lower() in (".pickle", ".pkl") or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5"):
-        raise CalibrationError(f"{path}: is a pickle, as OpenCap saves calibrations: reading one runs any program that is in it, so it is not "
-                               "opened here; where you trust it, Pose2Sim makes TOML of it (calibration type convert, from opencap)")
+        raise CalibrationError(f"{path}: is a pickle, as OpenCap saves calibrations: reading one runs any program that is in it, so it is "
+                               "not opened here; where you trust it, Pose2Sim makes TOML of it (calibration type convert, from opencap)")
     text = head.decode("utf-8", "replace")
     kind = next((kind for kind in FORMATS if kind.fits(path, text)), None)
     if kind is None:
@@ -142,7 +148,7 @@ def is_calibration(path: Path) -> bool:
         kind = format_of(path)
     except CalibrationError:
         return path.suffix.lower() in (".pickle", ".pkl")
-    if path.is_file() and kind is FORMATS[-1]:
+    if path.is_file() and kind is TABLES:
         with path.open("rb") as file:
             return b"matrix" in file.read(HEAD)
     return True
@@ -170,10 +176,10 @@ def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
     twice = 2 * np.asarray(draft.matrix, float)[:2, 2] + 1
     if not (np.isfinite(twice).all() and (twice >= 2).all() and (twice < 1e5).all()):
         raise CalibrationError(f"found no picture size, and a principal point of {((twice - 1) / 2).tolist()}, expected one in the picture")
-    known = [size for wide in SIZES for size in (wide, wide[::-1])]
+    known = [size for wide, high in SIZES for size in ((wide, high), (high, wide))]
     off = np.abs(np.array(known) / twice - 1).max(1)
     best = int(off.argmin())
-    size = known[best] if off[best] < NEAR else (round(twice[0]), round(twice[1]))
+    size: tuple[float, float] = known[best] if off[best] < NEAR else (round(float(twice[0])), round(float(twice[1])))
     notes.append(f"camera {draft.name!r}: no picture size in the file: taken for {size[0]} x {size[1]}, by the principal point")
     return size
 
@@ -182,9 +188,21 @@ def stood_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
     """Cameras in a world that is turned so that its direction `up` (`UPS`) is Z."""
     direction = UPS[up]
     if direction is None:
-        direction = -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
+        direction = _level(cameras)
     turn = _turn_to_z(np.asarray(direction, float))
     return tuple(replace(camera, T_camera_world=camera.T_camera_world @ inverse(turn)) for camera in cameras)
+
+
+def _level(cameras: tuple[Camera, ...]) -> Array:
+    """What is up (3,) where cameras are not rolled: at right angles to the rows of all pictures, whatever they are tilted by.
+
+    What is up in the pictures on the whole, where rows are parallel, or do not bear it out.
+    """
+    mean = -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
+    rows = np.array([camera.T_camera_world[0, :3] for camera in cameras])
+    sizes, axes = np.linalg.eigh(rows.T @ rows / len(rows))
+    up = axes[:, 0] * np.sign(axes[:, 0] @ mean)
+    return up if sizes[1] > PARALLEL and up @ mean > BORNE_OUT * np.linalg.norm(mean) else mean
 
 
 def _turn_to_z(direction: Array) -> Array:

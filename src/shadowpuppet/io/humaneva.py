@@ -15,9 +15,8 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
-from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
-from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import read_text, write_whole
 from shadowpuppet.io.c3d import read_c3d
 from shadowpuppet.io.calibration import write_calibration

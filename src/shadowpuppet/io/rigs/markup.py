@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 from xml.etree.ElementTree import Element, ParseError, XMLPullParser
 
 from shadowpuppet.errors import CalibrationError
@@ -23,7 +24,7 @@ def tree_of(path: Path) -> Element:
     try:
         for start in range(0, len(text), 4096):
             parser.feed(text[start : start + 4096])
-            for event, element in parser.read_events():
+            for event, element in cast("Iterator[tuple[str, Element]]", parser.read_events()):
                 root = element if root is None else root
                 depth += 1 if event == "start" else -1
                 if depth > DEEPEST:
@@ -31,7 +32,7 @@ def tree_of(path: Path) -> Element:
         parser.close()
     except (ParseError, ValueError) as error:
         raise CalibrationError(f"{path}: not valid XML: {error}") from None
-    if root is None or not isinstance(root, Element):
+    if root is None:
         raise CalibrationError(f"{path}: not valid XML: no element in it")
     return root
 

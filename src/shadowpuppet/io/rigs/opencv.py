@@ -78,7 +78,8 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft]
     cameras = _grouped(values)
     lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
     if not lenses:
-        raise CalibrationError(f"{path}: no camera matrix in it, expected camera_matrix, or K_<camera> for each; found {choices(values)[:200]}")
+        raise CalibrationError(f"{path}: no camera matrix in it, expected camera_matrix, or K_<camera> for each; found "
+                               f"{choices(values)[:200]}")
     shared = cameras.get("", {})
     if len(lenses) == 2 and "" not in lenses and not any("rotation" in parts for parts in lenses.values()) and "rotation" in shared:
         first, second = sorted(lenses)
@@ -88,8 +89,8 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft]
         parts.update({key: shared[key] for key in ("width", "height", "size") if key in shared and key not in parts})
     bare = [end or alone for end, parts in lenses.items() if "rotation" not in parts]
     if bare and len(lenses) > 1:
-        raise CalibrationError(f"{path}: no rotation of {choices(bare)}, expected R and T (or rvec and tvec) of every camera; EasyMocap has "
-                               "them in extri.yml beside intri.yml")
+        raise CalibrationError(f"{path}: no rotation of {choices(bare)}, expected R and T (or rvec and tvec) of every camera; EasyMocap "
+                               "has them in extri.yml beside intri.yml")
     notes = [f"{path.name} tells of the lens alone: the camera is taken for level, at the world's origin"] if bare else []
     fisheye = str(values.get("distortion_model", values.get("camera_model", ""))).lower() in ("fisheye", "equidistant")
     named = values.get("camera_name") if len(lenses) == 1 and isinstance(values.get("camera_name"), str) else None
@@ -148,7 +149,8 @@ def easymocap_texts(cameras: Sequence[Camera]) -> tuple[str, str]:
         if camera.fisheye:
             raise CalibrationError(f"camera {camera.name!r} is a fisheye, which EasyMocap's files have no place for; write TOML")
         if not re.fullmatch(r"[A-Za-z0-9_-]+", camera.name):
-            raise CalibrationError(f"camera {camera.name!r}: OpenCV's files take letters, digits, - and _ in names; rename it, or write TOML")
+            raise CalibrationError(f"camera {camera.name!r}: OpenCV's files take letters, digits, - and _ in names; rename it, or write "
+                                   "TOML")
     head = "%YAML:1.0\n---\nnames:\n" + "".join(f'  - "{camera.name}"\n' for camera in cameras)
     intri, extri = [head], [head]
     for camera in cameras:

@@ -100,7 +100,8 @@ def _below(path: Path, key: str, value: str, below: list[str]) -> Any:
 def _matrix(path: Path, key: str, table: dict[str, str]) -> Array | None:
     shape = numbers_of(f"{table['rows']} {table['cols']}", (2,))
     if shape is None or (shape < 0).any() or (shape % 1).any():
-        raise CalibrationError(f"{path}: {key}: found {table['rows'][:20]!r} rows and {table['cols'][:20]!r} columns, expected whole numbers")
+        raise CalibrationError(f"{path}: {key}: found {table['rows'][:20]!r} rows and {table['cols'][:20]!r} columns, expected whole "
+                               "numbers")
     rows, cols = int(shape[0]), int(shape[1])
     if rows * cols > LARGEST:
         return None  # nothing that a camera is told by

@@ -53,7 +53,7 @@ def _draft(entry: Entry, notes: list[str]) -> Draft:
     frame = entry.child("KeyFrames/KeyFrame")
     size = entry.numbers("SENSOR_SIZE", (2,))
     focal, aspect = frame.number("FOCAL_LENGTH"), entry.number("PIXEL_ASPECT_RATIO", "1")
-    if not (focal > 0 and aspect > 0 and (0 < size).all() and (size < 1e5).all()):
+    if not (focal > 0 and aspect > 0 and (size > 0).all() and (size < 1e5).all()):
         raise CalibrationError(f"{entry.path}: camera {entry.camera!r}: found a focal length of {focal:g}, an aspect ratio of {aspect:g} "
                                f"and a sensor of {size.tolist()}, expected positive numbers")
     principal = frame.numbers("PRINCIPAL_POINT", (2,))
