@@ -113,7 +113,8 @@ def qualisys(made: Sequence[Camera]) -> str:
                 f'<intrinsic focallength="9.3" sensorMinU="0" sensorMaxU="{64 * w}" sensorMinV="0" sensorMaxV="{64 * h}"\n'
                 f' focalLengthU="{64 * camera.matrix[0, 0]}" focalLengthV="{64 * camera.matrix[1, 1]}" centerPointU="'
                 f'{64 * (camera.matrix[0, 2] + 16)}" centerPointV="{64 * (camera.matrix[1, 2] + 8)}" skew="0" radialDistortion1="{k1}"\n'
-                f' radialDistortion2="{k2}" radialDistortion3="{k3}" tangentalDistortion1="{p1}" tangentalDistortion2="{p2}"/>\n</camera>\n')
+                f' radialDistortion2="{k2}" radialDistortion3="{k3}" tangentalDistortion1="{p1}" tangentalDistortion2="{p2}"/>\n'
+                "</camera>\n")
 
     body = "".join(camera_text(camera, "Miqus Video") for camera in made)
     body += camera_text(replace(made[0], name="marker"), "Oqus 400") + camera_text(replace(made[0], name="off"), "Miqus Video", 0)
@@ -155,7 +156,8 @@ def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
     texts = {"anipose.toml": toml(made), "freemocap.toml": freemocap(made), "camera_array.toml": caliscope(made),
              "Calib.qca.txt": qualisys(made), "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
     for camera in made:
-        texts |= {f"cal/{camera.name}.cal": cal(camera), f"yaml/{camera.name}.yml": opencv(camera), f"xml/{camera.name}.xml": opencv_xml(camera)}
+        texts |= {f"cal/{camera.name}.cal": cal(camera), f"yaml/{camera.name}.yml": opencv(camera)}
+        texts |= {f"xml/{camera.name}.xml": opencv_xml(camera)}
     for name, text in texts.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)

@@ -121,7 +121,7 @@ def _standpoint(camera: Camera, middle: Array | None) -> Standpoint:
     return Standpoint(
         name=camera.name, size=(width, height), fov=(fov[0], fov[1]), lens=lens, bend=_bend(camera), place=_three(camera.centre),
         facing=float(np.degrees(np.arctan2(R[2, 1], R[2, 0]))),
-        down=float(np.degrees(-np.arcsin(np.clip(R[2, 2], -1, 1)))), roll=float(np.degrees(np.arctan2(R[0, 2], -R[1, 2]))), away=away,
+        down=float(np.degrees(-np.arcsin(np.clip(R[2, 2], -1, 1)))), roll=float(np.degrees(np.arctan2(-R[0, 2], -R[1, 2]))), away=away,
         placed=camera.oriented,
     )  # fmt: skip
 
