@@ -155,6 +155,13 @@ def test_turned_and_late_at_once(tmp_path, cameras, masks):
     assert len(found.doubts) == 2
 
 
+def test_a_camera_that_was_carried_off_is_named_and_not_late(again, cameras):
+    carried = replace(cameras[2], T_camera_world=rigid(np.eye(3), [0.4, 0, 0]) @ cameras[2].T_camera_world)
+    found = checked(again([*cameras[:2], carried, cameras[3]]))
+    assert found.late == ()
+    assert any("camera 'cam3' disagrees" in doubt for doubt in found.doubts)
+
+
 def test_swapped_films_are_told_and_no_time_is(recording, again, cameras):
     swapped = [replace(cameras[1], name="cam1"), replace(cameras[0], name="cam2"), *cameras[2:]]
     found = checked(again(swapped))

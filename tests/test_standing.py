@@ -85,7 +85,7 @@ def test_what_is_odd_is_doubted(tmp_path, rig):
     assert "is that in metres?" in doubts(scaled(20))
     assert "is that in metres?" in doubts(scaled(0.01))
     assert "stand at the same place" in doubts([rig[0], replace(rig[0], name="copy"), *rig[1:]])
-    off = rig[0].matrix + [[0, 0, 250], [0, 0, 0], [0, 0, 0]]
+    off = rig[0].matrix + np.array([[0, 0, 250], [0, 0, 0], [0, 0, 0]])
     assert "the principal point" in doubts([replace(rig[0], matrix=off), *rig[1:]])
     assert "turns back at" in doubts([replace(rig[0], distortion=np.array([-0.9, 0, 0, 0])), *rig[1:]])
     away = replace(rig[0], T_camera_world=rigid(rotation_from_vector([0, np.radians(70), 0]), np.zeros(3)) @ rig[0].T_camera_world)

@@ -31,8 +31,9 @@ COMPARED = 12
 """Sets, spread over them, by which places are judged."""
 BRIEFLY = 240
 """Frames of each film that are looked at where its background need not be made from it."""
-LATE, SURE = 0.5, 3.0
-"""Frames from which on a film is said to be late, and how many times its pairs' spread."""
+LATE, MISPLACED, SURE = 0.5, 1.5, 3.0
+"""Sets from which on a film is said to be late; the same of a camera that disagrees about places, where time is told less well; and how
+many times its pairs' spread."""
 SLIGHT = 0.004
 """Pixels, over the picture's longer side, from which on a camera is looked into that agrees on the whole (2.6 of 640)."""
 ALONE = 3.0
@@ -80,27 +81,33 @@ class RigCheck:
         return not self.doubts
 
 
-class _Seen(NamedTuple):
-    """Sets of silhouettes that follow one another."""
+class Seen(NamedTuple):
+    """Sets of silhouettes that follow one another, by camera."""
 
     packed: list[list[NDArray[np.uint8] | None]]
-    """Bits of masks, by set and camera."""
+    """Bits of masks; None where nobody is seen."""
     outlines: list[list[Outline | None]]
+    every: int
+    """Frames of the films from set to set."""
 
 
 def check_rig(rig: Rig, options: Options, listener: Listener | None = None) -> RigCheck:
     """Test the calibration of several cameras. Raises a `ShadowPuppetError` where silhouettes cannot be had, or show nobody."""
     listener = listener or Listener()
-    every = max(1, round(rig.rate / FASTEST))
-    seen = _gathered(rig, options, every, listener)
+    seen = gather(rig, options, listener)
+    listener.begin("comparing")
+    return judge(rig, seen)
+
+
+def judge(rig: Rig, seen: Seen) -> RigCheck:
+    """What silhouettes say of the calibration of `rig`. Raises `RecordingError` where no two cameras see a person at a time."""
     if sum(sum(outline is not None for outline in row) > 1 for row in seen.outlines) < 2:
         raise RecordingError(f"{rig.recording.path}: no two cameras see a person at the same time: do the films belong together?")
-    listener.begin("comparing")
     found, late, shifts, turns = _judged(rig, seen)
     check = RigCheck(
-        recording=str(rig.recording.path), sets=len(seen.outlines), rate=rig.rate / every, frame_rate=rig.rate, agreement=found,
-        lateness=None if late is None else _in_frames(late, every), turns=turns,
-        late=tuple(name for name, shift in zip(rig.names, shifts) if shift), starts=_starts(rig, shifts, every),
+        recording=str(rig.recording.path), sets=len(seen.outlines), rate=rig.rate / seen.every, frame_rate=rig.rate, agreement=found,
+        lateness=None if late is None else _in_frames(late, seen.every), turns=turns,
+        late=tuple(name for name, shift in zip(rig.names, shifts) if shift), starts=_starts(rig, shifts, seen.every),
     )  # fmt: skip
     return replace(check, doubts=tuple(_doubts(check)))
 
@@ -113,7 +120,7 @@ class _Judgement(NamedTuple):
     turns: dict[str, Mended]
 
 
-def _judged(rig: Rig, seen: _Seen) -> _Judgement:
+def _judged(rig: Rig, seen: Seen) -> _Judgement:
     """Places and times. A camera that was turned is turned back before times are asked for, and asked again once they are right."""
     still, rows = [0.0] * len(rig.cameras), _spread(rig, seen)
     found = agreement(rig.cameras, rows)
@@ -121,7 +128,7 @@ def _judged(rig: Rig, seen: _Seen) -> _Judgement:
         return _Judgement(found, None, still, {})
     turns = _turns(rig, found, rows)
     late = _late(rig, seen, turns)
-    shifts = _certain(late)
+    shifts = _certain(late, found)
     if not any(shifts):
         return _Judgement(found, late, still, turns)
     aligned = _spread(rig, seen, shifts)
@@ -130,7 +137,7 @@ def _judged(rig: Rig, seen: _Seen) -> _Judgement:
     if _left(later, then) >= _left(found, turns):
         return _Judgement(found, late, still, turns)  # what differs is not time
     late = _late(rig, seen, then)
-    return _Judgement(later, late, _certain(late), then)
+    return _Judgement(later, late, _certain(late, later), then)
 
 
 def _left(found: Agreement, turns: dict[str, Mended]) -> float:
@@ -143,7 +150,7 @@ def _mended(rig: Rig, turns: dict[str, Mended]) -> tuple[Camera, ...]:
     return tuple(turns[camera.name].turn.of(camera) if camera.name in turns else camera for camera in rig.cameras)
 
 
-def _late(rig: Rig, seen: _Seen, turns: dict[str, Mended]) -> Lateness:
+def _late(rig: Rig, seen: Seen, turns: dict[str, Mended]) -> Lateness:
     """How late films are, with cameras that were turned turned back."""
     mended = _mended(rig, turns)
     rows = [[turned_outline(outline, before, after) if outline is not None and before is not after else outline
@@ -151,12 +158,13 @@ def _late(rig: Rig, seen: _Seen, turns: dict[str, Mended]) -> Lateness:
     return lateness(mended, rows)
 
 
-def _gathered(rig: Rig, options: Options, every: int, listener: Listener) -> _Seen:
+def gather(rig: Rig, options: Options, listener: Listener) -> Seen:
     """Silhouettes from the first set on in which two cameras see a person."""
+    every = max(1, round(rig.rate / FASTEST))
     listener.begin("looking")
     with ThreadPoolExecutor(usable_cores(), "check") as pool:
         see = list(pool.map(lambda footage: _silhouettes(footage, options), rig.footage))
-    seen = _Seen([], [])
+    seen = Seen([], [], every)
     listener.begin("reading", SETS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when a run comes to it
@@ -177,7 +185,7 @@ def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
     return silhouettes(footage, sample, options)
 
 
-def _spread(rig: Rig, seen: _Seen, shifts: Sequence[float] | None = None) -> list[list[Mask | None]]:
+def _spread(rig: Rig, seen: Seen, shifts: Sequence[float] | None = None) -> list[list[Mask | None]]:
     """Some sets of masks, each camera's so many sets later."""
     steps, F = [round(shift) for shift in shifts or [0.0] * len(rig.cameras)], len(seen.packed)
     first, last = max(0, -min(steps)), F - 1 - max(0, *steps)
@@ -190,12 +198,10 @@ def _unpacked(bits: NDArray[np.uint8] | None, size: tuple[int, int]) -> Mask | N
     return None if bits is None else np.unpackbits(bits, count=size[0] * size[1]).reshape(size[1], size[0]).astype(bool)
 
 
-def _certain(late: Lateness | None) -> list[float]:
+def _certain(late: Lateness, found: Agreement) -> list[float]:
     """Sets by which films are late for certain; 0 for the others."""
-    if late is None:
-        return []
-    return [frames if frames is not None and abs(frames) > LATE and abs(frames) > SURE * (spread or 0.0) else 0.0
-            for frames, spread in zip(late.frames, late.spread)]
+    least = [max(MISPLACED if name in found.wrong else LATE, SURE * (spread or 0.0)) for name, spread in zip(late.names, late.spread)]
+    return [frames if frames is not None and abs(frames) > limit else 0.0 for frames, limit in zip(late.frames, least)]
 
 
 def _turns(rig: Rig, found: Agreement, rows: Sequence[Sequence[Mask | None]]) -> dict[str, Mended]:
