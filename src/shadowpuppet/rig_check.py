@@ -23,8 +23,8 @@ from shadowpuppet.running import Listener
 from shadowpuppet.tangency import Outline, Outlines
 from shadowpuppet.turning import Turn, turned_outline, turning
 
-SETS, LONGEST = 240, 3000
-"""Sets of silhouettes that are compared, and among how many they are looked for."""
+SETS, FEWEST, LONGEST = 240, 120, 3000
+"""Sets of silhouettes that are compared, so many at least where the films are long enough, and among how many they are looked for."""
 FASTEST = 31.0
 """Sets/s at most: more of them tell no more."""
 COMPARED = 12
@@ -160,7 +160,7 @@ def _late(rig: Rig, seen: Seen, turns: dict[str, Mended]) -> Lateness:
 
 def gather(rig: Rig, options: Options, listener: Listener) -> Seen:
     """Silhouettes from the first set on in which two cameras see a person."""
-    every = max(1, round(rig.rate / FASTEST))
+    every = max(1, min(round(rig.rate / FASTEST), (rig.count or SETS * 9) // FEWEST))
     listener.begin("looking")
     with ThreadPoolExecutor(usable_cores(), "check") as pool:
         see = list(pool.map(lambda footage: _silhouettes(footage, options), rig.footage))

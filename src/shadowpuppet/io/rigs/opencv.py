@@ -106,15 +106,9 @@ def _grouped(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
         for kind, pattern in PATTERNS.items():
             match = pattern.fullmatch(key)
             if match is not None and (kind not in ("width", "height") or isinstance(value, float)):
-                parts = cameras.setdefault(match[2] or match[3] or "", {})
-                if kind not in parts or _is_vector(parts[kind]):  # a matrix rather than a vector, where there are both
-                    parts[kind] = value
+                cameras.setdefault(match[2] or match[3] or "", {}).setdefault(kind, value)
                 break
     return cameras
-
-
-def _is_vector(value: object) -> bool:
-    return isinstance(value, np.ndarray) and value.shape != (3, 3)
 
 
 def _draft(path: Path, name: str, parts: dict[str, Any], fisheye: bool) -> Draft:
