@@ -187,5 +187,7 @@ def test_check_as_a_user_types_it(recording, again, cameras, capsys, tmp_path):
     assert "cam3" in told["turns"]
     assert run(["check", str(tmp_path / "nowhere")]) == 2
     assert "no such recording" in capsys.readouterr().err
+    assert run(["check", str(recording / "calibration.toml")]) == 2
+    assert "is a calibration, expected a recording with films" in capsys.readouterr().err
     assert run(["check", str(recording), "--camera", "cam1"]) == 2
     assert "found one camera, expected two or more" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import RecordingError, SettingsError
 from shadowpuppet.flags import OTHER, LookFlags, options_from
 
 ForCheck = Annotated[LookFlags | None, Parameter(name="*")]
@@ -24,6 +24,8 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     from shadowpuppet.rig_check import check_rig
     from shadowpuppet.terminal import show, show_json, terminal
 
+    if recording.is_file() and is_explained(recording):
+        raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
     options = options_from(flags, config)
     with terminal(quiet=as_json) as shown:
         found = check_rig(open_rig(recording, options), options, shown)
