@@ -98,7 +98,7 @@ def check_table(check: RigCheck) -> RenderableType:
         frames, spread = (None, None) if late is None else (late.frames[n], late.spread[n])
         wrong = [word for word, here in (("place", name in found.wrong or name in check.turns), ("time", name in check.late)) if here]
         table.add_row(name, "unknown" if apart is None else f"{apart:.1f} px", f"{len(pairs_of)} others",
-                      "unknown" if frames is None else f"{frames + 0:.1f} frames", "" if spread is None else f"{spread:.1f}",
+                      "unknown" if frames is None else f"{round(frames, 1) + 0.0:.1f} frames", "" if spread is None else f"{spread:.1f}",
                       f"wrong: {' and '.join(wrong)}" if wrong else "")
     rows = [("recording", check.recording),
             ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
