@@ -1,0 +1,46 @@
+"""All figures and tables of Ni 2008: `python -m papers.ni2008` lists them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from papers.common.experiment import Experiment
+from papers.common.runner import main as run_main
+from papers.ni2008 import fig4, fig5, fig6, fig7, fig8, models, particles, table1, table2
+
+ABOUT = ("Ni, Kassim and Winkler 2008: walking, jogging and boxing before seven cameras. Without --recording, recordings like HumanEva's are "
+         "made first, some five minutes each on a core, once; --drawn does without films.")
+EXPERIMENTS = (
+    Experiment("fig1", "Fig. 1: the human model, ten cylinders and 25 degrees of freedom", "1 s", models.fig1),
+    Experiment("fig2", "Fig. 2: the force and the moment of one scene point", "1 s", models.fig2),
+    Experiment("fig3", "Fig. 3: the tree of the model's parts", "1 s", models.fig3),
+    Experiment("table1", "Table I: training and testing sizes", "a minute to read the films, once", table1.make),
+    Experiment("fig4", "Fig. 4: reconstruction error against the number of regions", "10 s", fig4.make, runs=5),
+    Experiment("fig5", "Fig. 5: estimated pose over the true one", "a minute", fig5.make),
+    Experiment("fig6", "Fig. 6: joint angles beside the true ones", "a minute", fig6.make),
+    Experiment("fig7", "Fig. 7: RMSE of joint angles and positions", "3 minutes", fig7.make, runs=5),
+    Experiment("fig8", "Fig. 8: RMSE against the number of regions", "15 minutes", fig8.make, runs=3),
+    Experiment("table2", "Table II and Fig. 9: hybrid, image force and particle filter", "7 minutes", table2.make, runs=5),
+    Experiment("particles", "VII: how many particles a plain filter wants", "12 minutes", particles.make, runs=2),
+)
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """What only this paper's experiments can be asked."""
+    parser.add_argument("--drawn", action="store_true", help="drawn silhouettes of the made motions in place of films: seconds, not minutes")
+    parser.add_argument("--masks", action="store_true", help="the recordings' exact silhouettes in place of those of the films")
+    parser.add_argument("--made", type=Path, metavar="FOLDER", help="where the made recordings are, or are made (default: in the output)")
+    parser.add_argument("--humaneva", type=Path, metavar="FOLDER", help="HumanEva-I, for those who have it: the paper's own recordings")
+    parser.add_argument("--subject", default="S2", help="of HumanEva; the paper's is S2")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run what is asked for."""
+    return run_main("ni2008", ABOUT, EXPERIMENTS, argv, add)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

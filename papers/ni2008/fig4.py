@@ -1,0 +1,112 @@
+"""Fig. 4: what a pose loses by being told in a region and three numbers, against the number of regions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from papers.common.claims import Verdict
+from papers.common.experiment import Outcome, Request, Table
+from papers.common.plotting import COLOURS, label, new_figure
+from papers.ni2008.inputs import Case, cases
+from papers.ni2008.tracks import DIMENSIONS, REGIONS, learn, most_regions
+from shadowpuppet.geometry import Array
+from shadowpuppet.vqpca import reconstruction_error
+
+TRIED = (5, 10, 15, 20, 30, 40, 50, 60, 70, 80)
+"""M of Figs. 4 and 8."""
+LOW, DONE = 0.1, 0.9
+"""An error is quite low that is less than this share of how much the poses vary; a curve is flat from where so much of its whole fall is
+done."""
+
+
+class Curve(NamedTuple):
+    """Errors of one case, degrees."""
+
+    regions: list[int]
+    """M, K of them."""
+    training: Array
+    """Of the poses that were learnt from, of shape (R, K)."""
+    unseen: Array
+    """Of those of the recording."""
+    varies: float
+    """Root mean square deviation of the training poses from their mean."""
+
+
+def make(request: Request) -> Outcome:
+    """Learn, encode, reconstruct."""
+    found = {case.name: (case, curve(case, request.seeds, tried(request))) for case in cases(request)}
+    curves = {case.motion: each for case, each in found.values()}
+    rows = [(motion, M, seed, each.training[n, k], each.unseen[n, k]) for motion, each in curves.items()
+            for n, seed in enumerate(request.seeds) for k, M in enumerate(each.regions)]
+    table = Table(("recording", "regions", "seed", "training_deg", "unseen_deg"), rows)
+    return Outcome({"dimensions": DIMENSIONS, "regions": list(tried(request))}, {"fig4": picture(curves)}, {"fig4": table}, verdicts(curves),
+                   [said(motion, each) for motion, each in curves.items()])
+
+
+def tried(request: Request) -> Sequence[int]:
+    """Numbers of regions."""
+    return (5, 20, 40) if request.short else TRIED
+
+
+def curve(case: Case, seeds: Sequence[int], regions: Sequence[int]) -> Curve:
+    """Errors by seed and number of regions."""
+    possible = [M for M in regions if most_regions(case) >= M]
+    columns = case.body.skeleton.dof_indices(learn(case, possible[0], seeds[0]).prior.names)
+    poses, film = case.training[:, columns], case.true_poses[:, columns]
+    film = film[np.isfinite(film).all(1)]
+    errors = np.array([[[reconstruction_error(learn(case, M, seed).prior, [each]) for M in possible] for seed in seeds]
+                       for each in (poses, film)])
+    return Curve(possible, *np.degrees(errors), float(np.degrees(poses.std(0).mean())))
+
+
+def picture(curves: dict[str, Curve]):
+    """As in the paper, and beside it the same of poses that were not learnt from."""
+    figure, panels = new_figure(1, 2, width=9)
+    for colour, (motion, each) in zip(COLOURS, curves.items()):
+        for axes, errors in zip(panels[0], (each.training, each.unseen)):
+            axes.errorbar(each.regions, errors.mean(0), errors.std(0), color=colour, marker="o", markersize=3, capsize=2, linewidth=1,
+                          label=motion)
+    for axes, title in zip(panels[0], ("training poses, as in Fig. 4", "poses of the recording, which it has not learnt")):
+        axes.axvline(REGIONS, color="0.7", linestyle=":", linewidth=1)
+        axes.set_ylim(bottom=0)
+        label(axes, "number of Voronoi regions M", "average reconstruction error (degrees)", title)
+    return figure
+
+
+def verdicts(curves: dict[str, Curve]) -> list[Verdict]:
+    """What the paper says of the curves."""
+    low = {motion: float(at(each, each.training, REGIONS)) for motion, each in curves.items()}
+    done = {motion: share_done(each, each.training) for motion, each in curves.items()}
+    unseen = {motion: share_done(each, each.unseen) for motion, each in curves.items()}
+    return [
+        Verdict(f"At M = {REGIONS} the average reconstruction error is already quite low", "VI, Fig. 4",
+                "; ".join(f"{motion} {low[motion]:.2f}° of poses that vary by {each.varies:.1f}°" for motion, each in curves.items())
+                + f" (low: under {LOW:.0%} of it)",
+                all(low[motion] < LOW * each.varies for motion, each in curves.items()), "fig4.png"),
+        Verdict(f"The reconstruction error is flat from M = {REGIONS} on", "VI, Fig. 4",
+                f"done of the whole fall by M = {REGIONS}: " + "; ".join(f"{motion} {share:.0%}" for motion, share in done.items())
+                + f" (flat: {DONE:.0%}); of poses not learnt from: " + ", ".join(f"{share:.0%}" for share in unseen.values()),
+                all(share >= DONE for share in done.values()), "fig4.png"),
+    ]  # fmt: skip
+
+
+def share_done(each: Curve, errors: Array) -> float:
+    """How much of the fall from the fewest to the most regions is done with `REGIONS`."""
+    means = errors.mean(0)
+    return float((means[0] - at(each, errors, REGIONS)) / max(means[0] - means.min(), 1e-12))
+
+
+def at(each: Curve, errors: Array, regions: int) -> float:
+    """Mean error with so many regions, or the most below."""
+    return float(errors.mean(0)[max(k for k, M in enumerate(each.regions) if regions >= M)])
+
+
+def said(motion: str, each: Curve) -> str:
+    """What the training error does not tell."""
+    best = each.regions[int(each.unseen.mean(0).argmin())]
+    last, M = each.training.mean(0)[-1], each.regions[-1]
+    return (f"{motion}: with {M} regions the error of the training poses is {last:.2f}°, of the recording's {each.unseen.mean(0)[-1]:.1f}°; "
+            f"the latter is least with M = {best} ({each.unseen.mean(0).min():.1f}°).")
