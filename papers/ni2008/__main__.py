@@ -11,8 +11,8 @@ from papers.common.experiment import Experiment
 from papers.common.runner import main as run_main
 from papers.ni2008 import fig4, fig5, fig6, fig7, fig8, models, particles, table1, table2
 
-ABOUT = ("Ni, Kassim and Winkler 2008: walking, jogging and boxing before seven cameras. Without --recording, recordings like HumanEva's are "
-         "made first, some five minutes each on a core, once; --drawn does without films.")
+ABOUT = ("Ni, Kassim and Winkler 2008: walking, jogging and boxing before seven cameras. Without --recording, recordings like HumanEva's "
+         "are made first, some five minutes each on a core, once; --drawn does without films.")
 EXPERIMENTS = (
     Experiment("fig1", "Fig. 1: the human model, ten cylinders and 25 degrees of freedom", "1 s", models.fig1),
     Experiment("fig2", "Fig. 2: the force and the moment of one scene point", "1 s", models.fig2),
@@ -30,7 +30,7 @@ EXPERIMENTS = (
 
 def add(parser: argparse.ArgumentParser) -> None:
     """What only this paper's experiments can be asked."""
-    parser.add_argument("--drawn", action="store_true", help="drawn silhouettes of the made motions in place of films: seconds, not minutes")
+    parser.add_argument("--drawn", action="store_true", help="drawn silhouettes of the made motions in place of films: that is quick")
     parser.add_argument("--masks", action="store_true", help="the recordings' exact silhouettes in place of those of the films")
     parser.add_argument("--made", type=Path, metavar="FOLDER", help="where the made recordings are, or are made (default: in the output)")
     parser.add_argument("--humaneva", type=Path, metavar="FOLDER", help="HumanEva-I, for those who have it: the paper's own recordings")

@@ -37,13 +37,12 @@ class Curve(NamedTuple):
 
 def make(request: Request) -> Outcome:
     """Learn, encode, reconstruct."""
-    found = {case.name: (case, curve(case, request.seeds, tried(request))) for case in cases(request)}
-    curves = {case.motion: each for case, each in found.values()}
+    curves = {case.motion: curve(case, request.seeds, tried(request)) for case in cases(request)}
     rows = [(motion, M, seed, each.training[n, k], each.unseen[n, k]) for motion, each in curves.items()
             for n, seed in enumerate(request.seeds) for k, M in enumerate(each.regions)]
     table = Table(("recording", "regions", "seed", "training_deg", "unseen_deg"), rows)
-    return Outcome({"dimensions": DIMENSIONS, "regions": list(tried(request))}, {"fig4": picture(curves)}, {"fig4": table}, verdicts(curves),
-                   [said(motion, each) for motion, each in curves.items()])
+    settings = {"dimensions": DIMENSIONS, "regions": list(tried(request))}
+    return Outcome(settings, {"fig4": picture(curves)}, {"fig4": table}, verdicts(curves), [said(*each) for each in curves.items()])
 
 
 def tried(request: Request) -> Sequence[int]:
@@ -59,7 +58,8 @@ def curve(case: Case, seeds: Sequence[int], regions: Sequence[int]) -> Curve:
     film = film[np.isfinite(film).all(1)]
     errors = np.array([[[reconstruction_error(learn(case, M, seed).prior, [each]) for M in possible] for seed in seeds]
                        for each in (poses, film)])
-    return Curve(possible, *np.degrees(errors), float(np.degrees(poses.std(0).mean())))
+    training, unseen = np.degrees(errors)
+    return Curve(possible, training, unseen, float(np.degrees(poses.std(0).mean())))
 
 
 def picture(curves: dict[str, Curve]):
@@ -106,7 +106,6 @@ def at(each: Curve, errors: Array, regions: int) -> float:
 
 def said(motion: str, each: Curve) -> str:
     """What the training error does not tell."""
-    best = each.regions[int(each.unseen.mean(0).argmin())]
-    last, M = each.training.mean(0)[-1], each.regions[-1]
-    return (f"{motion}: with {M} regions the error of the training poses is {last:.2f}°, of the recording's {each.unseen.mean(0)[-1]:.1f}°; "
-            f"the latter is least with M = {best} ({each.unseen.mean(0).min():.1f}°).")
+    learnt, unseen, M = each.training.mean(0), each.unseen.mean(0), each.regions
+    return (f"{motion}: with {M[-1]} regions the error of the training poses is {learnt[-1]:.2f}°, of the recording's {unseen[-1]:.1f}°; "
+            f"the latter is least with M = {M[int(unseen.argmin())]} ({unseen.min():.1f}°).")

@@ -16,7 +16,6 @@ from papers.ni2008.measures import Errors, errors
 from papers.ni2008.tracks import HYBRID, Track, of, tracks
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.overlay import write_text
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.video import open_frames
 
@@ -73,7 +72,7 @@ def tile(source: Source, case: Case, track: Track, frame: int, camera: int) -> n
     x0, y0, x1, y1 = box(case, camera, frame, track)
     both = [cv2.resize(each[y0:y1, x0:x1], (round((x1 - x0) * HEIGHT / (y1 - y0)), HEIGHT), interpolation=cv2.INTER_AREA if y1 - y0 > HEIGHT
                        else cv2.INTER_CUBIC) for each in (image, shown)]  # fmt: skip
-    write_text(both[1], f"{case.motion}, frame {frame + 1}", HEIGHT - 26, INK, size=300)
+    cv2.putText(both[1], f"{case.motion}, frame {frame + 1}", (8, HEIGHT - 8), cv2.FONT_HERSHEY_SIMPLEX, 0.5, INK, 1, cv2.LINE_AA)
     return np.concatenate(both)
 
 
@@ -91,7 +90,7 @@ def picture_of(source: Source, case: Case, frame: int, camera: int) -> np.ndarra
     return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image
 
 
-def paint(image: np.ndarray, view: Picture, pose: Array, colour: tuple[int, int, int], strength: float = 0.6) -> None:
+def paint(image: np.ndarray, view: Picture, pose: Array, colour: tuple[int, int, int], strength: float = 0.5) -> None:
     """The body in one colour that lets through what is below, darker toward the edges of each part."""
     corners, counts = view.polygons(view.transforms(pose[None]), np.arange(len(view.body.parts)))
     ink = image.copy()
@@ -109,8 +108,8 @@ def box(case: Case, camera: int, frame: int, track: Track) -> tuple[int, int, in
     own = case.cameras[camera]
     places = np.concatenate([case.truth.positions[frame], case.body.points(track.poses[frame][None])[0]])
     places = places[np.isfinite(places).all(1)]
-    pixels = own.project(np.concatenate([places + step for step in MARGIN * np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0],
-                                                                                      [0, -1, 0]])]))  # fmt: skip
+    steps = MARGIN * np.concatenate([np.eye(3), -np.eye(3)])
+    pixels = own.project(np.concatenate([places + step for step in steps]))
     low, high = np.clip(pixels.min(0), 0, None), np.minimum(pixels.max(0), own.size)
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 

@@ -42,8 +42,8 @@ def picture(errors: Mapping[str, list[Errors]]):
 
 def harder(errors: Mapping[str, list[Errors]]) -> Verdict:
     """Whether jogging and boxing are tracked worse than walking."""
-    pairs = [(other, difference([one.rmse for one in errors[other]], [one.rmse for one in errors["walking"]])) for other in ("jogging", "boxing")
-             if {other, "walking"} <= set(errors)]  # fmt: skip
-    got = "; ".join(f"{motion} {told([one.rmse for one in each])} mm" for motion, each in errors.items())
+    rmse = {motion: [one.rmse for one in each] for motion, each in errors.items()}
+    pairs = [difference(rmse[other], rmse["walking"]) for other in ("jogging", "boxing") if {other, "walking"} <= set(rmse)]
+    got = "; ".join(f"{motion} {told(each)} mm" for motion, each in rmse.items())
     return Verdict("Errors are greater in the jogging and boxing sequences than in walking", "VI, Fig. 7", got,
-                   all_of([each.greater for _, each in pairs]) if len(pairs) == 2 else None, "fig7.png")
+                   all_of([each.greater for each in pairs]) if len(pairs) == 2 else None, "fig7.png")

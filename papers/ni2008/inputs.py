@@ -181,7 +181,7 @@ def load(request: Request, source: Source) -> Case:
         cameras, arrays = _read(source) if source.path is not None else _drawn(source)
         write_calibration(folder / "calibration.toml", cameras)
         part = folder / "part.npz"
-        np.savez_compressed(part, **arrays)
+        np.savez_compressed(part, **arrays)  # pyright: ignore[reportArgumentType]
         part.replace(folder / "case.npz")
     return opened(folder, source.name)
 

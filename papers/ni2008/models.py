@@ -29,8 +29,6 @@ AXES = ((60, 60, 210), (60, 150, 40), (200, 90, 40))
 """Colours (blue, green, red) of X, Y, Z."""
 POINT, BENT = (0.16, 0.13), 0.9
 """Fig. 2's scene point: how far down the lower arm, and how far off its axis (m); the elbow's angle (rad)."""
-SHOWN = 2.2
-"""Arrows of forces are drawn so many times their length."""
 
 
 def person() -> Body:
@@ -62,8 +60,8 @@ def fig1(request: Request) -> Outcome:
         middle = T[limbs.joints[s]] @ np.append(0.5 * limbs.starts[s] + 0.5 * limbs.ends[s], 1)
         _number(image, view.project(middle[None])[0], str(number))
     return Outcome({"body": BODY, "height": HEIGHT}, {"fig1": image}, {"fig1": parts_table(body)},
-                   said=[f"{len(PARTS)} parts, {len(body.skeleton.dofs)} degrees of freedom. X forward, Y to the left, Z up in each part's frame "
-                         "at rest (red, green, blue); the paper's root is the torso's centre, ours the pelvis."])  # fmt: skip
+                   said=[f"{len(PARTS)} parts, {len(body.skeleton.dofs)} degrees of freedom. X forward, Y to the left, Z up in each part's "
+                         "frame at rest (red, green, blue); the paper's root is the torso's centre, ours the pelvis."])  # fmt: skip
 
 
 def parts_table(body: Body) -> Table:
@@ -77,7 +75,8 @@ def parts_table(body: Body) -> Table:
         radii = limbs.radii[s, 0]
         rows.append((number, part, joint.name, parent_of(body, part), " ".join(dof.name for dof in dofs), " ".join(angles),
                      float(limbs.lengths[s]), float(radii[0]), float(radii[1])))
-    return Table(("number", "part", "turns_about", "hangs_on", "degrees_of_freedom", "limits_deg", "length_m", "radius_x_m", "radius_y_m"), rows)
+    columns = ("number", "part", "turns_about", "hangs_on", "degrees_of_freedom", "limits_deg", "length_m", "radius_x_m", "radius_y_m")
+    return Table(columns, rows)
 
 
 def parent_of(body: Body, part: str) -> str | None:
@@ -101,14 +100,18 @@ def fig2(request: Request) -> Outcome:
     cosine = float(normal @ away / np.linalg.norm(away))
     force = away / np.linalg.norm(away) * min(cosine * float(np.linalg.norm(away)), settings.surface.tau)
     moment = np.cross(foot - elbow[:3, 3], force)
-    flat = {name: np.array([(place - elbow[:3, 3]) @ along, (place - elbow[:3, 3]) @ across]) for name, place in (("P", point), ("P'", foot))}
-    F = np.array([force @ along, force @ across])
-    figure = _force_picture(limbs, s, flat["P"], flat["P'"], F)
+    plane = np.stack([along, across])
+    figure = _force_picture(limbs, s, plane @ (point - elbow[:3, 3]), plane @ (foot - elbow[:3, 3]), plane @ force)
     rows = [(name, *map(float, value)) for name, value in (("P", point), ("P'", foot), ("c", elbow[:3, 3]), ("F", force), ("M", moment))]
     told = {"point_m": list(POINT), "tau_m": settings.surface.tau}
     return Outcome(told, {"fig2": figure}, {"fig2": Table(("what", "x", "y", "z"), rows, True)},
-                   said=[f"P is {1000 * np.linalg.norm(away):.0f} mm from P', the nearest place on the model; the force is bounded at "
-                         f"{1000 * settings.surface.tau:.0f} mm (rho), its moment about the elbow {np.linalg.norm(moment):.4f} m²."])  # fmt: skip
+                   said=[told_of(away, settings.surface.tau, moment)])  # fmt: skip
+
+
+def told_of(away: Array, tau: float, moment: Array) -> str:
+    """The force in a sentence."""
+    return (f"P is {1000 * np.linalg.norm(away):.0f} mm from P', the nearest place on the model; the force is bounded at {1000 * tau:.0f} mm "
+            f"(rho), its moment about the elbow {np.linalg.norm(moment):.4f} m².")
 
 
 def _force_picture(limbs: Limbs, s: int, P: Array, foot: Array, F: Array):
@@ -118,7 +121,7 @@ def _force_picture(limbs: Limbs, s: int, P: Array, foot: Array, F: Array):
     length, radius = cm * float(limbs.lengths[s]), cm * float(limbs.radii[s, 0, 0])
     axes.fill([0, length, length, 0], [-radius, -radius, radius, radius], color="0.88", edgecolor="0.45")
     axes.plot([0, length], [0, 0], color="0.6", linewidth=0.8, linestyle="-.")
-    end = foot + SHOWN * F
+    end = foot + F
     corner = np.array([foot[0], 0.0])  # the force's line nearest to the centre of rotation
     axes.annotate("", cm * end, cm * foot, arrowprops={"arrowstyle": "-|>", "color": COLOURS[1], "linewidth": 2})
     axes.plot(*cm * np.array([foot, P]).T, color="0.3", linestyle=":", linewidth=1)
@@ -131,10 +134,12 @@ def _force_picture(limbs: Limbs, s: int, P: Array, foot: Array, F: Array):
     axes.annotate("", (4.2 * np.cos(0.9) - 0.2, 4.2 * np.sin(0.9)), (4.2 * np.cos(0.72) - 0.2, 4.2 * np.sin(0.72)),
                   arrowprops={"arrowstyle": "-|>", "color": COLOURS[2], "linewidth": 1.8})
     axes.annotate("", (length + 2, 5.0), (length + 2, 0.0), arrowprops={"arrowstyle": "-|>", "color": COLOURS[3], "linewidth": 1.8})
-    for text, place, colour in (("P  scene point", cm * P + [0.8, 0.2], "black"), ("P'  nearest place on the model", cm * foot + [0.9, -1.6], "0.3"),
-                                ("F  (eq. 32)", cm * end + [0.8, -1.2], COLOURS[1]), ("L", cm * corner / 2 + [0, -1.9], COLOURS[0]),
-                                ("rotation centre", np.array([-1.0, -radius - 2.0]), "black"), ("ω = λM", np.array([3.6, 4.4]), COLOURS[2]),
-                                ("v = ρF", np.array([length + 2.6, 2.0]), COLOURS[3])):  # fmt: skip
+    for text, place, colour in (
+        ("P  scene point", cm * P + [0.8, 0.2], "black"), ("P'  nearest place on the model", cm * foot + [0.9, -1.6], "0.3"),
+        ("F  (eq. 32)", cm * (foot + 0.5 * F) + [0.8, 0.0], COLOURS[1]), ("L", cm * corner / 2 + [0, -1.9], COLOURS[0]),
+        ("rotation centre", (-1.0, -radius - 2.0), "black"), ("ω = λM", (3.6, 4.4), COLOURS[2]),
+        ("v = ρF", (length + 2.6, 2.0), COLOURS[3]),
+    ):  # fmt: skip
         axes.text(*place, text, color=colour, fontsize=9)
     axes.set_aspect("equal")
     axes.set_xlim(-4, length + 9)
@@ -153,8 +158,9 @@ def fig3(request: Request) -> Outcome:
         axes.plot(*np.array([places[parent], places[part]]).T, color="0.5", linewidth=1.2, zorder=1)
     for number, part in enumerate(PARTS):
         dofs = sum(dof.joint == _joint(body, part) for dof in body.skeleton.dofs)
-        axes.text(*places[part], f"{number}  {part.replace('_', ' ')}\n{dofs} DOF, feels {_listed(below(body, part))}", ha="center", va="center",
-                  fontsize=7.5, zorder=2, bbox={"boxstyle": "round", "facecolor": "#e8f1f8", "edgecolor": COLOURS[0]})  # fmt: skip
+        text = f"{number}  {part.replace('_', ' ')}\n{dofs} DOF, feels {_listed(below(body, part))}"
+        axes.text(*places[part], text, ha="center", va="center", fontsize=7.5, zorder=2,
+                  bbox={"boxstyle": "round", "facecolor": "#e8f1f8", "edgecolor": COLOURS[0]})
     axes.set_xlim(-0.7, 4.7)
     axes.set_ylim(-0.45, 2.4)
     axes.axis("off")

@@ -99,12 +99,11 @@ class Job(NamedTuple):
     file: Path
 
 
-def tracks(request: Request, cases: Iterable[Case], ways: Sequence[Way], seeds: Sequence[int] | None = None) -> dict[tuple[str, Way], list[Track]]:
+def tracks(request: Request, cases: Iterable[Case], ways: Sequence[Way],
+           seeds: Sequence[int] | None = None) -> dict[tuple[str, str], list[Track]]:
     """Runs of every case, way and seed, by case and way, in the order of the seeds; those that are not there yet are done now."""
-    seeds, jobs = list(request.seeds) if seeds is None else list(seeds), {}
-    for case in cases:
-        for way in ways:
-            jobs[case.name, _key(way)] = [_job(request, case, way, seed) for seed in seeds]
+    wanted = list(request.seeds) if seeds is None else list(seeds)
+    jobs = {(case.name, _key(way)): [_job(request, case, way, seed) for seed in wanted] for case in cases for way in ways}
     missing = [job for some in jobs.values() for job in some if not job.file.exists()]
     if missing:
         run_all("runs", run, missing, request.workers)
