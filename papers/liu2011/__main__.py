@@ -7,11 +7,11 @@ import sys
 from collections.abc import Sequence
 
 from papers.common.runner import main
-from papers.liu2011 import figure_6_7
+from papers.liu2011 import figure_6_7, figure_8, figure_9, figure_10_12
 from papers.liu2011.material import SILHOUETTES
 
 ABOUT = "Z. Liu, D. Lee, W. Sepp (IROS 2011): every figure and table, on a made recording, or on --recording."
-EXPERIMENTS = tuple(module.EXPERIMENT for module in (figure_6_7,))
+EXPERIMENTS = tuple(module.EXPERIMENT for module in (figure_6_7, figure_8, figure_9, figure_10_12))
 
 
 def add(parser: argparse.ArgumentParser) -> None:

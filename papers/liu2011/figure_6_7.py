@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 JOINTS = {"shoulder": ("shoulder", "shoulder"), "elbow": ("elbow", "elbow"), "hand": ("hand", "hand"), "fist": ("fist", "wrist")}
 """What is compared: a landmark of the model with a joint of the truth. `hand` is the base of the fingers in both. `fist` is what the paper
 compares: the fist's end in the model, the wrist in the truth."""
-SHORT = {"shoulder": "S", "elbow": "E", "hand": "H (base of the fingers)", "fist": "H (fist's end against wrist)"}
+LABELS = ("shoulder (S)", "elbow (E)", "hand (H): base of the fingers", "hand (H): fist's end against wrist")
 HAND = 0.10
 """What the paper says that its two definitions of the hand add, metres."""
 STABLE = 0.05
@@ -56,23 +57,23 @@ def errors_of(runs: Runs) -> Array:
 def draw(case: Case, errors: Errors) -> object:
     """Left beside right: shoulder, elbow and hand above, the hand by both definitions below."""
     figure, panels = new_figure(2, 2, 11, 3.3, sharex=True, sharey="row")
-    names = list(JOINTS)
-    for side, (column, title) in enumerate(zip(panels.T, ("Fig. 6: left", "Fig. 7: right"))):
-        _lines(column[0], errors, side, [names.index(name) for name in ("shoulder", "elbow", "hand")], "LR"[side])
-        label(column[0], "", "mean 3D error (mm)", title, legend=side == 0)
-        _lines(column[1], errors, side, [names.index(name) for name in ("hand", "fist")], "LR"[side])
-        label(column[1], "frame", "mean 3D error (mm)", "", legend=side == 0)
-        for axes in column:
+    for side, title in enumerate(("Fig. 6: left (LS, LE, LH)", "Fig. 7: right (RS, RE, RH)")):
+        for row, joints in enumerate(((0, 1, 2), (2, 3))):
+            axes = panels[row, side]
+            _lines(axes, errors, side, joints)
+            label(axes, "frame" if row else "", "" if side else "mean 3D error (mm)", "" if row else title, legend=False)
             axes.set_ylim(bottom=0)
             mark_parts(axes, case)
+            if side:
+                axes.legend(frameon=False, fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
     return figure
 
 
-def _lines(axes: Axes, errors: Errors, side: int, joints: list[int], letter: str) -> None:
-    for colour, joint in zip((COLOURS[0], COLOURS[1], COLOURS[2]) if len(joints) == 3 else (COLOURS[2], COLOURS[3]), joints):
-        name = list(SHORT.values())[joint]
+def _lines(axes: Axes, errors: Errors, side: int, joints: Sequence[int]) -> None:
+    for joint in joints:
         for method, each in errors.items():
-            axes.plot(1000 * each[:, :, side, joint].mean(0), STYLES[method], color=colour, linewidth=1, label=f"{letter}{name}, {method}")
+            mean = 1000 * each[:, :, side, joint].mean(0)
+            axes.plot(mean, STYLES[method], color=COLOURS[joint], linewidth=1, label=f"{LABELS[joint]}, {method}")
 
 
 def over_time(case: Case, errors: Errors) -> Table:
@@ -85,11 +86,10 @@ def over_time(case: Case, errors: Errors) -> Table:
 
 def means(errors: Errors) -> Table:
     """Over all frames: the mean, and its standard deviation from run to run."""
-    rows = [[f"{side} {joint}", *(round(float(value), 1) for method in METHODS for value in _mean_sd(errors[method][:, :, i, j]))]
-            for i, side in enumerate(("left", "right")) for j, joint in enumerate(SHORT.values())]
     columns = [f"{method} {what}, mm" for method in METHODS for what in ("mean", "sd of runs")]
-    return Table(("joint", *columns), [[row[0].replace(" S", " shoulder").replace(" E", " elbow").replace(" H ", " hand "), *row[1:]]
-                                       for row in rows], shown=True)
+    rows = [[f"{side} {joint}", *(round(value, 1) for method in METHODS for value in _mean_sd(errors[method][:, :, i, j]))]
+            for i, side in enumerate(("left", "right")) for j, joint in enumerate(LABELS)]
+    return Table(("joint", *columns), rows, shown=True)
 
 
 def _mean_sd(errors: Array) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import Guess
+from shadowpuppet.io._files import reason
 from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking import MonocularTracker
@@ -155,7 +156,7 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise ShadowPuppetError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+        raise ShadowPuppetError(f"{path}: cannot be written ({reason(error)})") from None
 
 
 def _read(path: Path) -> dict[str, Array] | None:
