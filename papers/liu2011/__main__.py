@@ -7,11 +7,28 @@ import sys
 from collections.abc import Sequence
 
 from papers.common.runner import main
-from papers.liu2011 import figure_6_7, figure_8, figure_9, figure_10_12
+from papers.liu2011 import (
+    cardbox_cost,
+    figure_1_2,
+    figure_3_4,
+    figure_5,
+    figure_6_7,
+    figure_8,
+    figure_9,
+    figure_10_12,
+    frame_rate,
+    particles_sweep,
+    selectivity,
+    survival_sweep,
+    table_1,
+    toward_camera,
+)
 from papers.liu2011.material import SILHOUETTES
 
 ABOUT = "Z. Liu, D. Lee, W. Sepp (IROS 2011): every figure and table, on a made recording, or on --recording."
-EXPERIMENTS = tuple(module.EXPERIMENT for module in (figure_6_7, figure_8, figure_9, figure_10_12))
+MODULES = (figure_1_2, figure_3_4, figure_5, table_1, figure_6_7, figure_8, figure_9, figure_10_12, toward_camera, survival_sweep,
+           particles_sweep, selectivity, frame_rate, cardbox_cost)  # fmt: skip
+EXPERIMENTS = tuple(module.EXPERIMENT for module in MODULES)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
