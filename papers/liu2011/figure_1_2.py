@@ -61,7 +61,7 @@ def model(name: str, sizes: CardboxSizes) -> Image:
     out[:] = np.uint8(0.55 * out + 0.45 * PAPER)
     draw_skeleton(out, picture, pose)
     draw_axes(out, picture)
-    write_text(out, {"boxes": "volumetric: 42 faces", "cardbox": "cardbox: 15 cards"}[name], 0, (235, 235, 235), size=480)
+    write_text(out, f"{'volumetric' if name == 'boxes' else name}: {len(body.parts)} planes", 0, (235, 235, 235), size=480)
     return out
 
 

@@ -16,8 +16,8 @@ from shadowpuppet.geometry import Array
 
 MEASURES = {"neck": ("neck", None), "left hand": ("left_hand", "left_shoulder"), "right hand": ("right_hand", "right_shoulder")}
 """What comes toward the camera: a joint, by itself or before another one."""
-LEAST = 0.15
-"""Metres by which something must come toward the camera to be judged (its 5th to its 95th percentile)."""
+LEAST = {"neck": 0.15, "left hand": 0.3, "right hand": 0.3}
+"""Metres by which each must come toward the camera to be judged (its 5th to its 95th percentile)."""
 FOLLOWED, AGREES = (0.5, 1.5), 0.7
 """What share of the motion is followed, and how it must correlate with the truth's, to be called tracked."""
 
@@ -112,7 +112,7 @@ def followed(case: Case, runs: Runs) -> dict[str, Followed]:
         known = np.isfinite(true[:, n])
         x = true[known, n] - true[known, n].mean()
         reach = float(np.subtract(*np.percentile(x, [95, 5])))
-        if reach >= LEAST:
+        if reach >= LEAST[what]:
             y = found[:, known, n] - found[:, known, n].mean(1, keepdims=True)
             share, spread = (y @ x) / (x @ x), np.sqrt((y**2).sum(1) * (x @ x))
             error = np.abs(found[:, known, n] - true[known, n]).mean()
@@ -129,7 +129,7 @@ def verdicts(case: Case, runs: Runs, shown: str) -> list[Verdict]:
         if those:
             got = "; ".join(f"{name}: of {100 * each.reach:.0f} cm {100 * each.share:.0f} % is followed (correlation "
                             f"{each.correlation:.2f}, mean error {100 * each.error:.0f} cm)" for name, each in those.items())
-            out.append(Verdict(f"{claim} ({case.name})", "abstract, VI", f"DRS, {got}; tracked is {100 * FOLLOWED[0]:.0f} to "
+            out.append(Verdict(claim, "abstract, VI", f"{case.name}, DRS: {got}; tracked is {100 * FOLLOWED[0]:.0f} to "
                                f"{100 * FOLLOWED[1]:.0f} % with a correlation of {AGREES} or more",
                                all_of([each.tracked for each in those.values()]), shown))
     return out
