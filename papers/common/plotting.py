@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.io._files import reason
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +43,7 @@ def label(axes: Axes, x: str, y: str, title: str = "", legend: bool = True) -> N
 
 
 def save_picture(picture: Any, path: Path) -> None:
-    """Write a figure, or an image (H, W, 3), blue green red, as PNG with a palette: as many colours as `LARGEST` bytes allow.
+    """Write a figure, or an image (H, W, 3), blue green red, as PNG, with as many colours as `LARGEST` bytes allow.
 
     Raises `ShadowPuppetError` where it cannot be written.
     """
@@ -56,11 +57,12 @@ def save_picture(picture: Any, path: Path) -> None:
         image = Image.fromarray(np.asarray(picture.canvas.buffer_rgba())[..., :3])
     part = path.with_name(f"{path.name}.part")
     try:
-        for colours in (128, 64, 32, 16):
-            image.quantize(colours, dither=Image.Dither.NONE).save(part, "PNG", optimize=True)
+        for colours in (0, 256, 128, 64, 32, 16):  # few thin lines of a colour must keep it: hence the way to choose them
+            some = image.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE) if colours else image
+            some.save(part, "PNG", optimize=True)
             if part.stat().st_size <= LARGEST:
                 break
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise ShadowPuppetError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+        raise ShadowPuppetError(f"{path}: cannot be written ({reason(error)})") from None

@@ -39,7 +39,7 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
     try:
         _make_folder(request.output)
         for name in dict.fromkeys(known if "all" in args.names else args.names):
-            run(paper, known[name], replace(request, runs=args.runs or _runs(known[name], args.short)))
+            run(paper, known[name], replace(request, runs=args.runs or _runs(known[name], args.short)), list(known).index(name))
     except ShadowPuppetError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -49,15 +49,15 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
     return 0
 
 
-def run(paper: str, experiment: Experiment, request: Request) -> Outcome:
-    """One experiment: what it is done with is said first, what it found last. Raises `ShadowPuppetError`."""
+def run(paper: str, experiment: Experiment, request: Request, number: int = 0) -> Outcome:
+    """One experiment, the `number`-th: what it is done with is said first, what it found last. Raises `ShadowPuppetError`."""
     takes = "some seconds" if request.short else experiment.takes
     repeated = "" if request.runs == 1 else f" to {request.seeds[-1]}"
     print(f"{experiment.name}: {experiment.title}\nseed {request.seed}{repeated}; takes {takes}", flush=True)
     start = time.perf_counter()
     outcome = experiment.make(request)
     seconds = time.perf_counter() - start
-    write_outcome(paper, experiment, request, outcome, seconds)
+    write_outcome(paper, experiment, request, outcome, seconds, number)
     print(text(experiment, request, outcome, seconds), flush=True)
     return outcome
 

@@ -16,13 +16,15 @@ from shadowpuppet.io._files import write_whole
 from shadowpuppet.running import json_text
 
 
-def write_outcome(paper: str, experiment: Experiment, request: Request, outcome: Outcome, seconds: float) -> None:
-    """Write all of it into the request's folder; the JSON last, so that where it is, all is. Raises `ShadowPuppetError`."""
+def write_outcome(paper: str, experiment: Experiment, request: Request, outcome: Outcome, seconds: float, number: int = 0) -> None:
+    """Write all of it into the request's folder; the JSON last, so that where it is, all is. `number`: the experiment's, in the paper's
+    order. Raises `ShadowPuppetError`."""
     for name, picture in outcome.pictures.items():
         save_picture(picture, request.output / f"{name}.png")
     for name, table in outcome.tables.items():
         write_whole(request.output / f"{name}.csv", csv_text(table))
-    write_whole(request.output / f"{experiment.name}.json", json_text(summary(paper, experiment, request, outcome, seconds)) + "\n")
+    told = summary(paper, experiment, request, outcome, seconds) | {"number": number}
+    write_whole(request.output / f"{experiment.name}.json", json_text(told) + "\n")
 
 
 def summary(paper: str, experiment: Experiment, request: Request, outcome: Outcome, seconds: float) -> dict[str, Any]:
