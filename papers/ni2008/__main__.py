@@ -9,21 +9,21 @@ from pathlib import Path
 
 from papers.common.experiment import Experiment
 from papers.common.runner import main as run_main
-from papers.ni2008 import fig4, fig5, fig6, fig7, fig8, models, particles, table1, table2
+from papers.ni2008 import figure_4, figure_5, figure_6, figure_7, figure_8, models, particles, table_1, table_2
 
 ABOUT = ("Ni, Kassim and Winkler 2008: walking, jogging and boxing before seven cameras. Without --recording, recordings like HumanEva's "
          "are made first, some five minutes each on a core, once; --drawn does without films.")
 EXPERIMENTS = (
-    Experiment("fig1", "Fig. 1: the human model, ten cylinders and 25 degrees of freedom", "1 s", models.fig1),
-    Experiment("fig2", "Fig. 2: the force and the moment of one scene point", "1 s", models.fig2),
-    Experiment("fig3", "Fig. 3: the tree of the model's parts", "1 s", models.fig3),
-    Experiment("table1", "Table I: training and testing sizes", "a minute to read the films, once", table1.make),
-    Experiment("fig4", "Fig. 4: reconstruction error against the number of regions", "10 s", fig4.make, runs=5),
-    Experiment("fig5", "Fig. 5: estimated pose over the true one", "a minute", fig5.make),
-    Experiment("fig6", "Fig. 6: joint angles beside the true ones", "a minute", fig6.make),
-    Experiment("fig7", "Fig. 7: RMSE of joint angles and positions", "3 minutes", fig7.make, runs=5),
-    Experiment("fig8", "Fig. 8: RMSE against the number of regions", "15 minutes", fig8.make, runs=3),
-    Experiment("table2", "Table II and Fig. 9: hybrid, image force and particle filter", "7 minutes", table2.make, runs=5),
+    Experiment("figure_1", "Fig. 1: the human model, ten cylinders and 25 degrees of freedom", "1 s", models.figure_1),
+    Experiment("figure_2", "Fig. 2: the force and the moment of one scene point", "1 s", models.figure_2),
+    Experiment("figure_3", "Fig. 3: the tree of the model's parts", "1 s", models.figure_3),
+    Experiment("table_1", "Table I: training and testing sizes", "a minute to read the films, once", table_1.make),
+    Experiment("figure_4", "Fig. 4: reconstruction error against the number of regions", "10 s", figure_4.make, runs=5),
+    Experiment("figure_5", "Fig. 5: estimated pose over the true one", "a minute", figure_5.make),
+    Experiment("figure_6", "Fig. 6: joint angles beside the true ones", "a minute", figure_6.make),
+    Experiment("figure_7", "Fig. 7: RMSE of joint angles and positions", "3 minutes", figure_7.make, runs=5),
+    Experiment("figure_8", "Fig. 8: RMSE against the number of regions", "15 minutes", figure_8.make, runs=3),
+    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "7 minutes", table_2.make, runs=5),
     Experiment("particles", "VII: how many particles a plain filter wants", "12 minutes", particles.make, runs=2),
 )
 

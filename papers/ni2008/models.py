@@ -42,7 +42,7 @@ def limbs_of(body: Body) -> Limbs:
     return body.limbs
 
 
-def fig1(request: Request) -> Outcome:
+def figure_1(request: Request) -> Outcome:
     """The model with its numbers and frames, and all its parts and degrees of freedom as a table."""
     body = person()
     angles = {f"{side}_{name}": value for side in ("left", "right") for name, value in
@@ -59,7 +59,7 @@ def fig1(request: Request) -> Outcome:
         s = limbs.parts.index(part)
         middle = T[limbs.joints[s]] @ np.append(0.5 * limbs.starts[s] + 0.5 * limbs.ends[s], 1)
         _number(image, view.project(middle[None])[0], str(number))
-    return Outcome({"body": BODY, "height": HEIGHT}, {"fig1": image}, {"fig1": parts_table(body)},
+    return Outcome({"body": BODY, "height": HEIGHT}, {"figure_1": image}, {"figure_1": parts_table(body)},
                    said=[f"{len(PARTS)} parts, {len(body.skeleton.dofs)} degrees of freedom. X forward, Y to the left, Z up in each part's "
                          "frame at rest (red, green, blue); the paper's root is the torso's centre, ours the pelvis."])  # fmt: skip
 
@@ -86,7 +86,7 @@ def parent_of(body: Body, part: str) -> str | None:
     return None if parent is None else limbs.parts[list(limbs.joints).index(body.skeleton.joint_index(parent))]
 
 
-def fig2(request: Request) -> Outcome:
+def figure_2(request: Request) -> Outcome:
     """A lower arm, a scene point, and what it does (eqs. 32-35)."""
     body, settings = person(), make_multiview_settings("ni2008")
     limbs, s = limbs_of(body), limbs_of(body).parts.index("right_lower_arm")
@@ -104,14 +104,14 @@ def fig2(request: Request) -> Outcome:
     figure = _force_picture(limbs, s, plane @ (point - elbow[:3, 3]), plane @ (foot - elbow[:3, 3]), plane @ force)
     rows = [(name, *map(float, value)) for name, value in (("P", point), ("P'", foot), ("c", elbow[:3, 3]), ("F", force), ("M", moment))]
     told = {"point_m": list(POINT), "tau_m": settings.surface.tau}
-    return Outcome(told, {"fig2": figure}, {"fig2": Table(("what", "x", "y", "z"), rows, True)},
+    return Outcome(told, {"figure_2": figure}, {"figure_2": Table(("what", "x", "y", "z"), rows, True)},
                    said=[told_of(away, settings.surface.tau, moment)])  # fmt: skip
 
 
 def told_of(away: Array, tau: float, moment: Array) -> str:
     """The force in a sentence."""
-    return (f"P is {1000 * np.linalg.norm(away):.0f} mm from P', the nearest place on the model; the force is bounded at {1000 * tau:.0f} mm "
-            f"(rho), its moment about the elbow {np.linalg.norm(moment):.4f} m².")
+    return (f"P is {1000 * np.linalg.norm(away):.0f} mm from P', the nearest place on the model; the force is bounded at "
+            f"{1000 * tau:.0f} mm (rho), its moment about the elbow {np.linalg.norm(moment):.4f} m².")
 
 
 def _force_picture(limbs: Limbs, s: int, P: Array, foot: Array, F: Array):
@@ -148,7 +148,7 @@ def _force_picture(limbs: Limbs, s: int, P: Array, foot: Array, F: Array):
     return figure
 
 
-def fig3(request: Request) -> Outcome:
+def figure_3(request: Request) -> Outcome:
     """The tree: whose moments a part feels (eqs. 38-40)."""
     body = person()
     places, edges = _layout(body)
@@ -165,7 +165,7 @@ def fig3(request: Request) -> Outcome:
     axes.set_ylim(-0.45, 2.4)
     axes.axis("off")
     rows = [(n, part, parent_of(body, part), _listed(below(body, part))) for n, part in enumerate(PARTS)]
-    return Outcome({}, {"fig3": figure}, {"fig3": Table(("number", "part", "hangs_on", "feels_forces_on"), rows)})
+    return Outcome({}, {"figure_3": figure}, {"figure_3": Table(("number", "part", "hangs_on", "feels_forces_on"), rows)})
 
 
 def below(body: Body, part: str) -> list[int]:

@@ -39,7 +39,7 @@ def make(request: Request) -> Outcome:
         rows.append((case.motion, frame, case.cameras[camera].name, float(found.by_frame[frame])))
         verdict.append(found)
     table = Table(("recording", "frame", "camera", "rmse_mm"), rows, shown=True)
-    return Outcome({"seed": request.seed, **HYBRID.plain}, {"fig5": side_by_side(tiles)}, {"fig5": table}, [matches(rows, verdict)])
+    return Outcome({"seed": request.seed, **HYBRID.plain}, {"figure_5": side_by_side(tiles)}, {"figure_5": table}, [matches(rows, verdict)])
 
 
 def matches(rows: list[Any], found: list[Errors]) -> Verdict:
@@ -48,7 +48,7 @@ def matches(rows: list[Any], found: list[Errors]) -> Verdict:
     whole = ", ".join(f"{np.percentile(one.by_frame, 95):.0f}" for one in found)
     return Verdict("The estimated pose closely matches the true one in the frames shown", "VI, Fig. 5",
                    f"RMSE of the joints in frames of median error: {got}; 95 of 100 frames are under {whole} mm (close: under {CLOSE:.0f})",
-                   all(row[3] < CLOSE for row in rows), "fig5.png")
+                   all(row[3] < CLOSE for row in rows), "figure_5.png")
 
 
 def median_frame(found: Errors) -> int:

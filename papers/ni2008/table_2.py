@@ -66,8 +66,8 @@ def make(request: Request) -> Outcome:
     found = {(case.motion, way.name): Runs(case, way, of(done, case, way), of_runs(case, of(done, case, way)))
              for way in ways for case in some}
     settings = {way.name: way.plain for way in ways} | {"lost": {"frame_m": FAR, "share": OFTEN}}
-    return Outcome(settings, {"fig9": picture(found)}, {"table2": shown(found), "table2_runs": each_run(found, request),
-                                                        "fig9": by_frame(found)}, verdicts(found), said(found))  # fmt: skip
+    return Outcome(settings, {"figure_9": picture(found)}, {"table_2": shown(found), "table_2_runs": each_run(found, request),
+                                                        "figure_9": by_frame(found)}, verdicts(found), said(found))  # fmt: skip
 
 
 def shown(found: Found) -> Table:
@@ -118,18 +118,18 @@ def verdicts(found: Found) -> list[Verdict]:
     best = [difference(found[motion, other].rmse, found[motion, "hybrid"].rmse).greater for motion in motions for other in OTHERS]
     gone = [found[motion, "image force"].lost == len(found[motion, "image force"].errors) for motion in hard]
     return [
-        Verdict("The hybrid is the most accurate on every sequence", "VII, Table II", listed(found, motions), all_of(best), "fig9.png"),
+        Verdict("The hybrid is the most accurate on every sequence", "VII, Table II", listed(found, motions), all_of(best), "figure_9.png"),
         Verdict("The image force loses the jogging and boxing sequences", "VII, Table II", lost(found, hard, "image force"),
-                all(gone) if hard else None, "fig9.png"),
+                all(gone) if hard else None, "figure_9.png"),
         on_walking(found),
         *(Verdict(f"The {name} loses no sequence", "VII", lost(found, motions, name),
-                  not any(found[motion, name].lost for motion in motions), "fig9.png") for name in ("hybrid", "particle filter")),
+                  not any(found[motion, name].lost for motion in motions), "figure_9.png") for name in ("hybrid", "particle filter")),
         Verdict("The image force is the fastest, the particle filter by far the slowest (17 times the hybrid)", "VII, Table II",
                 "ms a frame, hybrid, image force, particle filter: " + "; ".join(
                     " ".join((motion, ", ".join(f"{1000 * found[motion, name].pace:.1f}" for name in ("hybrid", *OTHERS))))
                     for motion in motions),
                 all(found[motion, "image force"].pace < found[motion, "hybrid"].pace < found[motion, "particle filter"].pace
-                    for motion in motions), "table2.csv"),
+                    for motion in motions), "table_2.csv"),
     ]  # fmt: skip
 
 
@@ -139,7 +139,8 @@ def on_walking(found: Found) -> Verdict:
     if ("walking", "hybrid") not in found:
         return Verdict(claim, where, "there is no walking among the recordings", None)
     ours, best = (float(np.mean(found["walking", name].rmse)) for name in ("image force", "hybrid"))
-    return Verdict(claim, where, f"{ours:.1f} mm, the hybrid {best:.1f} (well: under {WELL:g} times it)", ours < WELL * best, "fig9.png")
+    got = f"{ours:.1f} mm, the hybrid {best:.1f} (well: under {WELL:g} times it)"
+    return Verdict(claim, where, got, ours < WELL * best, "figure_9.png")
 
 
 def listed(found: Found, motions: list[str]) -> str:

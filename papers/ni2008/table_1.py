@@ -22,5 +22,5 @@ def make(request: Request) -> Outcome:
             and all(camera.size == SIZE for camera in case.cameras) for case in some}  # fmt: skip
     verdict = Verdict("100 frames to learn from; 433 (walking), 393 (jogging), 377 (boxing) to track, in seven views of 640 x 480",
                       "VI, Table I", "; ".join(f"{case.motion} {len(case.training)} and {case.frames}" for case in some),
-                      all(same.values()) and set(same) == set(PAPER), "table1.csv")
-    return Outcome({}, {}, {"table1": table}, [verdict])
+                      all(same.values()) and set(same) == set(PAPER), "table_1.csv")
+    return Outcome({}, {}, {"table_1": table}, [verdict])

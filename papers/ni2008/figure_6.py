@@ -54,7 +54,7 @@ def make(request: Request) -> Outcome:
             for frame in range(len(one.true))]
     table = Table(("recording", "frame", "angle", "true_deg", "estimated_deg"), rows)
     every = [one for each in angles.values() for one in each]
-    return Outcome({"seed": request.seed, **HYBRID.plain}, {"fig6": picture(angles)}, {"fig6": table}, [follows(every)])
+    return Outcome({"seed": request.seed, **HYBRID.plain}, {"figure_6": picture(angles)}, {"figure_6": table}, [follows(every)])
 
 
 def shown(case: Case, track: Track) -> list[Angle]:
@@ -74,7 +74,7 @@ def picture(angles: dict[str, list[Angle]]):
             name = one.name.replace("_", " ")
             axes.plot(one.true, color=colour, linewidth=1.6, alpha=0.45, label=f"{name}, true")
             axes.plot(one.found, color=colour, linewidth=0.9, linestyle="--", label=f"{name}, estimated")
-        label(axes, "frame", "degrees", motion, legend="upper right")
+        label(axes, "frame", "degrees", motion)
         axes.margins(x=0.01)
     return figure
 
@@ -84,4 +84,4 @@ def follows(angles: list[Angle]) -> Verdict:
     return Verdict("The estimated joint angles accurately follow the true ones", "VI, Fig. 6",
                    "; ".join(f"{one.told}: off by {one.off:.1f}°, correlation {one.alike:.2f}" for one in angles)
                    + f" (follows: under {CLOSE:.0f}°, over {ALIKE:g})",
-                   all(one.off < CLOSE and one.alike > ALIKE for one in angles), "fig6.png")
+                   all(one.off < CLOSE and one.alike > ALIKE for one in angles), "figure_6.png")

@@ -26,7 +26,8 @@ def make(request: Request) -> Outcome:
     means = [(motion, told([one.angles for one in each]), told([one.firm for one in each]), told([one.rmse for one in each]))
              for motion, each in errors.items()]
     shown = Table(("recording", "angles, degrees", "without twist, degrees", "positions, mm"), means, shown=True)
-    return Outcome({**HYBRID.plain, "particles": 40}, {"fig7": picture(errors)}, {"fig7": table, "fig7_means": shown}, [harder(errors)])
+    tables = {"figure_7": table, "figure_7_means": shown}
+    return Outcome({**HYBRID.plain, "particles": 40}, {"figure_7": picture(errors)}, tables, [harder(errors)])
 
 
 def picture(errors: Mapping[str, list[Errors]]):
@@ -46,4 +47,4 @@ def harder(errors: Mapping[str, list[Errors]]) -> Verdict:
     pairs = [difference(rmse[other], rmse["walking"]) for other in ("jogging", "boxing") if {other, "walking"} <= set(rmse)]
     got = "; ".join(f"{motion} {told(each)} mm" for motion, each in rmse.items())
     return Verdict("Errors are greater in the jogging and boxing sequences than in walking", "VI, Fig. 7", got,
-                   all_of([each.greater for each in pairs]) if len(pairs) == 2 else None, "fig7.png")
+                   all_of([each.greater for each in pairs]) if len(pairs) == 2 else None, "figure_7.png")

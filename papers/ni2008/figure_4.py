@@ -42,7 +42,7 @@ def make(request: Request) -> Outcome:
             for n, seed in enumerate(request.seeds) for k, M in enumerate(each.regions)]
     table = Table(("recording", "regions", "seed", "training_deg", "unseen_deg"), rows)
     settings = {"dimensions": DIMENSIONS, "regions": list(tried(request))}
-    return Outcome(settings, {"fig4": picture(curves)}, {"fig4": table}, verdicts(curves), [said(*each) for each in curves.items()])
+    return Outcome(settings, {"figure_4": picture(curves)}, {"figure_4": table}, verdicts(curves), [said(*each) for each in curves.items()])
 
 
 def tried(request: Request) -> Sequence[int]:
@@ -85,11 +85,11 @@ def verdicts(curves: dict[str, Curve]) -> list[Verdict]:
         Verdict(f"At M = {REGIONS} the average reconstruction error is already quite low", "VI, Fig. 4",
                 "; ".join(f"{motion} {low[motion]:.2f}° of poses that vary by {each.varies:.1f}°" for motion, each in curves.items())
                 + f" (low: under {LOW:.0%} of it)",
-                all(low[motion] < LOW * each.varies for motion, each in curves.items()), "fig4.png"),
+                all(low[motion] < LOW * each.varies for motion, each in curves.items()), "figure_4.png"),
         Verdict(f"The reconstruction error is flat from M = {REGIONS} on", "VI, Fig. 4",
                 f"done of the whole fall by M = {REGIONS}: " + "; ".join(f"{motion} {share:.0%}" for motion, share in done.items())
                 + f" (flat: {DONE:.0%}); of poses not learnt from: " + ", ".join(f"{share:.0%}" for share in unseen.values()),
-                all(share >= DONE for share in done.values()), "fig4.png"),
+                all(share >= DONE for share in done.values()), "figure_4.png"),
     ]  # fmt: skip
 
 

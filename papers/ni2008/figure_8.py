@@ -9,7 +9,7 @@ import numpy as np
 from papers.common.claims import Verdict, all_of, difference
 from papers.common.experiment import Outcome, Request, Table
 from papers.common.plotting import COLOURS, label, new_figure
-from papers.ni2008.fig4 import TRIED
+from papers.ni2008.figure_4 import TRIED
 from papers.ni2008.inputs import Case, cases
 from papers.ni2008.measures import Errors, of_runs
 from papers.ni2008.tracks import REGIONS, hybrid, most_regions, of, tracks
@@ -27,8 +27,8 @@ def make(request: Request) -> Outcome:
     rows = [(motion, M, seed, one.rmse, one.angles, one.off) for motion, each in curves.items() for M, errors in each.items()
             for seed, one in zip(request.seeds, errors)]
     table = Table(("recording", "regions", "seed", "rmse_mm", "angles_deg", "lost_share"), rows)
-    return Outcome({"regions": sorted({M for each in curves.values() for M in each}), "particles": 40}, {"fig8": picture(curves)},
-                   {"fig8": table}, verdicts(curves))
+    return Outcome({"regions": sorted({M for each in curves.values() for M in each}), "particles": 40}, {"figure_8": picture(curves)},
+                   {"figure_8": table}, verdicts(curves))
 
 
 def runs(request: Request, case: Case) -> dict[int, list[Errors]]:
@@ -62,13 +62,14 @@ def verdicts(curves: Curves) -> list[Verdict]:
              if (chosen := [value for M, value in each.items() if RANGE[0] <= M <= RANGE[1]])}
     return [
         Verdict("The tracking error falls with M, by much while M is small", "VI, Fig. 8",
-                f"mm with the least M, {REGIONS} and the greatest: {ends}", all_of([falls(each) for each in curves.values()]), "fig8.png"),
+                f"mm with the least M, {REGIONS} and the greatest: {ends}", all_of([falls(each) for each in curves.values()]),
+                "figure_8.png"),
         Verdict(f"Beyond M = {REGIONS} the tracking error is flat", "VI, Fig. 8", f"from {REGIONS} to the greatest M it changes by "
                 + ", ".join(f"{share:+.0%}" for share in beyond.values()) + f" (flat: under {LEVEL:.0%})",
-                all(abs(share) < LEVEL for share in beyond.values()) if beyond else None, "fig8.png"),
+                all(abs(share) < LEVEL for share in beyond.values()) if beyond else None, "figure_8.png"),
         Verdict("A good choice of M is 10 to 20", "VI, Fig. 8", "over the least error of any M, at worst: "
                 + ", ".join(f"{share:+.0%}" for share in worst.values()) + f" (good: under {GOOD:.0%})",
-                all(share < GOOD for share in worst.values()) if worst else None, "fig8.png"),
+                all(share < GOOD for share in worst.values()) if worst else None, "figure_8.png"),
     ]  # fmt: skip
 
 
