@@ -21,10 +21,10 @@ EXPERIMENTS = (
     Experiment("figure_4", "Fig. 4: reconstruction error against the number of regions", "10 s", figure_4.make, runs=5),
     Experiment("figure_5", "Fig. 5: estimated pose over the true one", "a minute", figure_5.make),
     Experiment("figure_6", "Fig. 6: joint angles beside the true ones", "a minute", figure_6.make),
-    Experiment("figure_7", "Fig. 7: RMSE of joint angles and positions", "3 minutes", figure_7.make, runs=5),
-    Experiment("figure_8", "Fig. 8: RMSE against the number of regions", "15 minutes", figure_8.make, runs=3),
-    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "7 minutes", table_2.make, runs=5),
-    Experiment("particles", "VII: how many particles a plain filter wants", "12 minutes", particles.make, runs=2),
+    Experiment("figure_7", "Fig. 7: RMSE of joint angles and positions", "2 minutes", figure_7.make, runs=3),
+    Experiment("figure_8", "Fig. 8: RMSE against the number of regions", "10 minutes", figure_8.make, runs=2),
+    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "5 minutes", table_2.make, runs=3),
+    Experiment("particles", "VII: how many particles a plain filter wants", "12 minutes", particles.make),
 )
 
 

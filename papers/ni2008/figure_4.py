@@ -15,7 +15,7 @@ from papers.ni2008.tracks import DIMENSIONS, REGIONS, learn, most_regions
 from shadowpuppet.geometry import Array
 from shadowpuppet.vqpca import reconstruction_error
 
-TRIED = (5, 10, 15, 20, 30, 40, 50, 60, 70, 80)
+TRIED = (5, 10, 15, 20, 30, 40, 60, 80)
 """M of Figs. 4 and 8."""
 LOW, DONE = 0.1, 0.9
 """An error is quite low that is less than this share of how much the poses vary; a curve is flat from where so much of its whole fall is
