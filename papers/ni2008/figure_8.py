@@ -9,11 +9,12 @@ import numpy as np
 from papers.common.claims import Verdict, all_of, difference
 from papers.common.experiment import Outcome, Request, Table
 from papers.common.plotting import COLOURS, label, new_figure
-from papers.ni2008.figure_4 import TRIED
 from papers.ni2008.inputs import Case, cases
 from papers.ni2008.measures import Errors, of_runs
 from papers.ni2008.tracks import REGIONS, hybrid, most_regions, of, tracks
 
+TRIED = (5, 10, 20, 40, 80)
+"""M."""
 LEVEL, GOOD, RANGE = 0.1, 0.05, (10, 20)
 """A curve is flat whose mean changes by less than this share; a choice is good that is within that share of the least; the choice."""
 Curves = Mapping[str, dict[int, list[Errors]]]

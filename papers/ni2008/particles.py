@@ -59,7 +59,7 @@ def verdicts(curves: Mapping[str, Curve], most: int) -> list[Verdict]:
     rule = f" (good: under {ENOUGH:g} times the hybrid's)"
     return [
         Verdict("1000 particles are not adequate for the plain filter", "VII", "; ".join(
-            f"{motion} {value:.1f} mm, the hybrid with 40 {best[motion]:.1f}" for motion, value in few.items()) + rule,
+            f"{motion} {value:.1f} mm, the hybrid {best[motion]:.1f}" for motion, value in few.items()) + rule,
             all(value > ENOUGH * best[motion] for motion, value in few.items()) if few else None, "particles.png"),
         Verdict("With many more particles, perhaps 10,000, the plain filter gives good results", "VII", "; ".join(
             f"{motion} {value:.1f} mm with {most}" for motion, value in many.items()) + rule,
