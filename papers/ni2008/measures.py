@@ -25,7 +25,7 @@ class Errors(NamedTuple):
     rmse: float
     """Of both shoulders, elbows, wrists, hips, knees and ankles over all frames, mm."""
     by_frame: Array
-    """The same in each frame, of shape (T,), mm."""
+    """The same in each frame, of shape (T,), mm; not a number where the truth is not known."""
     angles: float
     """Root mean square difference of the angles of arms and legs, degrees."""
     firm: float
@@ -42,11 +42,12 @@ class Errors(NamedTuple):
 def errors(case: Case, track: Track) -> Errors:
     """A run beside the truth."""
     distance = joint_errors(track.joints(case), case.truth, LIMBS).distance
-    by_frame = np.sqrt((distance**2).mean(1))
+    known = np.isfinite(distance).all(1)
+    by_frame = np.where(known, np.sqrt((distance**2).mean(1)), np.nan)
     angles = angle_differences(case, track)
     firm = [n for n, name in enumerate(ANGLES) if not name.endswith("twist")]
     return Errors(1000 * _rms(distance), 1000 * by_frame, np.degrees(_rms(angles)), np.degrees(_rms(angles[:, firm])),
-                  float((distance.mean(1) > FAR).mean()))  # fmt: skip
+                  float((distance[known].mean(1) > FAR).mean()))  # fmt: skip
 
 
 def angle_differences(case: Case, track: Track) -> Array:

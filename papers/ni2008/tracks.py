@@ -58,8 +58,8 @@ ALONE = Way("image force, each joint alone", {"method": "image_force", "velocity
 
 
 def particle_filter(particles: int = 1000) -> Way:
-    """The plain one: noise in all degrees of freedom, neither prior nor refinement. The paper does not say how much; of 0.02, 0.035, 0.05 and
-    0.1 rad, 0.035 was best on the first 80 frames of the made walking."""
+    """The plain one: noise in all degrees of freedom, neither prior nor refinement. The paper does not say how much; of 0.02, 0.035, 0.05
+    and 0.1 rad, 0.035 was best on the first 80 frames of the made walking."""
     noise = {"sigma_rotation": 0.035, "sigma_heading": 0.03, "sigma_translation": 0.01}
     return Way("particle filter", {"method": "particle_filter", "particles": particles, **noise})
 
