@@ -121,8 +121,10 @@ def test_pictures_grow_no_larger_than_the_documentation_takes(tmp_path, monkeypa
 
 
 def test_a_picture_that_cannot_be_written_is_told(tmp_path):
-    with pytest.raises(ShadowPuppetError, match=r"nowhere.*cannot be written \(no such file or directory\)"):
-        save_picture(np.zeros((4, 4, 3), np.uint8), tmp_path / "nowhere" / "a.png")
+    (tmp_path / "file").write_text("")
+    for folder, why in (("nowhere", "no such file or directory"), ("file", "not a directory")):
+        with pytest.raises(ShadowPuppetError, match=rf"{folder}.*cannot be written \({why}\)"):
+            save_picture(np.zeros((4, 4, 3), np.uint8), tmp_path / folder / "a.png")
 
 
 # Many runs
