@@ -45,10 +45,10 @@ def made(request: Request) -> Outcome:
     figure, panels = new_figure()
     panels[0, 0].plot(range(request.runs + 1), label="runs")
     label(panels[0, 0], "x", "y", "title")
-    verdict = Verdict("one is less than two", "Table I", f"{request.runs}", request.runs < 2, "tried.png")
+    verdicts = [Verdict("nobody knows", "V", "nothing", None), Verdict("one is less than two", "Table I", f"{request.runs}", request.runs < 2)]
     table = Table(("a", "b", "c"), [(1, 2.5, None), ("x|y", math.nan, 1 / 3)], shown=True)
     hidden = Table(("only_in_the_file",), [(7,)])
-    return Outcome({"runs": request.runs}, {"tried": figure}, {"tried": table, "tried_more": hidden}, [verdict], ["Said."])
+    return Outcome({"runs": request.runs}, {"tried": figure}, {"tried": table, "tried_more": hidden}, verdicts, ["Said."])
 
 
 EXPERIMENTS = (Experiment("tried", "A try", "no time", made, runs=5, short_runs=2), Experiment("again", "Another", "no time", made))
@@ -164,7 +164,7 @@ def test_an_experiment_says_what_it_does_and_leaves_everything(tmp_path, capsys)
     told = json.loads((tmp_path / "out" / "tried.json").read_text("utf-8"))
     assert (told["command"], told["runs"], told["number"]) == ("python -m papers.tests tried --seed 3", 5, 0)
     assert told["tables"]["tried"]["rows"][1] == ["x|y", None, 1 / 3]
-    assert told["claims"][0]["same"] is False
+    assert [claim["same"] for claim in told["claims"]] == [None, False]
     assert (tmp_path / "out" / "tried_more.csv").read_text("utf-8") == "only_in_the_file\n7\n"
     assert (tmp_path / "out" / "tried.png").stat().st_size > 1000
 
@@ -230,8 +230,9 @@ def test_the_page_is_built_of_results_and_keeps_what_is_not_named(tmp_path, docs
     assert page.endswith("<!-- others -->\nkept\n<!-- end of others -->\n")
     assert "| paper said | where | we got: made | same? | we got: lab | same? |" in page
     assert "| one is less than two | Table I | 3 | **no** | 1 | yes |" in page
-    assert "Of 1 conclusions 0 are the same here, 1 are not" in page
-    assert "- *one is less than two* (Table I): 3; see [`tried`](#tests-tried)." in page
+    assert "Of 2 conclusions 0 are the same here, 1 are not, and for 1 the runs do not tell" in page
+    assert [line for line in page.splitlines() if line.startswith("- *")] == [
+        "- *one is less than two* (Table I): 3; see [`tried`](#tests-tried)."]
     assert "![tried](assets/tests_tried.png)" in page
     assert (docs / "assets" / "tests_tried.png").read_bytes() == (tmp_path / "a" / "tried.png").read_bytes()
     assert "mean little" not in page
