@@ -45,7 +45,8 @@ def made(request: Request) -> Outcome:
     figure, panels = new_figure()
     panels[0, 0].plot(range(request.runs + 1), label="runs")
     label(panels[0, 0], "x", "y", "title")
-    verdicts = [Verdict("nobody knows", "V", "nothing", None), Verdict("one is less than two", "Table I", f"{request.runs}", request.runs < 2)]
+    verdicts = [Verdict("nobody knows", "V", "nothing", None),
+                Verdict("one is less than two", "Table I", str(request.runs), request.runs < 2)]  # fmt: skip
     table = Table(("a", "b", "c"), [(1, 2.5, None), ("x|y", math.nan, 1 / 3)], shown=True)
     hidden = Table(("only_in_the_file",), [(7,)])
     return Outcome({"runs": request.runs}, {"tried": figure}, {"tried": table, "tried_more": hidden}, verdicts, ["Said."])
@@ -205,7 +206,7 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path, capsys):
 # The page
 
 
-PAGE = "# Page\n\n<!-- tests -->\nold\n<!-- end of tests -->\n\n<!-- others -->\nkept\n<!-- end of others -->\n"
+PAGE = "# Page\n\n<!-- tests -->\nas it was\n<!-- end of tests -->\n\n<!-- others -->\nkept\n<!-- end of others -->\n"
 
 
 @pytest.fixture
@@ -226,7 +227,7 @@ def test_the_page_is_built_of_results_and_keeps_what_is_not_named(tmp_path, docs
     assert reproduction.main([str(results(tmp_path / "a", 3)), str(results(tmp_path / "b", 1, recordings=(Path("lab"),))),
                               "--docs", str(docs)]) == 0  # fmt: skip
     page = (docs / "reproduction.md").read_text("utf-8")
-    assert "old" not in page
+    assert "as it was" not in page
     assert page.endswith("<!-- others -->\nkept\n<!-- end of others -->\n")
     assert "| paper said | where | we got: made | same? | we got: lab | same? |" in page
     assert "| one is less than two | Table I | 3 | **no** | 1 | yes |" in page
