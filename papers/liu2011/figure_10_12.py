@@ -32,7 +32,8 @@ def make(request: Request) -> Outcome:
             outcome.pictures[name] = sheet(case, runs.poses[which], frames)
             outcome.tables[name] = Table(("frame", "seconds", "motion", "cost_px", "overlap"), [
                 [n, float(case.times[n]), part.name, float(runs.costs[which, n]), float(runs.overlaps[which, n])] for n in frames])
-            outcome.said.append(f"Fig. {number}, {part.name}: {', '.join(f'{case.times[n]:.1f}' for n in frames)} s. {followed(runs, part)}")
+            when = ", ".join(f"{case.times[n]:.1f}" for n in frames)
+            outcome.said.append(f"Fig. {number}, {part.name}, at {when} s. {followed(runs, part)}")
         outcome.settings |= told(case)
     return outcome
 
