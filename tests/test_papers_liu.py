@@ -190,6 +190,14 @@ def test_3d_errors_decide_on_elbows_hands_and_their_order():
     assert judged(errors(0.06, 0.1), overlap=0.4)[4] is False
 
 
+def test_gains_are_told_motion_by_motion():
+    case: Any = SimpleNamespace(name="lab", times=np.arange(4.0), parts=(material.Part("wave", 0, 1), material.Part("bow", 2, 3)))
+    of = errors(0.06, 0.1)
+    of["DRS"][:, 2:] += 0.09
+    said = figure_6_7.by_motion(case, of)
+    assert said == "What DRS gains over SRS, motion by motion (lab): wave: elbow +40, hand +60 mm; bow: elbow -50, hand -30 mm."
+
+
 @pytest.mark.parametrize(("drs", "srs", "same"), [(100, 200, True), (200, 100, False), (100, 100, None)])
 def test_2d_errors_decide(drs, srs, same):
     costs = 1 + 0.01 * np.linspace(-1, 1, 6)[:, None] * np.ones((6, 5))
