@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,5 +65,6 @@ def save_picture(picture: Any, path: Path) -> None:
                 break
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
         raise ShadowPuppetError(f"{path}: cannot be written ({reason(error)})") from None

@@ -43,6 +43,7 @@ def make(request: Request) -> Outcome:
         outcome.tables[f"{name}_means"] = means(errors)
         outcome.verdicts += verdicts(errors, runs, f"{name}.png")
         outcome.settings |= told(case)
+        outcome.said.append(by_motion(case, errors))
     outcome.said.append("The paper's truth had the hand at the wrist, its model at the fist's end. The lower panels show what that adds.")
     return outcome
 
@@ -95,6 +96,16 @@ def means(errors: Errors) -> Table:
 def _mean_sd(errors: Array) -> tuple[float, float]:
     each = 1000 * np.nanmean(errors, axis=1)
     return float(each.mean()), float(each.std())
+
+
+def by_motion(case: Case, errors: Errors) -> str:
+    """In which motions DRS is nearer, and in which SRS is."""
+    said = []
+    for part in case.parts:
+        during = (case.times >= part.start) & (case.times <= part.end)
+        less = [1000 * float(np.nanmean(errors["SRS"][:, during, :, j]) - np.nanmean(errors["DRS"][:, during, :, j])) for j in (1, 2)]
+        said.append(f"{part.name}: elbow {less[0]:+.0f}, hand {less[1]:+.0f} mm")
+    return f"What DRS gains over SRS, motion by motion ({case.name}): {'; '.join(said)}."
 
 
 def verdicts(errors: Errors, runs: dict[str, Runs], shown: str) -> list[Verdict]:

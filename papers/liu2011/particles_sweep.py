@@ -69,4 +69,4 @@ def verdicts(found: Sweep, numbers: tuple[int, ...], shown: str) -> list[Verdict
     ]  # fmt: skip
 
 
-EXPERIMENT = Experiment("particles_sweep", "N from 25 to 3,200 particles a stage, DRS and SRS", "6 minutes", make, runs=20, short_runs=2)
+EXPERIMENT = Experiment("particles_sweep", "N from 25 to 3,200 particles a stage, DRS and SRS", "2 minutes", make, runs=10, short_runs=2)

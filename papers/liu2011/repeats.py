@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -155,7 +156,8 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
         np.savez(part, **arrays)
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
         raise ShadowPuppetError(f"{path}: cannot be written ({reason(error)})") from None
 
 

@@ -114,5 +114,5 @@ def verdicts(found: Sweep, readings: Readings, shares: tuple[float, ...], kept: 
     ]  # fmt: skip
 
 
-EXPERIMENT = Experiment("selectivity", "IV-C: how much SRS's weights tell, other sigma_gamma, other readings of the paper", "3 minutes",
-                        make, runs=20, short_runs=2)
+EXPERIMENT = Experiment("selectivity", "IV-C: how much SRS's weights tell, other sigma_gamma, other readings of the paper", "a minute",
+                        make, runs=10, short_runs=2)

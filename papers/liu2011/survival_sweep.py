@@ -77,5 +77,5 @@ def verdicts(found: Sweep, rates: tuple[float, ...], speeds: tuple[int, ...], sh
     ]  # fmt: skip
 
 
-EXPERIMENT = Experiment("survival_sweep", "V: survival rate e from 0 to 1 on slow and fast motion", "3 minutes", make, runs=20,
+EXPERIMENT = Experiment("survival_sweep", "V: survival rate e from 0 to 1 on slow and fast motion", "a minute", make, runs=10,
                         short_runs=2)
