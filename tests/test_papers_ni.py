@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from papers.common import runner
 from papers.common.experiment import Request
 from papers.ni2008 import figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
 from papers.ni2008.__main__ import EXPERIMENTS, main
@@ -141,6 +142,13 @@ def test_what_cannot_be_used_is_told(tmp_path, capsys, words, told):
     said = capsys.readouterr().err
     assert told in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(("name", "value", "said"), [
+    ("drawn", True, "--drawn"), ("made", Path("/home/me/made"), "--made made"), ("subject", "S3", "--subject S3"),
+])
+def test_a_command_is_told_without_the_readers_folders(name, value, said):
+    assert runner._flag(name, value) == said
 
 
 def test_humaneva_is_asked_for_the_papers_trials(tmp_path, monkeypatch):

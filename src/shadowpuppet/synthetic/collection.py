@@ -101,7 +101,7 @@ def around() -> tuple[Spec, ...]:
     return tuple(specs)
 
 
-HUMANEVA = (
+HUMANEVA: tuple[tuple[str, Kind, int, str, float, int, float, float, tuple[int, int]], ...] = (
     # name, kind and seed of the body, gestures, seconds of them before the film, its frames (Ni 2008, Table I), distance (m) and field of
     # view (degrees) of the cameras, seeds of clothes and room
     ("humaneva_walking", "man", 21, "walk 11", 2.0, 433, 4.8, 48, (92, 92)),
