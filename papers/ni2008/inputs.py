@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -166,8 +166,9 @@ def load(request: Request, source: Source) -> Case:
     return opened(folder, source.name)
 
 
+@lru_cache(maxsize=1)
 def opened(folder: Path, name: str) -> Case:
-    """A case that was read."""
+    """A case that was read; the last one is kept: it is large, and runs of it follow one another."""
     with np.load(folder / "case.npz", allow_pickle=False) as file:
         return Case(name, folder, read_calibration(folder / "calibration.toml"), {key: file[key] for key in file.files})
 
