@@ -30,6 +30,10 @@ def twice(job: int) -> int:
     return 2 * job
 
 
+def whoami(job: int) -> int:
+    return os.getpid()
+
+
 def killed(job: int) -> int:
     if job == 3:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -137,13 +141,18 @@ def test_jobs_come_back_in_their_order(workers):
 
 
 def test_a_task_that_refuses_is_told_as_it_is():
-    with pytest.raises(ShadowPuppetError, match="job 0: found nothing"):
+    with pytest.raises(ShadowPuppetError, match="job [01]: found nothing"):
         run_all("jobs", refused, range(2), 2)
 
 
 def test_a_killed_process_is_told_in_a_sentence():
     with pytest.raises(ShadowPuppetError, match="jobs: a process was killed"):
         run_all("jobs", killed, range(5), 2)
+    assert run_all("jobs", twice, range(2), 2) == [0, 2]  # others are started
+
+
+def test_processes_stay_for_the_next_time():
+    assert len(set(run_all("jobs", whoami, range(4), 2)) | set(run_all("jobs", whoami, range(4), 2))) <= 2
 
 
 # The command line

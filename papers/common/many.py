@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from functools import lru_cache
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -28,16 +29,23 @@ def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], worke
         bar = progress.add_task(what, total=len(jobs))
         if workers <= 1 or len(jobs) <= 1:
             return [_counted(progress, bar, task(job)) for job in jobs]
-        pool = ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), initializer=_alone)
+        waiting = [_crew(workers).submit(task, job) for job in jobs]
         try:
-            waiting = [pool.submit(task, job) for job in jobs]
             for done in as_completed(waiting):
                 _counted(progress, bar, done.result())
             return [done.result() for done in waiting]
         except BrokenProcessPool:
+            _crew.cache_clear()
             raise ShadowPuppetError(f"{what}: a process was killed (is there enough memory?); try again with fewer --workers") from None
         finally:
-            pool.shutdown(cancel_futures=True)
+            for left in waiting:
+                left.cancel()
+
+
+@lru_cache(maxsize=1)
+def _crew(workers: int) -> ProcessPoolExecutor:
+    """Processes that stay for the next time: each takes seconds to start."""
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_alone)
 
 
 def _alone() -> None:

@@ -57,7 +57,8 @@ def sheet(case: Case, poses: Array, frames: list[int]) -> Image:
     """Three rows, a column a frame, of poses (T, D)."""
     import cv2
 
-    columns = [column(case.picture, case.images[n], case.masks[n], poses[n], case.tracker.ignore_legs) for n in frames]
+    seen = zip(frames, case.frames(frames))
+    columns = [column(case.picture, image, case.masks[n], poses[n], case.tracker.ignore_legs) for n, image in seen]
     whole = np.concatenate([np.pad(each, ((0, 0), (2, 2), (0, 0))) for each in columns], axis=1)
     return np.asarray(cv2.resize(whole, (WIDTH, round(whole.shape[0] * WIDTH / whole.shape[1])), interpolation=cv2.INTER_AREA), np.uint8)
 

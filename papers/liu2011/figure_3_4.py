@@ -25,7 +25,8 @@ def make(request: Request) -> Outcome:
         n = int(np.abs(case.times - (part.start + 0.45 * (part.end - part.start))).argmin())
         model, mask = case.picture.mask(run.poses[0, n]), case.masks[n]
         counted = ~case.picture.legs(run.poses[0, n]) | ~mask
-        tiles = {"observation": calm(case.images[n]), "by eq. 1 alone": white(plain(case, n)), "as `track` makes it": white(mask)}
+        image = case.frames([n])[0]
+        tiles = {"observation": calm(image), "by eq. 1 alone": white(plain(case, image)), "as `track` makes it": white(mask)}
         outcome.pictures[stem("figure_3", request, case)] = row({k: v for k, v in tiles.items() if v is not None})
         outcome.pictures[stem("figure_4", request, case)] = row({"model h": white(model), "silhouette f": white(mask),
                                                                  "h xor f": white((model ^ mask) & counted)})
@@ -37,13 +38,13 @@ def make(request: Request) -> Outcome:
     return outcome
 
 
-def plain(case: Case, n: int) -> Mask | None:
-    """The n-th frame's mask by eq. 1 alone; None where there is no film of the empty scene to learn deviations from."""
+def plain(case: Case, image: Image) -> Mask | None:
+    """A frame's mask by eq. 1 alone; None where there is no film of the empty scene to learn deviations from."""
     footage = case.prepared.footage
     if footage.view.background is None:
         return None
-    empty = footage.pictures(footage.view.background, "the empty scene")
-    return learn_background(empty, SilhouetteSettings(method="averaging"), film=list(case.images[::40])).raw(case.images[n])
+    empty, film = footage.pictures(footage.view.background, "the empty scene"), [shot.image for shot in case.prepared.sample.shots]
+    return learn_background(empty, SilhouetteSettings(method="averaging"), film=film).raw(image)
 
 
 def calm(image: Image) -> Image:

@@ -11,6 +11,7 @@ from papers.common.plotting import COLOURS, new_figure
 from papers.liu2011.material import Case, cases
 from papers.liu2011.shown import stem, told
 from shadowpuppet.geometry import Array
+from shadowpuppet.overlay import in_colour
 from shadowpuppet.resampling import deterministic
 from shadowpuppet.tracking import MonocularTracker
 
@@ -84,7 +85,7 @@ def real(case: Case, rng: np.random.Generator) -> tuple[int, np.ndarray, Array]:
 
 def show_hands(axes: Axes, case: Case, n: int, kinds: np.ndarray, hands: Array) -> None:
     """Dots over the picture."""
-    grey = case.images[n].mean(-1) if case.images[n].ndim == 3 else case.images[n]
+    grey = in_colour(case.frames([n])[0]).mean(-1)
     axes.imshow(grey, cmap="gray", vmin=-60, vmax=300, interpolation="bilinear")
     for kind, text, colour in ((2, "the best, redrawn", COLOURS[1]), (1, "survivors", COLOURS[0]), (0, "the best", "black")):
         axes.plot(*hands[kinds == kind].T, "o", color=colour, markersize=6 if kind == 0 else 2.5, label=text)

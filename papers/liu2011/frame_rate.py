@@ -17,6 +17,7 @@ from shadowpuppet.bench.timing import Contender, in_turns
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.video import Image
 
 PAPER = 15.0
 """Frames/s."""
@@ -45,7 +46,7 @@ def make(request: Request) -> Outcome:
 
 def chain(case: Case) -> dict[str, Contender]:
     """What a frame goes through."""
-    images = case.images[: FRAMES + 1]
+    images = case.frames(range(min(FRAMES + 1, len(case.times))))
     return {"decode": Contender(lambda: decode(case), FRAMES),
             "silhouette, eq. 1": Contender(segment(case, images, SilhouetteSettings(method="averaging")), len(images)),
             "silhouette, as `track`": Contender(segment(case, images, SilhouetteSettings()), len(images)),
@@ -58,11 +59,11 @@ def decode(case: Case) -> None:
         pass
 
 
-def segment(case: Case, images: np.ndarray, settings: SilhouetteSettings) -> Callable[[], None]:
+def segment(case: Case, images: list[Image], settings: SilhouetteSettings) -> Callable[[], None]:
     """Masks of pictures, by a background that is learnt before; where there is no film of the empty scene, by these pictures' median."""
     background, footage = case.prepared.footage.view.background, case.prepared.footage
     empty = list(footage.pictures(background, "the empty scene")) if background is not None else [np.median(images, 0).astype(np.uint8)] * 2
-    segmenter = learn_background(empty, settings, film=list(images[::8]))
+    segmenter = learn_background(empty, settings, film=images[::8])
 
     def run() -> None:
         for image in images:

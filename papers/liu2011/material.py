@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -29,6 +30,7 @@ from shadowpuppet.synthetic.motions import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from
 from shadowpuppet.synthetic.specfile import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.video import Image
 
 MADE = {
     "three_motions": ("wave_hands 7.4, bend_aside 7.5, bow_forward 7.5", "wave_hands 2.4, bend_aside 2.4, bow_forward 2.4"),
@@ -61,8 +63,6 @@ class Case:
     """Of the frames, seconds, (T,)."""
     masks: NDArray[np.bool_]
     """Silhouettes, (T, H, W)."""
-    images: NDArray[np.uint8]
-    """The film, (T, H, W, 3), blue, green, red."""
     truth: JointTable | None
     parts: tuple[Part, ...]
 
@@ -90,6 +90,12 @@ class Case:
     def tracker(self) -> MonocularSettings:
         """The paper's settings (Table I), by `DRS`."""
         return self.options.tracker
+
+    def frames(self, wanted: Sequence[int]) -> list[Image]:
+        """Some of the film's pictures, read again: a film is not kept in memory."""
+        last = max(wanted)
+        found = {n: shot.image for n, shot in zip(range(last + 1), self.prepared.footage.shots(False)) if n in wanted}
+        return [found[n] for n in wanted]
 
     def true_places(self, names: tuple[str, ...]) -> Array:
         """Where joints are (T, J, 3), metres, in the world; not a number where that is not known. Raises `ShadowPuppetError`."""
@@ -146,12 +152,11 @@ def _case(folder: Path, silhouettes: str, short: bool, seed: int, changes: tuple
     with one_blas_thread():
         prepared = prepare(str(folder), options, np.random.default_rng(seed))
         check(prepared)
-        shots = list(prepared.footage.shots(options.masks))
-        masks = np.array([prepared.silhouettes(shot) for shot in shots])
-    times, truth = np.array([shot.time for shot in shots]), prepared.footage.recording.truth
-    table = read_joints(truth) if truth is not None else None
-    images = np.array([shot.image for shot in shots])
-    return Case(prepared, options, times, masks, images, table, _parts(folder, times))
+        seen = [(shot.time, prepared.silhouettes(shot)) for shot in prepared.footage.shots(options.masks)]
+    times, masks, truth = np.array([time for time, _ in seen]), np.array([mask for _, mask in seen]), prepared.footage.recording.truth
+    if not masks[0].any():
+        raise ShadowPuppetError(f"{folder}: found nobody in the first frame, expected the person there: the paper's filter begins with it")
+    return Case(prepared, options, times, masks, read_joints(truth) if truth is not None else None, _parts(folder, times))
 
 
 def _parts(folder: Path, times: Array) -> tuple[Part, ...]:

@@ -113,8 +113,7 @@ def follow(job: Job) -> dict[str, Array]:
         rng = np.random.default_rng([2011, seed])
         states = [tracker.start(rng, masks[0])]
         for mask in masks[1:]:
-            state = states[-1]
-            states.append(tracker.absent(state) if tracker.is_absent(mask, state.pose) else tracker.cycle(rng, state, mask))
+            states.append(tracker.cycle(rng, states[-1], mask))
         found["poses"].append(np.array([state.pose for state in states]))
         found["costs"].append(np.array([state.cost for state in states]))
         found["overlaps"].append(np.array([state.overlap for state in states]))
@@ -124,7 +123,8 @@ def follow(job: Job) -> dict[str, Array]:
 def _key(case: Case, settings: MonocularSettings, seeds: tuple[int, ...], stride: int) -> str:
     """What tells runs from others."""
     guess = case.guess
-    told = (settings, seeds, stride, guess.sizes, guess.distance, guess.elevation, case.masks.shape, case.camera.matrix.tolist())
+    camera = [array.tolist() for array in (case.camera.matrix, case.camera.distortion, case.camera.T_camera_world)]
+    told = (settings, seeds, stride, guess.sizes, guess.distance, guess.elevation, case.masks.shape, camera, case.camera.fisheye)
     return hashlib.sha256(repr(told).encode() + case.masks.tobytes() + _code()).hexdigest()[:16]
 
 
