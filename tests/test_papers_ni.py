@@ -309,7 +309,7 @@ def test_fig_8_is_judged_by_its_curve(values, expected):
 @pytest.mark.parametrize(("training", "expected"), [
     ([4.0, 0.4, 0.1], [True, True]),
     ([4.0, 2.0, 0.1], [False, False]),
-    ([4.0, 0.9, 0.0], [True, False]),
+    ([1.5, 0.9, 0.0], [True, False]),
 ])
 def test_fig_4_is_judged_by_its_curve(training, expected):
     curve = figure_4.Curve([5, 20, 80], np.array([training] * 2), np.array([[5.0, 3.0, 4.0]] * 2), 10.0)
