@@ -212,6 +212,18 @@ def test_whole_turns_are_none_and_shifts_are_lost(case):
     assert away.off == pytest.approx(frames // 4 / frames)
 
 
+def test_exchanged_legs_are_told(case):
+    poses, skeleton = case.true_poses.copy(), case.body.skeleton
+    left, right = (skeleton.dof_indices([name for name in skeleton.dof_names if name.startswith((f"{side}_hip", f"{side}_knee"))])
+                   for side in ("left", "right"))
+    assert measures.errors(case, still(case, poses)).exchanged == 0
+    poses[2:5, left], poses[2:5, right] = np.array([-1.2, 0, 0, 0]), np.array([1.2, 0, 0, 0])
+    strides = replace(case, arrays=case.arrays | {"truth": case.body.points(poses, names=case.truth.names)})
+    again = poses.copy()
+    again[2:4, left], again[2:4, right] = poses[2:4, right], poses[2:4, left]
+    assert measures.errors(strides, still(strides, again)).exchanged == pytest.approx(2 / len(poses))
+
+
 def test_frames_without_a_truth_do_not_count(case):
     truth = case.arrays["truth"].copy()
     truth[3, case.truth.names.index("left_elbow")] = np.nan

@@ -80,8 +80,8 @@ def verdicts(curves: dict[str, Curve]) -> list[Verdict]:
     """What the paper says of the curves."""
     low = {motion: float(at(each, each.training, REGIONS)) for motion, each in curves.items()}
     steep = {motion: steepness(each, each.training) for motion, each in curves.items()}
-    unseen = ", ".join(f"{after / before:.0%}" if before > 0 else "it did not fall" for before, after in
-                       (steepness(each, each.unseen) for each in curves.values()))  # fmt: skip
+    unseen = "; ".join(f"{motion} {10 * before:.2f}° and {10 * after:.2f}°" for motion, (before, after) in
+                       ((motion, steepness(each, each.unseen)) for motion, each in curves.items()))  # fmt: skip
     return [
         Verdict(f"At M = {REGIONS} the average reconstruction error is already quite low", "VI, Fig. 4",
                 "; ".join(f"{motion} {low[motion]:.2f}° of poses that vary by {each.varies:.1f}°" for motion, each in curves.items())

@@ -68,13 +68,14 @@ def shown(case: Case, track: Track) -> list[Angle]:
 
 def picture(angles: dict[str, list[Angle]]):
     """A panel for each recording, as in the paper."""
-    figure, panels = new_figure(len(angles), 1, width=8, height=2.4)
+    figure, panels = new_figure(len(angles), 1, width=10, height=2.2)
     for axes, (motion, each) in zip(panels[:, 0], angles.items()):
         for colour, one in zip(COLOURS, each):
             name = one.name.replace("_", " ")
             axes.plot(one.true, color=colour, linewidth=1.6, alpha=0.45, label=f"{name}, true")
             axes.plot(one.found, color=colour, linewidth=0.9, linestyle="--", label=f"{name}, estimated")
-        label(axes, "frame", "degrees", motion)
+        label(axes, "frame", "degrees", motion, legend=False)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=7)
         axes.margins(x=0.01)
     return figure
 

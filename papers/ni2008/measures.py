@@ -11,6 +11,8 @@ from papers.ni2008.inputs import Case
 from papers.ni2008.tracks import Track
 from shadowpuppet.geometry import Array
 from shadowpuppet.metrics import LIMBS, joint_errors
+from shadowpuppet.motion import JointTable
+from shadowpuppet.whole_skeleton import SIDES
 
 FAR, OFTEN = 0.2, 0.1
 """The person is lost in a frame whose joints are this far off on average (m); a sequence is lost with such a share of its frames."""
@@ -32,6 +34,8 @@ class Errors(NamedTuple):
     """The same without the turn of upper arms and thighs about themselves, which the places of joints tell badly."""
     off: float
     """Share of the frames in which the person is lost."""
+    exchanged: float = 0.0
+    """Share of the frames in which the legs are nearer to each other's places than to their own."""
 
     @property
     def lost(self) -> bool:
@@ -41,13 +45,26 @@ class Errors(NamedTuple):
 
 def errors(case: Case, track: Track) -> Errors:
     """A run beside the truth."""
-    distance = joint_errors(track.joints(case), case.truth, LIMBS).distance
+    joints = track.joints(case)
+    distance = joint_errors(joints, case.truth, LIMBS).distance
     known = np.isfinite(distance).all(1)
     by_frame = np.where(known, np.sqrt((distance**2).mean(1)), np.nan)
     angles = angle_differences(case, track)
     firm = [n for n, name in enumerate(ANGLES) if not name.endswith("twist")]
     return Errors(1000 * _rms(distance), 1000 * by_frame, np.degrees(_rms(angles)), np.degrees(_rms(angles[:, firm])),
-                  float((distance[known].mean(1) > FAR).mean()))  # fmt: skip
+                  float((distance[known].mean(1) > FAR).mean()), exchanged(joints, case.truth))  # fmt: skip
+
+
+def exchanged(found: JointTable, truth: JointTable) -> float:
+    """Share of the frames in which knees and ankles are nearer to where those of the other side truly are."""
+    ours, own, other = (table.select([f"{side}_{joint}" for side in sides for joint in ("knee", "ankle")]).positions
+                        for table, sides in ((found, SIDES), (truth, SIDES), (truth, SIDES[::-1])))  # fmt: skip
+    known = np.isfinite(own).all((1, 2))
+    return float((_apart(ours, other) < _apart(ours, own))[known].mean())
+
+
+def _apart(ours: Array, theirs: Array) -> Array:
+    return np.linalg.norm(ours - theirs, axis=2).sum(1)
 
 
 def angle_differences(case: Case, track: Track) -> Array:

@@ -107,7 +107,8 @@ def picture(found: Found):
         for colour, runs in zip(COLOURS, (runs for (of_motion, _), runs in found.items() if of_motion == motion)):
             axes.plot(curve(runs), color=colour, linewidth=1, label=runs.way.name)
         axes.set_yscale("log")
-        label(axes, "frame", "RMSE of joint positions (mm)", motion, legend=motion == motions[0])
+        label(axes, "frame", "RMSE of joint positions (mm)", motion, legend=False)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
 
 
@@ -152,15 +153,19 @@ def listed(found: Found, motions: list[str]) -> str:
 
 def lost(found: Found, motions: list[str], name: str) -> str:
     """How many runs lost the person, and how often."""
-    return "; ".join(f"{motion}: {found[motion, name].lost} of {len(found[motion, name].errors)} runs lost, "
-                     f"{np.mean([one.off for one in found[motion, name].errors]):.0%} of the frames" for motion in motions)  # fmt: skip
+    return "; ".join(f"{motion} {np.mean(runs.rmse):.0f} mm, {runs.lost} of {len(runs.errors)} runs lost, "
+                     f"{np.mean([one.off for one in runs.errors]):.0%} of the frames"
+                     for motion, runs in ((motion, found[motion, name]) for motion in motions))  # fmt: skip
 
 
 def said(found: Found) -> list[str]:
     """What is to be known beside the table."""
     alone = {motion: float(np.mean(runs.rmse)) for (motion, name), runs in found.items() if name == ALONE.name}
     errors = ", ".join(f"{motion} {value:.0f} mm" for motion, value in alone.items())
+    legs = ", ".join(f"{motion} {np.mean([one.exchanged for one in runs.errors]):.0%}" for (motion, name), runs in found.items()
+                     if name == "image force")  # fmt: skip
     return [f"Lost: joints are {1000 * FAR:.0f} mm off on average in over {OFTEN:.0%} of the frames. Nobody who is lost is searched for, "
             "which `shadowpuppet track` does. Times are of one core, for tracking alone; the paper's are MATLAB's.",
             "The image force, after the paper's ref. [11], has no normals and no bound. That method's dynamics pass a force on along the "
-            f"limbs, as the sums over what hangs on a joint do here; without them it loses everybody at once ({errors})."]  # fmt: skip
+            f"limbs, as the sums over what hangs on a joint do here; without them it loses everybody at once ({errors}).",
+            f"The image force has left and right leg exchanged in so many of the frames: {legs}."]  # fmt: skip
