@@ -231,6 +231,8 @@ def test_frames_without_a_truth_do_not_count(case):
     found = measures.errors(gap, still(gap, case.true_poses))
     assert np.isnan(found.by_frame[3])
     assert np.isfinite([found.rmse, found.off]).all()
+    poses = case.true_poses + 1.0 * np.array([name == "root_x" for name in case.body.skeleton.dof_names])
+    assert measures.errors(gap, still(gap, poses)).off == 1  # of the frames whose truth is known
 
 
 # Methods
