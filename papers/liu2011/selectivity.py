@@ -17,7 +17,7 @@ from shadowpuppet.resampling import normalise
 from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.tracking import MonocularTracker
 
-SHARES, FEW = (1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625), (1.0, 0.0625)
+SHARES, FEW = (1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125), (1.0, 0.0625)
 """Of Table I's sigma_gamma, 8000 and 4000 pixels."""
 READINGS = {"as in the preset": {}, "arms drawn with the torso": {"torso_arms": "last"},
             "ranked in the new picture (eq. 8)": {"rank_by": "new"}, "no joint limits": {"limits": False}}  # fmt: skip
