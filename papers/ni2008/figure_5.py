@@ -19,7 +19,7 @@ from shadowpuppet.io.recording import read_recording
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.video import open_frames
 
-GREEN, RED, GROUND, INK = (70, 160, 40), (60, 60, 220), 245, (40, 40, 40)
+GREEN, RED, GROUND, INK = (70, 160, 40), (60, 60, 220), 255, (40, 40, 40)
 """Blue, green, red."""
 HEIGHT, MARGIN = 330, 0.35
 """Of each picture, pixels; what is shown around the person, metres."""
