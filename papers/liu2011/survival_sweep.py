@@ -72,7 +72,7 @@ def verdicts(found: Sweep, rates: tuple[float, ...], speeds: tuple[int, ...], sh
                 f"2D error {every.cost.mean():.0f} px with e = 1, {slow.cost.mean():.0f} px with {TABLE_I}'s; 3D error "
                 f"{every.error.mean():.0f} and {slow.error.mean():.0f} mm", difference(every.cost, slow.cost).greater, shown),
         Verdict("A good e is a compromise between both ends", "V, Table I",
-                f"3D error as filmed: {TABLE_I} {slow.error.mean():.0f} mm, any other e under 1 {min(between):.0f} to {max(between):.0f} mm; "
+                f"3D error as filmed: {TABLE_I} {slow.error.mean():.0f} mm, any e under 1 {min(between):.0f} to {max(between):.0f} mm; "
                 f"{fast} x as fast: {TABLE_I} {some.error.mean():.0f} mm, e = 0 {none.error.mean():.0f} mm", all_of(ends), shown),
     ]  # fmt: skip
 
