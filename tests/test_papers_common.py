@@ -141,7 +141,7 @@ def test_jobs_come_back_in_their_order(workers):
 
 
 def test_a_task_that_refuses_is_told_as_it_is():
-    with pytest.raises(ShadowPuppetError, match="job [01]: found nothing"):
+    with pytest.raises(ShadowPuppetError, match=r"job [01]: found nothing"):
         run_all("jobs", refused, range(2), 2)
 
 

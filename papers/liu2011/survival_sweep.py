@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from papers.common.claims import Verdict, difference
+from papers.common.claims import Verdict, all_of, difference
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from papers.liu2011.material import Case, cases
@@ -62,7 +62,8 @@ def verdicts(found: Sweep, rates: tuple[float, ...], speeds: tuple[int, ...], sh
     fast = speeds[-1]
     none, some, every = found[fast, 0.0], found[fast, TABLE_I], found[1, 1.0]
     slow = found[1, TABLE_I]
-    best = min(rates, key=lambda e: found[1, e].error.mean())
+    between = [found[1, e].error.mean() for e in rates if e < 1]
+    ends = [difference(none.error, some.error).greater, difference(every.error, slow.error).greater]
     return [
         Verdict("With e near 0 fast motion is lost", "V",
                 f"{fast} x as fast, joints over 30 cm off: {none.far.mean():.1f} % with e = 0, {some.far.mean():.1f} % with {TABLE_I}'s "
@@ -70,9 +71,9 @@ def verdicts(found: Sweep, rates: tuple[float, ...], speeds: tuple[int, ...], sh
         Verdict("With e = 1 particles are scattered and do not converge", "V",
                 f"2D error {every.cost.mean():.0f} px with e = 1, {slow.cost.mean():.0f} px with {TABLE_I}'s; 3D error "
                 f"{every.error.mean():.0f} and {slow.error.mean():.0f} mm", difference(every.cost, slow.cost).greater, shown),
-        Verdict(f"{TABLE_I}'s e is a good compromise", "V, Table I",
-                f"3D error {slow.error.mean():.0f} mm; the best single e is {best:g} with {found[1, best].error.mean():.0f} mm",
-                difference(slow.error, found[1, best].error).greater is not True, shown),
+        Verdict("A good e is a compromise between both ends", "V, Table I",
+                f"3D error as filmed: {TABLE_I} {slow.error.mean():.0f} mm, any e under 1 {min(between):.0f} to {max(between):.0f} mm; "
+                f"{fast} x as fast: {TABLE_I} {some.error.mean():.0f} mm, e = 0 {none.error.mean():.0f} mm", all_of(ends), shown),
     ]  # fmt: skip
 
 
