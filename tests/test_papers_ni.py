@@ -314,6 +314,7 @@ def test_table_ii_is_judged_by_its_runs(key, other, which, expected):
     ({5: (15, 15.1), 10: (20, 21), 20: (20, 21), 80: (20, 21)}, [False, True, False]),
     ({5: (30, 31), 10: (20, 21), 20: (20, 21), 80: (10, 11)}, [True, False, False]),
     ({5: (30, 31), 40: (20, 21)}, [None, None, None]),
+    ({5: (30, 31), 10: (20, 21), 20: (20, 21), 40: (20, 60), 80: (20, 21)}, [True, False, True]),
 ])
 def test_fig_8_is_judged_by_its_curve(values, expected):
     curve = {M: [errors(value) for value in each] for M, each in values.items()}
