@@ -24,7 +24,9 @@ APART = 0.07
 SLIM = 0.7
 """A sphere's radius over the limb's smaller one: nobody is shaped like their model to the pixel."""
 TAU = 0.1
-"""How far (m) a sphere may reach out until it costs no longer the square: a silhouette may have lost a limb."""
+"""How far (m) a sphere may reach out until it costs no longer the square."""
+OTHERS = 3
+"""So many others that see somebody at a place outvote a camera that does not: its silhouette may have lost a limb."""
 MARGIN = 24
 """Pixels around the person to which the way back is looked up; farther out it is that to the nearest of these, and theirs."""
 
@@ -53,6 +55,8 @@ class FreeSpace(NamedTuple):
     """Of the cameras, of shape (C, 3, 3)."""
     bends: Array
     """Distortion, padded (8), whether it is a fisheye's, whether there is any, and how far it holds, of shape (C, 11)."""
+    room: Array
+    """What each camera says of a sphere, of shape (C, 5)."""
 
 
 def spheres_in(limbs: Limbs) -> Spheres:
@@ -82,6 +86,7 @@ def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
         np.array([camera.T_camera_world[:3] for camera, _ in views], float).reshape(-1, 3, 4),
         np.array([camera.matrix for camera, _ in views], float).reshape(-1, 3, 3),
         np.array(bends, float).reshape(-1, 11),
+        np.empty((len(views), 5)),
     )
 
 
@@ -114,51 +119,67 @@ def _look_up(fields, window, x, y):  # pragma: no cover
     return distance, along, down
 
 
+@part
+def _ask(c, space, p0, p1, p2, radius, said):  # pragma: no cover
+    """What camera c says of a sphere at (p0, p1, p2): how far (m) it reaches out of the silhouette, the same of its middle, and how these
+    grow along the world's axes (3), into said (5,). Whether it has a say: the sphere must be in its picture."""
+    V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
+    said[0], said[1] = -1.0, 0.0
+    z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
+    if z < NEAR:
+        return False
+    u = (V[0, 0] * p0 + V[0, 1] * p1 + V[0, 2] * p2 + V[0, 3]) / z
+    v = (V[1, 0] * p0 + V[1, 1] * p1 + V[1, 2] * p2 + V[1, 3]) / z
+    a, b = bend_within(u, v, lens, lens[8] > 0, lens[10]) if lens[9] > 0 else (u, v)
+    x, y = K[0, 0] * a + K[0, 2], K[1, 1] * b + K[1, 2]
+    if not (0 <= x < window[5] and 0 <= y < window[6]):
+        return False
+    distance, along, down = _look_up(space.fields, window, x, y)
+    ahead = -(along * u + down * v)
+    said[1] = distance * z / np.sqrt(K[0, 0] * K[1, 1])
+    said[0] = said[1] + radius
+    for i in range(3):
+        said[2 + i] = V[0, i] * along + V[1, i] * down + V[2, i] * ahead
+    return True
+
+
 @kernel
 def push_inside(T, spheres, space, weight, origin, sums, adding):  # pragma: no cover
     """What it costs that spheres under transforms T (J, 3, 4) reach out of silhouettes: `weight` times the squared distances (m^2), beyond
     `TAU` the distances; where `adding`, what that says of the parts' motion is added to sums (J, >= 27) (see `refinement`)."""
-    if space.windows.shape[0] == 0:
+    cameras = space.windows.shape[0]
+    if cameras == 0:
         return 0.0
-    total, row = 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    share = weight / (spheres.radii.size * space.windows.shape[0])
+    total, share = 0.0, weight / (spheres.radii.size * cameras)
     for k in range(spheres.radii.size):
         joint, place, own = T[spheres.joints[k]], spheres.places[k], sums[spheres.joints[k]]
         p0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3]
         p1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3]
         p2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3]
-        for c in range(space.windows.shape[0]):
-            V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
-            z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
-            if z < NEAR:
+        inside = outside = 0
+        for c in range(cameras):
+            if _ask(c, space, p0, p1, p2, spheres.radii[k], space.room[c]):
+                outside += space.room[c, 1] > 0
+                inside += space.room[c, 1] <= 0
+        outvoted = outside == 1 and inside >= OTHERS
+        for c in range(cameras):
+            said = space.room[c]
+            if said[0] <= 0 or (outvoted and said[1] > 0):
                 continue
-            u = (V[0, 0] * p0 + V[0, 1] * p1 + V[0, 2] * p2 + V[0, 3]) / z
-            v = (V[1, 0] * p0 + V[1, 1] * p1 + V[1, 2] * p2 + V[1, 3]) / z
-            a, b = bend_within(u, v, lens, lens[8] > 0, lens[10]) if lens[9] > 0 else (u, v)
-            x, y = K[0, 0] * a + K[0, 2], K[1, 1] * b + K[1, 2]
-            if not (0 <= x < window[5] and 0 <= y < window[6]):
-                continue
-            distance, along, down = _look_up(space.fields, window, x, y)
-            pixels = np.sqrt(K[0, 0] * K[1, 1]) / z
-            r = distance / pixels + spheres.radii[k]
-            if r <= 0:
-                continue
-            fade = min(1.0, TAU / r)
-            total += share * (r * r if fade == 1 else TAU * (2 * r - TAU))
-            if not adding:
-                continue
-            # the direction, in the world, in which the sphere gets back the fastest
-            g0, g1 = -along, -down
-            g2 = -(g0 * u + g1 * v)
-            n0 = V[0, 0] * g0 + V[1, 0] * g1 + V[2, 0] * g2
-            n1 = V[0, 1] * g0 + V[1, 1] * g1 + V[2, 1] * g2
-            n2 = V[0, 2] * g0 + V[1, 2] * g1 + V[2, 2] * g2
-            x0, x1, x2 = p0 - origin[0], p1 - origin[1], p2 - origin[2]
-            row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
-            at = 0
-            for i in range(6):
-                for j in range(i, 6):
-                    own[at] += share * fade * row[i] * row[j]
-                    at += 1
-                own[21 + i] += share * fade * row[i] * r
+            fade = min(1.0, TAU / said[0])
+            total += share * (said[0] ** 2 if fade == 1 else TAU * (2 * said[0] - TAU))
+            if adding:
+                _add(-said[2], -said[3], -said[4], p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, said[0], own)
     return total
+
+
+@part
+def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
+    """Add to a joint's sums that a point x has to go a distance along n, as `refinement` does for surface points."""
+    row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
+    at = 0
+    for i in range(6):
+        for j in range(i, 6):
+            own[at] += weight * row[i] * row[j]
+            at += 1
+        own[21 + i] += weight * row[i] * distance
