@@ -221,6 +221,11 @@ def test_spreads_decide(request_):
     assert spread(request_, left_elbow_flexion=2.0) == [False, False, False, True]
 
 
+def test_frames_in_which_nothing_varies_say_nothing():
+    sd = {"DRS": np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]), "SRS": np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 0.0]])}
+    assert figure_9.smaller(sd).tolist() == [0.5, 1.0]
+
+
 def runs_of(error: float = 50, cost: float = 500, far: float = 1) -> Measured:
     drawn = np.linspace(-1, 1, 6)
     return Measured(error + 0.1 * drawn, cost + drawn, far + 0.05 * drawn, 0 * drawn)
