@@ -13,7 +13,7 @@ from pydantic import BeforeValidator
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.options import PATHS, Options, default_of, make_options, read_options, settings_of
+from shadowpuppet.options import PATHS, Options, default_of, make_options, over, read_options, settings_of
 from shadowpuppet.settings import PriorSettings, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded
@@ -69,12 +69,7 @@ def options_from(flags: Any, config: Path | None) -> Options:
     """Options from flags over a file over the defaults. Raises `SettingsError`."""
     read = read_options(config) if config is not None else {}
     make_options(read, str(config))  # so that what is wrong in the file is said with its name
-    return make_options(_over(read, given(flags)), "flags")
-
-
-def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    both = {key: _over(below[key], value) for key, value in above.items() if isinstance(value, Mapping) and key in below}
-    return {**below, **above, **both}
+    return make_options(over(read, given(flags)), "flags")
 
 
 def _bare(hint: Any) -> Any:
