@@ -102,12 +102,14 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = DemoFlags = SessionFlags = LiveFlags = PriorFlags = SpecFlags = Any
+    Flags = LookFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = PriorFlags = SpecFlags = Any
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
     LookFlags = flags_of(Options, without=("overlay",))
     """Those that matter where nothing is tracked."""
+    BatchFlags = flags_of(Options, without=("seed",))
+    """Those that many runs with seeds of their own may share."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
     """Those that matter where the recording is known."""
     SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training", "multiview"))

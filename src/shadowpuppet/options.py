@@ -136,9 +136,7 @@ def read_options(path: str | Path) -> dict[str, Any]:
 
 def settings_in(data: Mapping[str, Any], path: Path, source: str | None = None) -> dict[str, Any]:
     """Plain values from what a TOML file says, or a table of it; files are told from its folder on. Raises `SettingsError`."""
-    data = dict(data)
-    if isinstance(data.get("settings"), dict) and "versions" in data:
-        data = data["settings"]
+    data = dict(data["settings"] if isinstance(data.get("settings"), dict) and "versions" in data else data)
     unknown = set(data) - {f.name for f in fields(Options)}
     if unknown:
         names = choices(f.name for f in fields(Options))

@@ -46,7 +46,7 @@ class Cluster:
             from distributed import Client, as_completed
         except ImportError:
             raise ShadowPuppetError("scheduler: Dask's `distributed` is not installed; pip install 'shadowpuppet[batch]'") from None
-        file = {"scheduler_file": self._address} if Path(self._address).is_file() else {"address": self._address}
+        file: dict[str, Any] = {("scheduler_file" if Path(self._address).is_file() else "address"): self._address}
         try:
             self._client: Client = Client(**file, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:

@@ -112,7 +112,7 @@ class _Worker:
 
     def __init__(self, number: int, out: Path, threads: int, said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
         self.number, self.task, self.film, self.ready = number, None, "", False
-        self.errors = tempfile.TemporaryFile()
+        self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
         home = str(Path(__file__).parents[2])
         path = os.pathsep.join([home, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])])
         environment = os.environ | dict.fromkeys(POOLS, str(threads)) | {"PYTHONPATH": path, "PYTHONUTF8": "1"}

@@ -170,7 +170,7 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
     made: dict[str, Any] = {}
     for name, value in flat.items():
         *outer, last = name.split(".")
-        inner = value if not outer else _nested({".".join(outer[1:] + [last]): value})
+        inner = value if not outer else _nested({".".join([*outer[1:], last]): value})
         made = over(made, {(outer or [last])[0]: inner})
     return made
 

@@ -42,6 +42,8 @@ class Task:
     film: str
     """Equal for tasks whose silhouettes are."""
 
+    choice: str
+    """Case and values of the grid, in words; empty where nothing varies."""
     label: str
     """In words: recording, case, values of the grid, seed."""
     folder: str
@@ -87,8 +89,8 @@ class _Chosen:
         film = json.dumps(film_of(recording, self.settings), sort_keys=True)
         label, id = ", ".join(filter(None, [name, self.case.label, f"seed {seed}"])), _hash(said)
         words = re.sub(r"[^A-Za-z0-9.+_-]+", "-", label.replace(", ", "_")).strip("-.")
-        return Task(id, recording, name, self.case.name, seed, self.settings | {"seed": seed}, self.varied, _hash(film), label,
-                    f"{words[:80]}_{id}")
+        return Task(id, recording, name, self.case.name, seed, self.settings | {"seed": seed}, self.varied, _hash(film), self.case.label,
+                    label, f"{words[:80]}_{id}")
 
 
 def _check_different(chosen: Sequence[_Chosen]) -> None:
@@ -141,10 +143,10 @@ def _elsewhere(folder: Path) -> Iterator[Path]:
 def _names(paths: Sequence[Path]) -> list[str]:
     """Short names of recordings, with folders above them as far as two are called the same."""
     for depth in range(1, max(len(path.parts) for path in paths) + 1):
-        names = ["-".join(path.parts[-depth:]).strip("/\\") or "recording" for path in paths]
+        names = ["-".join(path.parts[-depth:]) for path in paths]
         if len(set(names)) == len(names):
             return names
-    return [f"{name}-{n}" for n, name in enumerate(names)]  # of paths that differ in separators alone
+    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # a-b/c and a/b-c
 
 
 def _found(settings: Mapping[str, Any], name: str) -> Any:

@@ -180,7 +180,7 @@ def _lock(file: int, out: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise ShadowPuppetError(f"{out}: another batch is at work in it, expected a folder for each; wait for it, or choose another") from None
+        raise ShadowPuppetError(f"{out}: found another batch at work in it, expected a folder for each; wait, or choose another") from None
     except OSError:
         return  # a file system without locks
 

@@ -50,7 +50,7 @@ def do(task: Mapping[str, Any], out: str | Path, repeats: Repeats | None = None,
 def _run(task: Mapping[str, Any], out: Path, repeats: Repeats | None, listener: Listener | None) -> None:
     folder = out / RUNS / task["folder"]
     if not (out / PLAN).exists():
-        raise ShadowPuppetError(f"{out}: found no {PLAN} in it, expected the folder of the batch, which all machines that work on it must see")
+        raise ShadowPuppetError(f"{out}: found no {PLAN} in it, expected the batch's folder, which all machines that work on it must see")
     if read_mark(folder) is not None:
         return
     part = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}{PART}")
