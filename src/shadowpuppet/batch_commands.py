@@ -48,7 +48,7 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
     from shadowpuppet.terminal import show
 
     grid = read_grid(config, given(flags)) if config is not None else make_grid(flags=given(flags))
-    with batch_terminal(quiet, folder) as shown:
+    with batch_terminal(quiet) as shown:
         found = run_batch(recordings, folder, grid, None if seeds is None else seeds_of(seeds, "flags: seeds"), workers=workers,
                           retries=retries, threads=threads, scheduler=scheduler, reuse=not afresh, table=table, listener=shown)
         shown.failures(found)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from time import monotonic
 
 import numpy as np
@@ -108,15 +107,12 @@ class BatchTerminal(BatchListener):
 
 
 @contextmanager
-def batch_terminal(quiet: bool, folder: Path) -> Iterator[BatchTerminal]:
-    """A terminal to be told of a batch; `folder`: where it lies."""
+def batch_terminal(quiet: bool) -> Iterator[BatchTerminal]:
+    """A terminal to be told of a batch."""
     with terminal(quiet) as shown:
         told = BatchTerminal(shown)
         try:
             yield told
-        except KeyboardInterrupt:
-            done = f"{told.before + told.done} of {told.total} runs are done and in {folder}; the same command does the rest"
-            raise KeyboardInterrupt(*([done] if told.total else [])) from None
         finally:
             told.stop()
 

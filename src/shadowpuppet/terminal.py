@@ -105,7 +105,9 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         warnings.showwarning = shown._show_warning
         try:
             yield shown
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            if interrupt.args:
+                raise  # it tells by itself what was kept
             kept = f"the {shown.frames} frames so far are in {folder}" if shown.frames and folder else nothing
             raise KeyboardInterrupt(kept) from None
         finally:

@@ -23,8 +23,8 @@ from shadowpuppet.io._table import shorten
 from shadowpuppet.io.run import versions
 from shadowpuppet.threads import usable_cores
 
-FAILURES = "failed"
-"""The folder that gets what programmers want to know of runs that failed of a bug."""
+LOCK, FAILURES = ".lock", "failed"
+"""The file that is held while a batch is at work; the folder that gets what programmers want to know of runs that failed of a bug."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +76,20 @@ def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | No
             if work.todo:
                 with _crew(out, scheduler, min(count, len(work.todo)), threads, reuse, listener) as crew:
                     work.all(crew)
-        finally:
-            _clean(out)
-            batch = Batch(out, work.runs())
-            write_summary(batch.runs, out / f"summary.{table}")
+        except KeyboardInterrupt:
+            done = sum(run.status == "done" for run in _told(work, table).runs)
+            raise KeyboardInterrupt(f"{done} of {len(tasks)} runs are done and in {out}; the same command does the rest") from None
+        except BaseException:
+            _told(work, table)
+            raise
+        return _told(work, table)
+
+
+def _told(work: _Work, table: str) -> Batch:
+    """What there is now, with its summary."""
+    _clean(work.out)
+    batch = Batch(work.out, work.runs())
+    write_summary(batch.runs, work.out / f"summary.{table}")
     return batch
 
 
@@ -157,12 +167,12 @@ def _claimed(out: Path) -> Iterator[None]:
     """A folder for this batch alone. Raises `ShadowPuppetError` for one that has other files in it, or another batch at work."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        names = sorted(path.name for path in out.iterdir())
+        names = sorted({path.name for path in out.iterdir()} - {RUNS, LOCK})
         if names and PLAN not in names:
             raise ShadowPuppetError(f"{out}: found {shorten(names, 60)} in it but no {PLAN}, expected a new or empty folder, or that of an "
                                     "earlier batch, which goes on")
         (out / RUNS).mkdir(exist_ok=True)
-        lock = (out / ".lock").open("w")
+        lock = (out / LOCK).open("w")
     except OSError as error:
         raise ShadowPuppetError(f"{out}: cannot be written ({reason(error)})") from None
     with lock:
