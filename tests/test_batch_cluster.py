@@ -94,12 +94,13 @@ def test_a_scheduler_that_does_not_answer_is_said(recording, tmp_path, address, 
         run_batch([recording], tmp_path / "out", QUICK, scheduler=address)
 
 
-def test_a_scheduler_that_ends_is_said(recording, tmp_path):
+def test_a_scheduler_that_ends_is_said(recording, tmp_path, monkeypatch):
     class Ends(BatchListener):
         def ended(self, task, outcome, again):
             found.scheduler.loop.add_callback(found.scheduler.close)
 
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as found, \
+    monkeypatch.setattr("shadowpuppet.batch.cluster.PATIENCE", 1)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as found, \
             pytest.raises(ShadowPuppetError, match="scheduler: the connection to .* was lost"):
         run_batch([recording], tmp_path / "out", QUICK, range(50), scheduler=found.scheduler_address, listener=Ends())
     assert (tmp_path / "out" / "summary.csv").exists()

@@ -37,7 +37,7 @@ class BatchTerminal(BatchListener):
         self._began = self._last = monotonic()
         self._live = Live(console=shown.console, get_renderable=self._table, refresh_per_second=4, transient=True)
 
-    def begin(self, total: int, before: int, workers: int) -> None:
+    def begin(self, total: int, before: int) -> None:
         """Show the table."""
         self.total, self.before, self._began = total, before, monotonic()
         if not self._shown.quiet and self._shown.console.is_terminal:

@@ -54,10 +54,8 @@ class Cluster:
             raise ShadowPuppetError(f"scheduler: found {self._address!r}, at which no Dask scheduler answers ({said}); expected an address "
                                     "as tcp://host:8786, or a scheduler file") from None
         self._ended = as_completed(loop=self._client.loop)
-        found = self._client.scheduler_info(n_workers=-1)["workers"].values()
-        if any(worker["nthreads"] > 1 for worker in found):
-            self._listener.note("the cluster's workers have several threads each, which share one core's worth of Python: start them with "
-                                "--nthreads 1")
+        if any(threads > 1 for threads in self._client.nthreads().values()):
+            self._listener.note("the cluster's workers have several threads each, of which Python mostly runs one: start them with --nthreads 1")
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -30,8 +30,8 @@ GRACE = 2.0
 class BatchListener:
     """Is told how a batch goes, and does nothing: derive from it."""
 
-    def begin(self, total: int, before: int, workers: int) -> None:
-        """Of `total` runs `before` were done when it began; `workers`: 0 where that is not known."""
+    def begin(self, total: int, before: int) -> None:
+        """Of `total` runs `before` were done when it began."""
 
     def working(self, worker: int, task: Task, doing: str, frames: int, total: int | None) -> None:
         """A worker is at a task: `looking` or `tracking`, so many of its frames."""
@@ -169,7 +169,7 @@ class Processes:
 
     def __init__(self, out: Path, workers: int, threads: int, reuse: bool, listener: BatchListener) -> None:
         """`threads`: that each may use; the others as in `Alone`."""
-        self.count = workers
+        self._count = workers
         self._out, self._threads, self._reuse, self._listener = out, threads, reuse, listener
         self._said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
@@ -221,9 +221,9 @@ class Processes:
         for worker in self._workers:
             if worker.task is None and any(self._waiting.values()):
                 worker.give(self._choose(worker.film), self._reuse)
-        while len(self._workers) < self.count and any(self._waiting.values()):
+        while len(self._workers) < self._count and any(self._waiting.values()):
             numbers = {worker.number for worker in self._workers}
-            worker = _Worker(min(n for n in range(self.count) if n not in numbers), self._out, self._threads, self._said)
+            worker = _Worker(min(n for n in range(self._count) if n not in numbers), self._out, self._threads, self._said)
             self._workers.append(worker)
             worker.give(self._choose(""), self._reuse)
 

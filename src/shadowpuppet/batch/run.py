@@ -116,7 +116,7 @@ class _Work:
 
     def all(self, crew: Crew) -> None:
         """Do what is to be done."""
-        self.listener.begin(len(self.tasks), len(self.tasks) - len(self.todo), getattr(crew, "count", 0))
+        self.listener.begin(len(self.tasks), len(self.tasks) - len(self.todo))
         for task in self.todo:
             crew.put(task)
         left = len(self.todo)
