@@ -86,8 +86,8 @@ def test_the_bad_do_not_stop_the_good_and_are_named(two, recording):
 def test_a_run_of_a_batch_is_the_run_that_track_makes(two, recording, tmp_path):
     batch, _ = two
     for run in batch.of(case="srs"):
-        alone = track_recording(recording, tmp_path / str(run.task.seed),
-                                make_options(SETTINGS | {"seed": run.task.seed, "tracker": SETTINGS["tracker"] | {"resampling": "stratified"}}))
+        tracker = SETTINGS["tracker"] | {"resampling": "stratified"}
+        alone = track_recording(recording, tmp_path / "alone", make_options(SETTINGS | {"seed": run.task.seed, "tracker": tracker}))
         assert (alone.folder / "joints.csv").read_bytes() == (run.folder / "joints.csv").read_bytes()
         assert read_run(run.folder).complete
         assert read_run(run.folder).settings == read_run(alone.folder).settings
@@ -148,9 +148,8 @@ def test_a_second_start_does_what_is_missing(recording, tmp_path):
 
 def test_other_settings_are_other_runs_and_it_is_said(recording, tmp_path):
     run_batch([recording], tmp_path / "out", QUICK, [0, 1], workers=0)
-    notes = Notes()
-    other = run_batch([recording], tmp_path / "out", make_grid(SETTINGS, cases={"flat": {"tracker": {"motion_weight": 0.0}}}), [0], workers=0,
-                      listener=notes)
+    notes, flat = Notes(), make_grid(SETTINGS, cases={"flat": {"tracker": {"motion_weight": 0.0}}})
+    other = run_batch([recording], tmp_path / "out", flat, [0], workers=0, listener=notes)
     assert notes.notes == [f"{tmp_path / 'out'}: 2 of its runs are of other recordings, settings or seeds than now: they stay, and are not "
                            "in the summary"]
     assert len(other.runs) == len(table(tmp_path / "out")) == 1
@@ -290,8 +289,8 @@ def test_two_batches_do_not_share_a_folder(recording, tmp_path):
 
 
 @pytest.mark.parametrize(("more", "said"), [
-    ({"workers": -1}, "workers: found -1, expected 0 to 1000"), ({"retries": -1}, "retries: found -1"), ({"threads": 0}, "threads: found 0"),
-    ({"table": "xls"}, "table: found 'xls', expected one of csv, parquet"),
+    ({"workers": -1}, "workers: found -1, expected 0 to 1000"), ({"retries": -1}, "retries: found -1"),
+    ({"threads": 0}, "threads: found 0"), ({"table": "xls"}, "table: found 'xls', expected one of csv, parquet"),
 ])  # fmt: skip
 def test_what_cannot_be_asked_for_is_said(recording, tmp_path, more, said):
     with pytest.raises(ShadowPuppetError, match=said):

@@ -68,8 +68,8 @@ def test_seeds_are_ranges_as_pythons(first, count, step):
     assert seeds_of(f"{first}:{first + count}:{step}") == tuple(range(first, first + count, step))
 
 
-@pytest.mark.parametrize("said", ["", "ten", "3:3", "5:1", "0:9:0", "-1", "0:-3", "1,,2", "1,1", "0:1000000000000", [], [1.5], [True], [0, 0],
-                                  None, {"a": 1}, [-1]])  # fmt: skip
+@pytest.mark.parametrize("said", ["", "ten", "3:3", "5:1", "0:9:0", "-1", "0:-3", "1,,2", "1,1", "0:1000000000000", [], [1.5], [True],
+                                  [0, 0], None, {"a": 1}, [-1]])  # fmt: skip
 def test_what_are_no_seeds_is_said(said):
     with pytest.raises(SettingsError, match=r"^here: found .*, expected numbers from 0 on: 0:10 \(which is 0 to 9\)"):
         seeds_of(said, "here")
@@ -131,7 +131,7 @@ def test_files_are_told_from_the_grids_folder_on(written, tmp_path):
     ("seeds = 'all'", "seeds: found 'all', expected numbers"),
     ("speed = 3", "unknown setting 'speed'"),
     ("[grid", "not valid TOML"),
-    ("[grid]\nheight = [" + ", ".join(f"1.{n:03}" for n in range(500)) + "]\ndistance = [" + ", ".join(f"1.{n:03}" for n in range(500)) + "]",
+    (f"[grid]\nheight = {[1 + n / 1000 for n in range(500)]}\ndistance = {[1 + n / 1000 for n in range(500)]}",
      "grid: found 250000 combinations, expected at most 100000"),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_grid_is_said_with_file_and_field(written, text, said):
@@ -222,7 +222,8 @@ def test_recordings_of_one_name_are_told_apart(tmp_path):
 
 
 def test_a_run_folder_has_a_readable_name(recording):
-    task, = make_tasks([recording], make_grid(cases={"drs": {}}, grid={"tracker.arm.particles": [50], "region": [[1, 2, 30, 40]]}).cases, [3])
+    grid = make_grid(cases={"drs": {}}, grid={"tracker.arm.particles": [50], "region": [[1, 2, 30, 40]]})
+    (task,) = make_tasks([recording], grid.cases, [3])
     assert task.label == "walk, drs, particles 50, region 1-2-30-40, seed 3"
     assert task.folder == f"walk_drs_particles-50_region-1-2-30-40_seed-3_{task.id}"
 

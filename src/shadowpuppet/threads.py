@@ -24,16 +24,21 @@ def one_blas_thread() -> Iterator[None]:
         yield
 
 
+def thread_limit() -> int | None:
+    """Threads that this process is told to keep to; None where it is not told."""
+    told = os.environ.get(LIMIT, "")
+    return int(told) if told.isdecimal() and int(told) else None
+
+
 def usable_cores() -> int:
     """Processor cores that this process may use."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    told = os.environ.get(LIMIT, "")
-    return min(cores, int(told)) if told.isdecimal() and int(told) else cores
+    return min(cores, thread_limit() or cores)
 
 
 def limit_threads() -> None:
     """Hold OpenCV, which reads no variable, to the limit; the others had it when they were loaded."""
-    if os.environ.get(LIMIT, "").isdecimal():
+    if (limit := thread_limit()) is not None:
         import cv2
 
-        cv2.setNumThreads(int(os.environ[LIMIT]))
+        cv2.setNumThreads(limit)

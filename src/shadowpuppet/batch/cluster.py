@@ -54,8 +54,9 @@ class Cluster:
             raise ShadowPuppetError(f"scheduler: found {self._address!r}, at which no Dask scheduler answers ({said}); expected an address "
                                     "as tcp://host:8786, or a scheduler file") from None
         self._ended = as_completed(loop=self._client.loop)
-        if any(threads > 1 for threads in self._client.nthreads().values()):
-            self._listener.note("the cluster's workers have several threads each, of which Python mostly runs one: start them with --nthreads 1")
+        threads: Any = self._client.nthreads()  # by worker
+        if any(count > 1 for count in threads.values()):
+            self._listener.note("the cluster's workers have several threads each, of which mostly one runs: start them with --nthreads 1")
         return self
 
     def __exit__(self, *_: object) -> None:

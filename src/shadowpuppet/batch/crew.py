@@ -111,7 +111,7 @@ class _Worker:
     """A process, and what it is at."""
 
     def __init__(self, number: int, out: Path, threads: int, said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
-        self.number, self.task, self.film, self.ready = number, None, "", False
+        self.number, self.task, self.film = number, None, ""
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
         home = str(Path(__file__).parents[2])
         path = os.pathsep.join([home, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])])
@@ -174,6 +174,7 @@ class Processes:
         self._said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
         self._waiting: dict[str, deque[Task]] = {}
+        self._begun = False
 
     def __enter__(self) -> Self:
         """Nobody is hired before there is a task."""
@@ -203,12 +204,12 @@ class Processes:
                 self._workers.remove(worker)
                 why = worker.end()
                 worker.stop()
-                if not worker.ready:
+                if not self._begun:
                     raise ShadowPuppetError(f"batch: no worker can be started: {why}")
                 if task is not None:
                     return task, {"status": "failed", "message": why, "again": True, "seconds": None}
             elif "ready" in said:
-                worker.ready = True
+                self._begun = True
             elif task is not None and "outcome" in said:
                 worker.task = None
                 self._listener.resting(worker.number)
