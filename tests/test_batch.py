@@ -21,7 +21,9 @@ import made
 from shadowpuppet import cli
 from shadowpuppet.batch import Batch, BatchListener, make_grid, run_batch
 from shadowpuppet.batch import crew as crews
+from shadowpuppet.batch.plan import make_tasks
 from shadowpuppet.batch.run import _claimed
+from shadowpuppet.batch.task import _put, do
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import RunWriter, read_run
 from shadowpuppet.options import make_options
@@ -197,6 +199,38 @@ def test_a_full_disk_fails_the_runs_that_it_hits(recording, tmp_path, monkeypatc
     monkeypatch.undo()
     assert run_batch([recording], tmp_path / "out", QUICK, range(4), workers=0, listener=notes).failed == []
     assert notes.done[-1] == ("tiny", 2)
+
+
+@pytest.mark.parametrize(("error", "again"), [
+    (OSError(errno.ENOSPC, "full"), True), (OSError(errno.EIO, "broken"), True), (OSError(errno.EACCES, "not yours"), False),
+    (ShadowPuppetError("bad"), False), (MemoryError(), True), (KeyError("bug"), True),
+], ids=repr)  # fmt: skip
+def test_nothing_is_left_of_a_run_that_failed_and_what_may_go_well_next_time_is_known(recording, tmp_path, monkeypatch, error, again):
+    def fails(self, frame):
+        with self._told():
+            raise error
+
+    (tmp_path / "batch.toml").touch()
+    (tmp_path / "runs").mkdir()
+    monkeypatch.setattr(RunWriter, "write", fails)
+    (task,) = make_tasks([recording], QUICK.cases, [0])
+    outcome = do(task.wire(), tmp_path)
+    assert (outcome["status"], outcome["again"]) == ("failed", again)
+    assert ("trace" in outcome) == isinstance(error, (MemoryError, KeyError))
+    assert folders(tmp_path) == set()
+
+
+def test_a_run_that_another_machine_has_done_meanwhile_stays(recording, tmp_path):
+    batch = run_batch([recording], tmp_path / "out", QUICK, workers=0)
+    (folder,), task = (tmp_path / "out" / "runs").iterdir(), batch.runs[0].task.wire()
+    written = (folder / "joints.csv").stat().st_mtime_ns
+    assert do(task, tmp_path / "out")["status"] == "done"
+    copy = made.copied(folder, folder.with_name(".copy"))
+    _put(copy, folder)
+    assert (folder / "joints.csv").stat().st_mtime_ns == written
+    (folder / "task.json").unlink()
+    _put(copy, folder)
+    assert (folder / "task.json").exists()
 
 
 def test_a_summary_that_cannot_be_written_is_said_after_the_runs(recording, tmp_path):

@@ -79,7 +79,7 @@ def _row(axes: Any, y: int, values: np.ndarray, colour: str) -> None:
     if not len(values):
         axes.plot([], [])
         return
-    spread = 0.22 * np.sin(2.4 * np.arange(len(values)))  # aside from one another, and the same each time
+    spread = 0.5 * (0.618034 * np.arange(len(values)) % 1) - 0.25  # aside from one another, and the same each time
     axes.plot(values, y + spread, "o", color=colour, ms=3.5, alpha=0.45 if len(values) > 20 else 0.7, mew=0)
     low, middle, high = np.percentile(values, (25, 50, 75))
     axes.barh(y, high - low, 0.62, low, color=colour, alpha=0.18, lw=0)
