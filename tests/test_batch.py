@@ -31,7 +31,7 @@ from shadowpuppet.pipeline import track_recording
 
 SETTINGS = {"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 QUICK = make_grid(SETTINGS)
-FLAGS = ["--masks", "--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
+FLAGS = ["--masks", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
          "--initialization.sweeps", "2"]
 
 
@@ -427,20 +427,32 @@ def group(leader: int) -> list[int]:
     return found
 
 
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGKILL], ids=["Ctrl-C", "killed"])
-def test_a_batch_that_is_stopped_leaves_what_is_done_and_nobody_at_work(recording, tmp_path, signal_):
+needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+
+
+@needs_proc
+def test_control_c_keeps_what_is_done_and_leaves_nobody_at_work(recording, tmp_path):
     out = tmp_path / "out"
     child = batch_process(recording, "-o", out, "--seeds", "0:500", "--workers", 1, *FLAGS)
     wait_for(lambda: child.poll() is not None or ((out / "runs").is_dir() and any(not name.startswith(".") for name in folders(out))))
-    child.send_signal(signal_)
-    _, err = child.communicate(timeout=30)
-    wait_for(lambda: not group(child.pid), 30)
-    done = {name for name in folders(out) if not name.startswith(".")}
+    child.send_signal(signal.SIGINT)
+    _, err = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert group(child.pid) == []
+    done = folders(out)
     assert 1 <= len(done) < 500
     assert all(read_run(out / "runs" / name).complete for name in done)
-    if signal_ == signal.SIGINT:
-        assert child.returncode == 130
-        assert err.splitlines()[-1] == f"interrupted: {len(done)} of 500 runs are done and in {out}; the same command does the rest"
-        assert folders(out) == done
-        assert [row["status"] for row in table(out)].count("done") == len(done)
+    assert err.splitlines()[-1] == f"interrupted: {len(done)} of 500 runs are done and in {out}; the same command does the rest"
+    assert [row["status"] for row in table(out)].count("done") == len(done)
+
+
+@needs_proc
+def test_workers_end_with_whoever_began_them(recording, tmp_path):
+    """In the middle of a run that would take hours."""
+    out = tmp_path / "out"
+    child = batch_process(recording, "-o", out, "--workers", 1, *FLAGS, "--tracker.cycles", "100", "--tracker.arm.particles", "1000000")
+    wait_for(lambda: child.poll() is not None or any((out / "runs").glob(".*.part/joints.csv")))
+    assert len(group(child.pid)) == 2
+    child.kill()
+    child.communicate(timeout=60)
+    wait_for(lambda: not group(child.pid), 60)
