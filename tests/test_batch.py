@@ -451,7 +451,7 @@ def test_workers_end_with_whoever_began_them(recording, tmp_path):
     """In the middle of a run that would take hours."""
     out = tmp_path / "out"
     child = batch_process(recording, "-o", out, "--workers", 1, *FLAGS, "--tracker.cycles", "100", "--tracker.arm.particles", "1000000")
-    wait_for(lambda: child.poll() is not None or any((out / "runs").glob(".*.part/joints.csv")))
+    wait_for(lambda: child.poll() is not None or any((out / "runs").glob(".*.part/run.toml")))
     assert len(group(child.pid)) == 2
     child.kill()
     child.communicate(timeout=60)
