@@ -363,7 +363,8 @@ def shell(capsys, monkeypatch, tmp_path):
     return call
 
 
-def test_batch_tells_what_came_of_it(shell, recording, tmp_path):
+def test_batch_tells_what_came_of_it(shell, recording, tmp_path, monkeypatch):
+    monkeypatch.setattr("shadowpuppet.batch_terminal.PAUSE", 1e9)  # on a busy machine this takes longer
     (tmp_path / "grid.toml").write_text('seeds = "0:2"\n[case.drs]\n[case.srs]\ntracker.resampling = "stratified"\n')
     command = ["batch", recording, "gone", "-o", "out", "--config", "grid.toml", "--workers", 0, *FLAGS]
     code, out, err = shell(*command)
