@@ -43,7 +43,7 @@ def deviations(runs: dict[str, Runs]) -> dict[str, Array]:
 
 
 def smaller(sd: dict[str, Array]) -> Array:
-    """Share of the frames in which DRS varies less, (D,), of those in which the two differ: nothing varies while a start is not bettered."""
+    """Share of the frames in which DRS varies less, (D,), of those in which they differ: nothing varies while a start is not bettered."""
     differ = (sd["DRS"] != sd["SRS"]).sum(0)
     return np.where(differ > 0, (sd["DRS"] < sd["SRS"]).sum(0) / np.maximum(differ, 1), 1.0)
 
