@@ -337,7 +337,7 @@ def test_parquet_needs_pyarrow(recording, tmp_path):
         with pytest.raises(ShadowPuppetError, match="parquet needs pyarrow"):
             run_batch([recording], tmp_path / "out", QUICK, table="parquet")
         return
-    import pyarrow.parquet  # pyright: ignore[reportMissingImports]
+    import pyarrow.parquet
 
     batch = run_batch([recording, tmp_path / "gone"], tmp_path / "out", QUICK, workers=0, table="parquet")
     rows = pyarrow.parquet.read_table(tmp_path / "out" / "summary.parquet").to_pylist()

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.clips import mirrored
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.euler import three_turns
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.inverse_kinematics import _along, _Linear, _solved, fit_poses
 from shadowpuppet.io.joints import read_joints
-from shadowpuppet.joint_frames import _three_turns
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import NEEDED
 from shadowpuppet.synthetic.mannequin import JOINTS
@@ -188,9 +188,9 @@ def test_three_turns_make_the_rotation_again_in_the_singular_place_too(axes, rng
     angles[:20, 1] = rng.choice([-1, 1], 20) * np.pi / 2
     turned = [rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, angles.T)]
     R = turned[0] @ turned[1] @ turned[2]
-    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, _three_turns(R, axes).T))
+    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, three_turns(R, axes).T))
     np.testing.assert_allclose(first @ second @ third, R, atol=1e-6)
-    np.testing.assert_array_equal(_three_turns(R, axes)[:20, 0], 0)
+    np.testing.assert_array_equal(three_turns(R, axes)[:20, 0], 0)
 
 
 def test_one_frame_is_enough():

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from shadowpuppet.camera import Camera
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+    from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
+    from shadowpuppet.exporting import convert_motion, export_run
     from shadowpuppet.initialization import find_person, fit_references
     from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.io.calibration import read_calibration, write_calibration
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from shadowpuppet.io.prior import read_prior, write_prior
     from shadowpuppet.io.recording import Recording, read_recording
     from shadowpuppet.io.run import Run, read_run
+    from shadowpuppet.io.truth import read_truth
     from shadowpuppet.look import Look
     from shadowpuppet.metrics import evaluate
     from shadowpuppet.motion import JointTable, Motion
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.rasterize import Picture
+    from shadowpuppet.report.page import write_report
     from shadowpuppet.settings import (
         HullSettings,
         MonocularSettings,
@@ -61,7 +65,9 @@ _HOMES = {
     "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
     "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
     "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking", "MultiviewSettings": "settings",
-    "make_multiview_settings": "settings",
+    "make_multiview_settings": "settings", "export_run": "exporting", "convert_motion": "exporting",
+    "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation", "read_truth": "io.truth",
+    "write_report": "report.page",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -73,7 +79,8 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "write_calibration", "write_frames", "write_joints", "write_person",
     "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
     "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
-    "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings",
+    "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings", "export_run",
+    "convert_motion", "Comparison", "Evaluation", "measure_run", "read_truth", "write_report",
 ]  # fmt: skip
 
 

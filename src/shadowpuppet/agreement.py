@@ -81,10 +81,12 @@ class Agreement:
                    f"{','.join(rest)}")
 
 
-def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan) -> Agreement:
+def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan,
+              remedies: bool = True) -> Agreement:
     """How well the cameras' silhouettes fit together: `masks` (H, W) by set and camera, None where there is none.
 
-    `seconds`: from set to set, by which it is told how late a film is.
+    `seconds`: from set to set, by which it is told how late a film is; if left out, sets do not follow one another, and that is not asked.
+    `remedies`: whether what would mend them is looked for.
     """
     scene = _Scene(tuple(cameras), [list(row) for row in masks])
     limit = DISAGREES * max(max(camera.size) for camera in cameras)
@@ -97,7 +99,7 @@ def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]],
                 "millimetres, it seems; divide every translation in calibration.toml by 1000")
         return replace(found, remedy=told, hopeless=True)
     if found.wrong:
-        return replace(found, remedy=_remedy(scene, found, blamed, seconds))
+        return replace(found, remedy=_remedy(scene, found, blamed, seconds) if remedies else None)
     if height is not None and not PEOPLE[0] < height < PEOPLE[1]:
         told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? "
                 "multiply every translation in calibration.toml by what is missing")
@@ -195,6 +197,8 @@ def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: f
     yield (replace(scene, cameras=turned),
            "the calibration says where cameras stand (camera to world), it seems, instead of how the world lies to them; invert every "
            "rotation and translation in calibration.toml")
+    if not np.isfinite(seconds):
+        return
     for n in range(C) if blamed is None and C < 4 else [blamed] if blamed is not None else []:
         for steps in range(-MOVED, MOVED + 1):
             if steps:

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 
+ABSURD = 1e6
+"""A coefficient of distortion that no lens has."""
 STEPS = 1000
 """Angles off the optical axis at which a lens is tried."""
 
@@ -48,11 +50,12 @@ class Camera:
         distortion = numbers("distortions", self.distortion)
         allowed = (4,) if self.fisheye else (0, 4, 5, 8)
         check(distortion.size in allowed, "distortions", f"{distortion.size} numbers", " or ".join(map(str, allowed)))
+        check(bool((np.abs(distortion) < ABSURD).all()), "distortions", distortion.tolist(), f"numbers under {ABSURD:g}")
         distortion = distortion if self.fisheye else np.pad(distortion, (0, 8 - distortion.size))
         T = numbers("rotation and translation", self.T_camera_world, (4, 4))
         R = T[:3, :3]
-        check(bool(np.allclose(R @ R.T, np.eye(3), atol=1e-4)) and np.linalg.det(R) > 0, "rotation", np.round(R, 4).tolist(),
-              "an orthonormal, right-handed matrix")
+        turns = bool((np.abs(R) < 2).all()) and np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0
+        check(turns, "rotation", np.round(R, 4).tolist(), "an orthonormal, right-handed matrix")
         values = {"size": (int(size[0]), int(size[1])), "matrix": matrix, "distortion": distortion, "T_camera_world": T}
         for name, value in values.items():
             object.__setattr__(self, name, value)

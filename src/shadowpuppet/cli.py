@@ -10,9 +10,10 @@ from typing import Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import batch_commands, motion_commands
+from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.flags import (
+    CAMERAS,
     OTHER,
     RUN,
     DemoFlags,
@@ -50,6 +51,12 @@ ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
 ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
+To = Annotated[Path | None, Parameter(group=CAMERAS, help="Write the calibration there: NAME.toml for Pose2Sim, Anipose and this program, "
+                                                          "or a folder for EasyMocap's intri.yml and extri.yml.")]
+Unit = Annotated[str | None, Parameter(group=CAMERAS, help="What the calibration's lengths are in, where it does not say: m, cm or mm.")]
+Up = Annotated[str | None, Parameter(group=CAMERAS, allow_leading_hyphen=True,
+                                     help="What is up in the calibration's world: z, y, x, -z, -y, -x, or cameras (as their pictures say, "
+                                          "on the whole).")]
 SpecPath = Annotated[Path | None, Parameter(help="File that describes it, TOML, as --show-spec prints it, or the spec.toml of a made "
                                                  "recording.")]
 Like = Annotated[str | None, Parameter(group=RUN, help="Begin with a named spec; --list names them.")]
@@ -107,8 +114,14 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
 
 
 @app.command
-def info(recording: Recording, /, *, config: Config = None, as_json: AsJson = False, flags: ForLook = None) -> None:
-    """Look at a recording, as `track` does before it begins: cameras, scale, background, silhouettes, the person."""
+def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film, folder of pictures; or a calibration of any kind.")], /, *,
+         to: To = None, unit: Unit = None, up: Up = None, config: Config = None, as_json: AsJson = False,
+         flags: ForLook = None) -> None:  # fmt: skip
+    """Look at a recording, as `track` does before it begins: cameras, scale, background, silhouettes, the person; or explain a calibration:
+    where its cameras stand, what they look at and see together, from above; and write it as another kind of file."""
+    if calibration_commands.is_explained(recording):
+        return calibration_commands.explain(recording, to, unit, up, as_json)
+    calibration_commands.refuse_for_recordings(recording, to, unit, up)
     from shadowpuppet.pipeline import look_at
     from shadowpuppet.terminal import show_json, terminal
 
@@ -120,37 +133,6 @@ def info(recording: Recording, /, *, config: Config = None, as_json: AsJson = Fa
         show_json(look)
     if look.refusal:
         raise ShadowPuppetError(f"{recording}: {look.refusal}")
-
-
-@app.command
-def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0,
-             angles: Annotated[bool, Parameter(negative=(), show_default=False)] = False, as_json: AsJson = False) -> None:
-    """Measure a run: joint errors against a truth, overlap, cost, jitter.
-
-    Parameters
-    ----------
-    run
-        Folder that `track` made.
-    truth
-        Joints (.csv or .trc) to compare with. [default: the recording's truth]
-    joints
-        Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
-    start
-        First frame of the truth that counts.
-    angles
-        Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
-    """
-    from shadowpuppet.evaluation import evaluate_run
-    from shadowpuppet.tables import angle_table, error_table, measures_table
-    from shadowpuppet.terminal import show, show_json, terminal
-
-    with terminal():
-        metrics = evaluate_run(run, truth, joints.split(",") if joints else None, start, angles)
-    if as_json:
-        show_json(metrics)
-    else:
-        show(measures_table(metrics), *([error_table(metrics["errors"])] if "errors" in metrics else []),
-             *([angle_table(metrics["angles_deg"])] if angles else []))
 
 
 @app.command
@@ -268,8 +250,12 @@ def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool 
         show(*bench_tables(found))
 
 
+app.command(evaluation_commands.evaluate)
+app.command(calibration_commands.check)
 app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
+app.command(motion_commands.export)
+app.command(motion_commands.convert)
 app.command(batch_commands.batch)
 
 

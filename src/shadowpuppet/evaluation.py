@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -11,68 +13,201 @@ import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import fit_poses
+from shadowpuppet.intervals import coverage
+from shadowpuppet.io._files import write_whole
+from shadowpuppet.io._plain import for_json, plain
 from shadowpuppet.io.calibration import read_calibration
-from shadowpuppet.io.joints import read_joints
-from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import GROUPS, evaluate, match
-from shadowpuppet.motion import JointTable, Motion
-from shadowpuppet.skeleton import Skeleton
+from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
+from shadowpuppet.io.truth import names_in, read_truth
+from shadowpuppet.joint_angles import angle_errors, compared_poses, dof_errors, turn_errors
+from shadowpuppet.measures import (
+    aligned_errors,
+    axis_errors,
+    bend_errors,
+    bone_errors,
+    humaneva_error,
+    losses,
+    motion_errors,
+    whole_alignment,
+    worlds,
+)
+from shadowpuppet.metrics import GROUPS, JointErrors, evaluate, joint_errors
+from shadowpuppet.motion import JointTable
+from shadowpuppet.synchrony import at_times, find_offset, in_step, step_of
+
+__all__ = ["Comparison", "Evaluation", "angle_errors", "evaluate_run", "measure_run", "update_metrics", "write_evaluation"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How a run is compared with its truth."""
+
+    joints: Sequence[str] | None = None
+    """Those compared, or names of `metrics.GROUPS`; None: `metrics.default_joints`."""
+    start: int = 0
+    """The truth's first frame that counts."""
+    end: int | None = None
+    """The truth's last frame that counts; None: its last."""
+    offset: float = 0.0
+    """Seconds added to the truth's times."""
+    sync: bool = False
+    """Find the offset by the joints' speeds."""
+    align: bool = False
+    """Compare after one rigid motion of the whole truth into the run's world."""
+    angles: bool = False
+    """Compare the angles of a whole body's joints, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A run and its truth, at the same times and in one world, and all that was measured."""
+
+    run: Run
+    measured: dict[str, Any]
+    """Plain values, as `write_evaluation` writes them."""
+    cameras: Sequence[Camera]
+    """Of the run; none where they are not known."""
+    table: JointTable | None = None
+    """The run's joints at the times compared (T,); None without a truth."""
+    truth: JointTable | None = None
+    """The truth's at the same times, in the run's world as far as that was asked for."""
+    errors: JointErrors | None = None
 
 
 def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Sequence[str] | None = None,
                  start: int = 0, angles: bool = False) -> dict[str, Any]:
-    """`metrics.evaluate` of a run folder, against `truth` or that of its recording, where there is one.
+    """The figures of `measure_run`."""
+    return measure_run(folder, truth, Comparison(joints, start, angles=angles)).measured
 
-    `joints`: those compared, or names of `metrics.GROUPS`; `start`: the truth's first frame that counts. Plane and depth are those of
-    the run's camera. `angles`: compare the angles of a whole body's joints, too (`angle_errors`).
-    Raises `FormatError` or `ShadowPuppetError` for files that cannot be used.
+
+def measure_run(folder: str | Path, truth: str | Path | None = None, how: Comparison | None = None) -> Evaluation:
+    """A run folder measured against `truth` or that of its recording, where there is one: `metrics.evaluate`, and what `measures` has.
+
+    Plane and depth are those of the run's camera. Warns where run and truth seem to be in two worlds. Raises `FormatError` or
+    `ShadowPuppetError` for files that cannot be used.
     """
-    run = read_run(folder)
+    how, run = how or Comparison(), read_run(folder)
     table = truth if truth is not None else _known_truth(run.info.get("truth"))
-    reference = None if table is None else read_joints(table)
-    if reference is not None and not 0 <= start < len(reference.times):
-        raise ShadowPuppetError(f"start: found {start}, expected 0 to {len(reference.times) - 1}, a frame of {table}")
-    chosen = None if joints is None else [name for joint in joints for name in GROUPS.get(joint, (joint,))]
+    if table is None and (how.angles or how.sync or how.align):
+        asked = next(name for name in ("angles", "sync", "align") if getattr(how, name))
+        raise ShadowPuppetError(f"{folder}: {asked}: found no truth to compare with, expected one as TRUTH")
     cameras = _cameras(run.folder)
-    measured = evaluate(run.motion, reference, chosen, camera=cameras[0] if len(cameras) == 1 else None, start=start,
-                        cameras=max(len(cameras), 1))  # fmt: skip
-    if angles:
-        if reference is None:
-            raise ShadowPuppetError(f"{folder}: angles: found no truth to compare with, expected one as TRUTH")
-        measured["angles_deg"] = angle_errors(run.motion, reference, start)
-    return {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete, **measured}
+    said: dict[str, Any] = {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete}
+    lost = {"losses": losses(run.motion)}
+    if table is None:
+        measured = evaluate(run.motion, joints=_named(how.joints), camera=_only(cameras), cameras=max(len(cameras), 1))
+        return Evaluation(run, said | measured | lost, cameras)
+    read = _cut(read_truth(table, run.motion.joint_names), how, table)
+    reference, clock = _on_our_clock(run, read, how, table)
+    try:
+        reference, world = _in_our_world(run, reference, how)
+        measured = evaluate(run.motion, reference, _named(how.joints), camera=_only(cameras), cameras=max(len(cameras), 1))
+    except ShadowPuppetError as error:
+        names = names_in(table)
+        raise ShadowPuppetError(f"{error}" + (f" ({table} calls them {names})" if "which the truth lacks" in str(error) and names else "")
+                                ) from None
+    ours, theirs = in_step(run.motion.table, reference)
+    errors = joint_errors(ours, theirs, list(measured["errors"]["joints"]))
+    measured |= lost | {"clock": clock | {"frames_compared": len(theirs.times)}, "world": world} | _wider(run, ours, theirs, errors)
+    if how.angles:
+        poses = compared_poses(run.motion, theirs)
+        measured |= {"angles_deg": turn_errors(*poses), "dofs_deg": dof_errors(*poses)}
+    return Evaluation(run, said | measured, cameras, ours, theirs, errors)
 
 
-def angle_errors(motion: Motion, truth: JointTable, start: int = 0) -> dict[str, float]:
-    """By what angle each joint of a whole body is turned otherwise than in the poses that fit the truth best: root mean square, degrees,
-    by joint, and of `all`.
-
-    One angle a joint, of the whole turn between the two (Ni 2008, Fig. 7, has one an axis); how a straight limb is turned about itself,
-    which joints do not show, is in it. Heads and ankles are left out, of whose turns the places of joints tell little or nothing; so are
-    frames without a pose. Raises `ShadowPuppetError` for another body, or joints that are no whole person's.
-    """
-    fitted = fit_poses(truth, motion.body_name, source="truth")
-    index, matched = match(motion.times, truth.times[start:])
-    ours, theirs = motion.poses[index], fitted.poses[start:]
-    known = matched & np.isfinite(ours).all(1) & np.isfinite(theirs).all(1)
-    if not known.any():
-        raise ShadowPuppetError("angles: found no frame in which both the run and the truth have all joints")
-    skeleton = fitted.body.skeleton
-    turns = [_own_turns(skeleton, poses[known]) for poses in (ours, theirs)]
-    told = [j for j, joint in enumerate(skeleton.joints) if not joint.name.endswith(("head", "_ankle"))]
-    cosine = (np.einsum("njab,njab->nj", *turns)[:, told] - 1) / 2
-    squares = np.degrees(np.arccos(np.clip(cosine, -1, 1))) ** 2
-    by_joint = dict(zip((skeleton.joints[j].name for j in told), np.sqrt(squares.mean(0)).tolist(), strict=True))
-    return by_joint | {"all": float(np.sqrt(squares.mean()))}
+def write_evaluation(path: str | Path, measured: Mapping[str, Any], folder: str | Path) -> None:
+    """Write figures as JSON. Raises `ShadowPuppetError` where that fails, or the path is one of the run's own files."""
+    check_output(path, folder, ".json")
+    text = json.dumps(for_json(plain(measured, "evaluation")), indent=1, ensure_ascii=False, allow_nan=False)
+    write_whole(Path(path), text + "\n")
 
 
-def _own_turns(skeleton: Skeleton, poses: Array) -> Array:
-    """Rotations (N, J, 3, 3) of joints against those that they hang on."""
-    world = skeleton.forward(poses)[..., :3]
-    above = [skeleton.joint_index(joint.parent) if joint.parent else None for joint in skeleton.joints]
-    return np.stack([world[:, j] if k is None else world[:, k].swapaxes(1, 2) @ world[:, j] for j, k in enumerate(above)], axis=1)
+def check_output(path: str | Path, folder: str | Path, ending: str) -> None:
+    """Raise `ShadowPuppetError` where a file that is to be written has another ending, no folder, or is the run's own."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise ShadowPuppetError(f"{path}: cannot be written (there is no folder {path.parent})")
+    if path.suffix.lower() != ending:
+        raise ShadowPuppetError(f"{path}: found the ending {path.suffix!r}, expected {ending}")
+    if path.resolve().parent == Path(folder).resolve() and path.name in (*FILES, "run.toml", "look.json"):
+        raise ShadowPuppetError(f"{path}: found the run's own file, which is kept as `track` wrote it; choose another name"
+                                + (", or give --update to put the figures in it" if path.name == "metrics.json" else ""))
+
+
+def update_metrics(evaluation: Evaluation) -> Path:
+    """Put figures into the run's own metrics.json, over those of the same names; timings and all else stay. Returns its path."""
+    write_metrics(evaluation.run.folder, evaluation.run.metrics | evaluation.measured)
+    return evaluation.run.folder / "metrics.json"
+
+
+def _wider(run: Run, ours: JointTable, theirs: JointTable, errors: JointErrors) -> dict[str, Any]:
+    """What `measures` has, of tables at the same times."""
+    sd = at_times(replace(run.motion.table, positions=run.motion.joint_sd), ours.times).select(errors.names).positions
+    return {"aligned_mm": aligned_errors(errors, ours, theirs), "axes_mm": axis_errors(errors),
+            "humaneva": humaneva_error(ours, theirs), "bends_deg": bend_errors(ours, theirs),
+            "acceleration": motion_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
+            "coverage": coverage(errors.delta, sd, errors.names)}
+
+
+def _cut(truth: JointTable, how: Comparison, path: str | Path) -> JointTable:
+    last = len(truth.times) - 1
+    if not 0 <= how.start <= last:
+        raise ShadowPuppetError(f"start: found {how.start}, expected 0 to {last}, a frame of {path}")
+    if how.end is not None and not how.start <= how.end <= last:
+        raise ShadowPuppetError(f"end: found {how.end}, expected {how.start} to {last}, a frame of {path}")
+    frames = slice(how.start, None if how.end is None else how.end + 1)
+    return JointTable(truth.times[frames], truth.names, truth.positions[frames])
+
+
+def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path) -> tuple[JointTable, dict[str, Any]]:
+    """The truth at the run's clock, and what is known of that."""
+    if how.sync and how.offset:
+        raise ShadowPuppetError(f"offset: found {how.offset:g} s and --sync, which finds it; expected one of them")
+    if not np.isfinite(how.offset):
+        raise ShadowPuppetError(f"offset: found {how.offset}, expected seconds")
+    motion, found = run.motion.table, None
+    if how.sync:
+        found = find_offset(motion, truth)
+        if found.rival is not None:
+            warn(f"{path}: an offset of {found.rival:.3f} s fits nearly as well as {found.seconds:.3f} s: the motion repeats itself",
+                 ShadowPuppetWarning, stacklevel=4)
+    offset = found.seconds if found else how.offset
+    moved = replace(truth, times=truth.times + offset)
+    if len(motion.times) and (motion.times[-1] < moved.times[0] or motion.times[0] > moved.times[-1]):
+        raise ShadowPuppetError(f"{path}: found times from {moved.times[0]:.2f} to {moved.times[-1]:.2f} s, but the run has "
+                                f"{motion.times[0]:.2f} to {motion.times[-1]:.2f} s: give --sync or --offset")
+    rates = {name: float(1 / step_of(table.times)) for name, table in (("run_hz", motion), ("truth_hz", truth))}
+    return moved, rates | {"offset_s": offset} | (
+        {"speed_error_m_s": found.error, "speed_error_before_m_s": found.before, "rival_s": found.rival} if found else {})
+
+
+def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTable, dict[str, Any]]:
+    """The truth, moved as a whole into the run's world where that was asked for, and how far it was apart; warns where it seems to be in
+    another and was not moved."""
+    if not len(run.motion):
+        return truth, {}
+    ours, theirs = in_step(run.motion.table, truth)
+    errors = joint_errors(ours, theirs, _named(how.joints))
+    told = worlds(errors, ours, theirs)
+    if how.align and not told:
+        raise ShadowPuppetError("align: found fewer than three joints known in both run and truth, expected more")
+    if how.align:
+        back = whole_alignment(theirs, ours, errors)
+        return replace(truth, positions=back.apply(truth.positions)), told | {"moved": True}
+    if told.get("apart"):
+        warn(f"the run's joints are {told['mean_mm']:.0f} mm from the truth's, but {told['aligned_mm']:.0f} mm once the run is turned by "
+             f"{told['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(told['moved_mm']):.0f} mm as a whole: are they in two "
+             "worlds, or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
+    return truth, told | ({"moved": False} if told else {})
+
+
+def _named(joints: Sequence[str] | None) -> list[str] | None:
+    """Joints, groups taken apart, each once."""
+    return None if joints is None else list(dict.fromkeys(name for joint in joints for name in GROUPS.get(joint, (joint,))))
+
+
+def _only(cameras: Sequence[Camera]) -> Camera | None:
+    return cameras[0] if len(cameras) == 1 else None
 
 
 def _known_truth(path: object) -> str | None:

@@ -11,6 +11,7 @@ import numpy as np
 from shadowpuppet.body import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
+from shadowpuppet.free_space import FreeSpace, free_space
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.masks import Mask, may_be_person
@@ -53,6 +54,12 @@ class Evidence:
         """The silhouettes of people, and the pictures to be drawn in their place."""
         return tuple((picture, Observation.of(mask[::2, ::2])) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
                      if mask is not None and may_be_person(mask))
+
+    @cached_property
+    def space(self) -> FreeSpace:
+        """What the silhouettes rule out."""
+        return free_space([(picture.camera, mask[::2, ::2]) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
+                           if mask is not None and may_be_person(mask)])
 
     @cached_property
     def area(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
+from shadowpuppet.euler import branch, three_turns
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import SIDES, across, middle, of, unit
@@ -112,7 +113,7 @@ def _angles(rotations: Array, dofs: Sequence[Dof]) -> Array:
     """Values (T, 3) of three DOF that make rotations (T, 3, 3), on the branch that limits and neighbours in time want."""
     candidates, low, high = _candidates(rotations, dofs)
     free = ~np.isfinite(low)
-    values = _branch(candidates, _excess(candidates, low, high), wraps=free)
+    values = branch(candidates, _excess(candidates, low, high), wraps=free)
     values[:, free] = np.unwrap(values[:, free], axis=0)
     return values
 
@@ -127,47 +128,16 @@ def _candidates(rotations: Array, dofs: Sequence[Dof]) -> tuple[Array, Array, Ar
         other = v - 2 * np.pi * unit(np.where(np.linalg.norm(v, axis=1, keepdims=True) > 1e-9, v, [0, 0, 1e-9]))
         return np.stack([v, other], 1), low, high
     signs, free = np.array([AXES[dof.axis][1] for dof in dofs]), ~np.isfinite(low)
-    first = _three_turns(rotations, [AXES[dof.axis][0] for dof in dofs])
+    first = three_turns(rotations, [AXES[dof.axis][0] for dof in dofs])
     both = np.stack([first, first * [1, -1, 1] + np.pi], 1) * signs
     centre = np.where(free, 0.0, (np.where(free, 0, low) + np.where(free, 0, high)) / 2)
     return centre + (both - centre + np.pi) % (2 * np.pi) - np.pi, low, high
-
-
-def _three_turns(R: Array, axes: Sequence[int]) -> Array:
-    """Angles (N, 3) of turns about three different axes, one after another, that make rotations (N, 3, 3); the second within a quarter.
-
-    Where the second is a quarter, the first and the third are one and the same, and the first is none.
-    """
-    i, j, k = axes
-    e = 1 if (j - i) % 3 == 1 else -1
-    second = np.arcsin(np.clip(e * R[:, i, k], -1, 1))
-    first, third = np.arctan2(-e * R[:, j, k], R[:, k, k]), np.arctan2(-e * R[:, i, j], R[:, i, i])
-    single = np.hypot(R[:, i, i], R[:, i, j]) < 1e-7
-    third = np.where(single, np.arctan2(e * R[:, j, i], R[:, j, j]), third)
-    return np.stack([np.where(single, 0.0, first), second, third], 1)
 
 
 def _excess(candidates: Array, low: Array, high: Array) -> Array:
     """Squared excess (N, K) of candidates (N, K, 3) over limits; of those within them the small are a little better."""
     over = np.maximum(low - candidates, 0) + np.maximum(candidates - high, 0)
     return (np.where(np.isfinite(over), over, 0) ** 2).sum(2) + 1e-6 * (candidates**2).sum(2)
-
-
-def _branch(candidates: Array, own: Array, wraps: Array) -> Array:
-    """Of candidates (T, K, 3) the path (T, 3) of least squared steps and least costs of their own (T, K) (Viterbi 1967)."""
-    steps = candidates[1:, None, :] - candidates[:-1, :, None]
-    steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
-    between = (steps**2).sum(3)
-    cost, came = own[0], np.zeros(candidates.shape[:2], np.int64)
-    for t in range(1, len(candidates)):
-        total = cost[:, None] + between[t - 1]
-        came[t] = total.argmin(0)
-        cost = total.min(0) + own[t]
-    path = np.empty(len(candidates), np.int64)
-    path[-1] = cost.argmin()
-    for t in range(len(candidates) - 1, 0, -1):
-        path[t - 1] = came[t, path[t]]
-    return candidates[np.arange(len(path)), path]
 
 
 def _filled(values: Array) -> Array:

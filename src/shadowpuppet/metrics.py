@@ -13,6 +13,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion import BONES, JointTable, Motion
+from shadowpuppet.synchrony import in_step, match
 
 UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 """What is compared where one camera saw the upper body."""
@@ -44,6 +45,8 @@ class JointErrors:
     """Along the camera's optical axis."""
     aligned: Array
     """In space, less each frame's mean offset over the joints."""
+    delta: Array
+    """From the truth to the run's joint, of shape (T, J, 3), metres; not a number where either is unknown."""
 
     def summary(self, across: bool = True) -> dict[str, Any]:
         """Figures in millimetres, over all joints and for each: mean, RMSE, percentiles, share that is far off; `across` and along the
@@ -80,26 +83,13 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
     across = delta @ (LEVEL if camera is None else camera.T_camera_world[:3, :3]).T
     distances = (np.linalg.norm(delta, axis=2), np.linalg.norm(across[..., :2], axis=2), np.abs(across[..., 2]),
                  np.linalg.norm(delta - _offsets(delta), axis=2))
-    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances))
+    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances), delta=delta)
 
 
 def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:
     """`LIMBS` of a run that has legs, else `UPPER`; those that both have."""
     group = LIMBS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER
     return tuple(name for name in group if name in run.names and name in truth.names)
-
-
-def match(times: ArrayLike, truth_times: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """For each time of the truth (T,) the index of the nearest of `times` (increasing), and whether it is within half a step.
-
-    The step is the truth's median one; a truth of one frame takes any.
-    """
-    times, truth_times = np.asarray(times, float), np.asarray(truth_times, float)
-    after = np.clip(np.searchsorted(times, truth_times), 1, max(len(times) - 1, 1))
-    before, after = after - 1, np.minimum(after, len(times) - 1)
-    index = np.where(np.abs(times[before] - truth_times) <= np.abs(times[after] - truth_times), before, after)
-    half = 0.5 * np.median(np.diff(truth_times)) if len(truth_times) > 1 else np.inf
-    return index, np.abs(times[index] - truth_times) <= half + 1e-9
 
 
 def overlap(model: NDArray[np.bool_], silhouette: NDArray[np.bool_], ignore: NDArray[np.bool_] | None = None) -> float:
@@ -152,14 +142,17 @@ def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[s
              camera: Camera | None = None, start: int = 0, cameras: int = 1) -> dict[str, Any]:
     """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments.
 
-    Where several `cameras` saw it costs are m^2, and no error is told along or across the axis of one.
+    Run and truth are compared at the same times (`synchrony.in_step`), whatever their rates. Where several `cameras` saw it costs are
+    m^2, and no error is told along or across the axis of one.
     """
     run = motion.table
-    errors = None if truth is None else joint_errors(run, truth, joints, camera=camera, start=start)
+    if truth is not None and len(motion):
+        run, truth = in_step(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))
+    errors = None if truth is None else joint_errors(run, truth, joints, camera=camera)
     names = errors.names if errors else joints or default_joints(run, run)
     said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
                             "overlap": statistics(motion.overlap), "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
-                            "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(run)}
+                            "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(motion.table)}
     if truth is not None and errors is not None:
         said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
     return said

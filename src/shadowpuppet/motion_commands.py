@@ -1,4 +1,4 @@
-"""The commands about motion capture: what a motion is like, learnt from files of it, and HumanEva as a recording."""
+"""The commands about motion capture: what a motion is like, learnt from files of it, HumanEva as a recording, motion for other programs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from shadowpuppet.flags import PriorFlags, given, output
 ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 
 
-def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, or .amc beside its .asf.")], /, *,
+def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, .npz, .parquet, or .amc "
+                                                                             "beside its .asf.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
               rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
               flags: ForPrior = None) -> None:  # fmt: skip
@@ -73,3 +74,58 @@ def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, w
         folder = folder or Path(found.recording.name)
         write_humaneva(found, folder)
     show(trial_table(found, folder))
+
+
+def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, to: str = "bvh,c3d,trc,mot,csv,glb,npz",
+           folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
+           unit: Literal["m", "cm", "mm"] = "m") -> None:  # fmt: skip
+    """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
+
+    Parameters
+    ----------
+    to
+        Formats, separated by commas: bvh, c3d, csv, glb, mot, npz, parquet, trc; or all.
+    unit
+        Of BVH files, which do not tell it; Blender takes m.
+    """
+    from shadowpuppet.exporting import EXPORTS, export_run
+    from shadowpuppet.tables import pairs
+    from shadowpuppet.terminal import show, terminal
+
+    names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
+    with terminal() as shown:
+        shown.begin("exporting")
+        written = export_run(run, names, folder, unit)
+    show(pairs([("made", "\n".join(map(str, written)))]))
+
+
+def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, .csv, .npz, .parquet, .trc, or .amc beside its .asf.")],
+            target: Annotated[Path, Parameter(help="File to be written: .bvh, .c3d, .csv, .glb, .mot, .npz, .parquet or .trc.")], /, *,
+            all: Annotated[bool, Parameter(negative=(), show_default=False)] = False, rate: float | None = None,
+            source_unit: Literal["m", "cm", "mm", "in"] | None = None, unit: Literal["m", "cm", "mm"] = "m") -> None:  # fmt: skip
+    """Turn a file of motion into another: joints in metres, Z up, or as the other format wants them.
+
+    A skeleton (.bvh, .amc) stays one in .bvh and .glb; to joints alone, a body is fitted where the target needs one.
+
+    Parameters
+    ----------
+    all
+        Keep every point under its own name, not the joints that are known by ours alone.
+    rate
+        Frames/s of an .amc file, which tells none. [default: 120]
+    source_unit
+        Of a .bvh file that is read. [default: found from the length of the legs]
+    unit
+        Of a .bvh file that is written.
+    """
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.exporting import UNITS, convert_motion
+    from shadowpuppet.tables import pairs
+    from shadowpuppet.terminal import show, terminal
+
+    if rate is not None and not 0 < rate < 1e6:
+        raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
+    with terminal() as shown:
+        shown.begin("converting")
+        told = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
+    show(pairs([("made", str(target)), ("of", told)]))

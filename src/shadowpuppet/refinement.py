@@ -6,12 +6,16 @@ is its screw (`screws.py`), so that forces, moments and normal equations are pro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
 from shadowpuppet.closest import LANES, Cloud, constants, foot, measure, nearest, place_parts
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.free_space import FreeSpace, free_space, push_inside, spheres_in
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel, part, summing
 from shadowpuppet.screws import TRANSLATION, make_chain, place_one
@@ -23,6 +27,20 @@ COST, EQUATIONS, FORCES, ROBUST, MODULATED = 0, 1, 4, 1, 2
 """What a pass is for; to `FORCES` are added whether they are bounded, and whether they go by the normals."""
 STEP = 0.5
 """No DOF moves farther than this (rad or m) in one iteration."""
+
+
+class Pass(NamedTuple):
+    """Iterations of Gauss-Newton on the same evidence."""
+
+    cloud: Cloud
+    """Surface points."""
+    iterations: int
+    tau: float
+    """Distance (m) at which a point counts a quarter."""
+    space: FreeSpace | None = None
+    """What the silhouettes rule out, if that counts."""
+    emptiness: float = 0.0
+    """Weight of the mean squared distance by which limbs reach out of the silhouettes, beside that of the points."""
 
 
 class Refiner:
@@ -38,6 +56,7 @@ class Refiner:
         self.body, self.settings = body, settings or SurfaceSettings()
         self._chain = make_chain(body.skeleton)
         limbs = body.limbs
+        self._spheres, self._nowhere = spheres_in(limbs), free_space(())
         self._limbs = limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts)
         J, D, S = len(body.skeleton.joints), len(body.skeleton.dofs), len(limbs.joints)
         self._room = (constants(limbs), np.zeros((J, 3, 4)), np.zeros((D, 6)), np.zeros((3, 3, 3)), np.zeros(8 * LANES, np.float32),
@@ -51,18 +70,19 @@ class Refiner:
                out)
         return out / max(cloud.total, 1e-9)
 
-    def gauss_newton(self, poses: Array, clouds: tuple[tuple[Cloud, int, float], ...], centre: Array, pull: Array,
+    def gauss_newton(self, poses: Array, passes: Sequence[Pass | tuple[Cloud, int, float]], centre: Array, pull: Array,
                      damping: float = 0.03) -> Array:
         """Better poses (N, D): damped (Levenberg-Marquardt), robust, within limits.
 
-        `clouds`: surface points and how many iterations to take on them, a few points first. `pull` (D,): weight of the squared distance
-        from `centre` (N or 1, D) beside the mean squared distance of the points; it decides what these do not see.
+        `passes` in turn: a few points first, and what is empty; all points then. `pull` (D,): weight of the squared distance from `centre`
+        (N or 1, D) beside the mean squared distance of the points; it decides what these do not see.
         """
         poses = self.body.skeleton.checked(poses).copy()
         centre = np.ascontiguousarray(np.atleast_2d(centre), float)
-        for cloud, iterations, tau in clouds:
+        for cloud, iterations, tau, space, emptiness in (Pass(*each) for each in passes):
             _gauss_newton(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
-                          max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room, self._system)
+                          max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room, self._system,
+                          self._spheres, space or self._nowhere, emptiness)
         return poses
 
     def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
@@ -250,8 +270,8 @@ def _solve(A, b):  # pragma: no cover
 
 
 @kernel
-def _gauss_newton(poses, centre, pull, chain, limbs, rows, spheres, origin, points, numbers, damping, iterations, which, room,
-                  system):  # pragma: no cover
+def _gauss_newton(poses, centre, pull, chain, limbs, rows, groups, origin, points, numbers, damping, iterations, which, room, system,
+                  spheres, space, emptiness):  # pragma: no cover
     """See `Refiner.gauss_newton`; `poses` is written over."""
     T, screws, work, sums = room[1], room[2], room[3], room[6]
     H, A, vectors = system
@@ -262,7 +282,8 @@ def _gauss_newton(poses, centre, pull, chain, limbs, rows, spheres, origin, poin
         least, damp = np.inf, damping
         for turn in range(iterations + 1):
             place_one(pose, chain, T, screws, work)
-            held = _sweep(EQUATIONS if turn < iterations else COST, T, limbs, rows, spheres, origin, numbers, which, room) / points
+            held = _sweep(EQUATIONS if turn < iterations else COST, T, limbs, rows, groups, origin, numbers, which, room) / points
+            held += push_inside(T, spheres, space, emptiness * points, origin, sums, turn < iterations) / points
             for d in range(D):
                 held += pull[d] * (pose[d] - about[d]) ** 2
             if held <= least:

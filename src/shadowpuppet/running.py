@@ -16,8 +16,8 @@ import numpy as np
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io._plain import for_json, plain
-from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import Recording
+from shadowpuppet.io.truth import read_truth
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import evaluate
 from shadowpuppet.motion import Motion
@@ -123,7 +123,7 @@ def warn_of_losses(motion: Motion) -> None:
 def evaluated(recording: Recording, motion: Motion, camera: Camera | None = None, cameras: int = 1) -> dict[str, Any]:
     """Measures, against the truth where there is one that fits; `camera` says what is depth, where it is not one of several `cameras`."""
     try:
-        truth = read_joints(recording.truth) if recording.truth is not None else None
+        truth = read_truth(recording.truth, motion.joint_names) if recording.truth is not None else None
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is done: it is not to be lost over this
         warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)

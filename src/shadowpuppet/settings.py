@@ -260,6 +260,9 @@ class GaussNewtonSettings:
     """Distance (m) at which a point counts a quarter, in the coarse iterations."""
     fine_tau: Positive = 0.04
     """The same in the fine ones."""
+    emptiness: NonNegative = 2.0
+    """Weight of the mean squared distance by which limbs reach out of the silhouettes; in the fine iterations with few cameras
+    only."""
     damping: Positive = 0.03
     """Share of its own curvature by which each DOF is held back at first."""
     pull: NonNegative = 1e-5

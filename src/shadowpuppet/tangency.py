@@ -77,27 +77,50 @@ def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline
     return out
 
 
-def _apart(first: Camera, a: Outline, second: Camera, b: Outline) -> tuple[float, float]:
-    """Distances (pixels) of both pairs of outermost tangents; not a number at the border, or where they cannot be told."""
-    line = second.centre - first.centre
+class Tangents(NamedTuple):
+    """The outermost planes through two cameras that touch their silhouettes."""
+
+    angles: Array
+    """About the line from the first camera to the second (2 cameras, 2 planes), radians; not a number at a picture's border."""
+    levers: Array
+    """Pixels a radian is (2 planes,)."""
+    lever: float
+    """Of both, mean."""
+    reference: Array
+    """Where angles count from (3,)."""
+
+
+def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outline], reference: Array | None = None) -> Tangents | None:
+    """Where the tangent planes of two outlines lie; None where cameras stand at one place, or a silhouette lies about the line from one to
+    the other. `reference`: a direction (3,) to count from; if left out, the middle of both silhouettes."""
+    line = cameras[1].centre - cameras[0].centre
     length = float(np.linalg.norm(line))
     if length < 1e-9:
-        return np.nan, np.nan
+        return None
     line = line / length
-    aside = [outline.rays - (outline.rays @ line)[:, None] * line for outline in (a, b)]
-    ahead = _unit(aside[0].sum(0)) + _unit(aside[1].sum(0))
-    ahead = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else aside[0].sum(0))
-    angles = [np.arctan2(part @ np.cross(line, ahead), part @ ahead) for part in aside]
+    aside = [outline.rays - (outline.rays @ line)[:, None] * line for outline in outlines]
+    if reference is None:
+        ahead = _unit(aside[0].sum(0)) + _unit(aside[1].sum(0))
+        reference = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else aside[0].sum(0))
+    angles = [np.arctan2(part @ np.cross(line, reference), part @ reference) for part in aside]
     if max(float(np.ptp(each)) for each in angles) > WIDE:
-        return np.nan, np.nan
-    focal = [float(np.diag(camera.matrix)[:2].mean()) for camera in (first, second)]
-
-    def end(pick) -> float:
+        return None
+    focal = [float(np.diag(camera.matrix)[:2].mean()) for camera in cameras]
+    out, levers = np.full((2, 2), np.nan), np.zeros(2)
+    for n, pick in enumerate((np.argmin, np.argmax)):
         k = [int(pick(each)) for each in angles]
-        lever = np.mean([f * np.linalg.norm(part[at]) for f, part, at in zip(focal, aside, k)])
-        return abs(angles[0][k[0]] - angles[1][k[1]]) * float(lever) if a.firm[k[0]] and b.firm[k[1]] else np.nan
+        levers[n] = float(np.mean([f * np.linalg.norm(part[at]) for f, part, at in zip(focal, aside, k)]))
+        out[:, n] = [each[at] if outline.firm[at] else np.nan for each, outline, at in zip(angles, outlines, k)]
+    return Tangents(out, levers, float(levers.mean()), reference)
 
-    return end(np.argmin), end(np.argmax)
+
+def _apart(first: Camera, a: Outline, second: Camera, b: Outline) -> tuple[float, float]:
+    """Distances (pixels) of both pairs of outermost tangents; not a number at the border, or where they cannot be told."""
+    found = tangent_angles((first, second), (a, b))
+    if found is None:
+        return np.nan, np.nan
+    low, high = np.abs(found.angles[0] - found.angles[1]) * found.levers
+    return float(low), float(high)
 
 
 def _unit(vector: Array) -> Array:

@@ -23,7 +23,7 @@ from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.particle_filter import Particles, Refine, Weigh, diffuse, evaluate, step
 from shadowpuppet.proposals import Proposals
 from shadowpuppet.rasterize import Picture, count
-from shadowpuppet.refinement import Refiner
+from shadowpuppet.refinement import Pass, Refiner
 from shadowpuppet.resampling import Scheme, make_scheme, normalise
 from shadowpuppet.settings import MonocularSettings, MultiviewSettings
 from shadowpuppet.usual import Usual
@@ -244,9 +244,12 @@ class MultiviewTracker:
             some, half = evidence.cloud(g.share), s.forces.iterations // 2  # far from the goal, some of the points are enough
             coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
             return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), evidence.full, fine)
-        clouds = (evidence.cloud(g.share), g.coarse, g.coarse_tau), (evidence.full, g.fine, g.fine_tau)
+        # silhouettes bring limbs back that reach out of them, but have faults of their own: the surface of many cameras needs no more
+        space = evidence.space if g.emptiness else None
+        coarse = Pass(evidence.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
+        fine = Pass(evidence.full, g.fine, g.fine_tau, space, g.emptiness if len(self.cameras) < ENOUGH else 0.0)
         centre, pull = self.usual.held(last, g.pull, s.posture)
-        return lambda poses: self.refiner.gauss_newton(poses, clouds, centre, pull, g.damping)
+        return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
         """The state with its cost, overlap and status."""

@@ -16,6 +16,7 @@ from shadowpuppet.io.bvh import read_bvh
 from shadowpuppet.io.joint_names import JOINTS, columns_of, renamed
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.motion_files import TURNS, leg_length, read_motion, up_axis
+from shadowpuppet.metrics import LIMBS
 from shadowpuppet.motion import JointTable
 from vicon import c3d
 
@@ -153,6 +154,11 @@ CONVENTIONS = {
     "SMPL": "pelvis neck head left_collar left_shoulder left_elbow left_wrist left_hand left_hip left_knee left_ankle left_foot",
     "Kinect": "SpineBase Neck Head SpineMid ShoulderLeft ElbowLeft WristLeft HandLeft HipLeft KneeLeft AnkleLeft FootLeft",
     "Vicon": "S1:PELO S1:TRXO S1:HEDO S1:LSHO S1:LCLO S1:LHUO S1:LRAO S1:LHNO S1:LFEP S1:LFEO S1:LTIO S1:LANK_",
+    "HumanEva": "torsoDistal torsoProximal headProximal headDistal upperLArmProximal lowerLArmProximal lowerLArmDistal - upperLLegProximal "
+                "lowerLLegProximal lowerLLegDistal",
+    "joint centres": "Pelvis Neck Head LASI LSJC LEJC LWJC - LHJC LKJC LAJC",
+    "OpenCap": "midHip Neck head LBigToe LShoulder LElbow LWrist - LHJC_study LKnee LAnkle LHeel",
+    "COCO": "midhip neck head left_eye left_shoulder left_elbow left_wrist - left_hip left_knee left_ankle",
     "ours": "pelvis neck head x left_shoulder left_elbow left_wrist left_hand left_hip left_knee left_ankle",
 }
 MEANT = ["pelvis", "neck", "head", "left_shoulder", "left_elbow", "left_wrist", "left_hand", "left_hip", "left_knee", "left_ankle"]
@@ -164,7 +170,7 @@ def test_names_of_other_programs_are_known(program, side):
     text = CONVENTIONS[program]
     if side == "right":
         for old, new in (("Left", "Right"), ("left_", "right_"), ("_L_", "_R_"), (r"\.L", ".R"), (r"_l\b", "_r"), (":L", ":R"),
-                         (r"\bl(?=[A-Z])", "r")):
+                         (r"\bl(?=[A-Z])", "r"), (r"(?<=er)L(?=[AL])", "R"), (r"\bL(?=[A-Z])", "R")):
             text = re.sub(old, new, text)
     names = text.split()
     found = columns_of([name.replace("_", " ") if program == "Biped" else name for name in names])
@@ -178,6 +184,45 @@ def test_names_of_other_programs_are_known(program, side):
         assert "Shoulder" not in names[found[f"{side}_shoulder"]]
 
 
+DETECTORS = {
+    "BODY_25": "Nose Neck RShoulder RElbow RWrist LShoulder LElbow LWrist MidHip RHip RKnee RAnkle LHip LKnee LAnkle REye LEye REar LEar "
+               "LBigToe LSmallToe LHeel RBigToe RSmallToe RHeel",
+    "HALPE_26": "Hip RHip RKnee RAnkle RBigToe RSmallToe RHeel LHip LKnee LAnkle LBigToe LSmallToe LHeel Neck Head Nose RShoulder RElbow "
+                "RWrist LShoulder LElbow LWrist",
+    "COCO": "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist left_hip"
+            " right_hip left_knee right_knee left_ankle right_ankle",
+}
+
+
+@pytest.mark.parametrize("detector", DETECTORS)
+def test_all_limbs_of_detectors_are_known(detector):
+    names = DETECTORS[detector].split()
+    table = renamed(JointTable(np.zeros(1), tuple(names), np.arange(3.0 * len(names)).reshape(1, -1, 3)))
+    assert {*LIMBS, "pelvis"} <= {*table.names}
+    assert ("neck" in table.names, "head" in table.names) == (detector != "COCO", False)
+    for name in LIMBS:
+        side, joint = name.split("_")
+        there = f"{side[0].upper()}{joint.capitalize()}" if detector != "COCO" else name
+        np.testing.assert_array_equal(table.select([name]).positions[0, 0], np.arange(3) + 3 * names.index(there))
+
+
+@pytest.mark.parametrize(("outside", "inside", "joint"), [
+    ("R.Knee.Lat", "R.Knee.Med", "right_knee"), ("L.Ankle.Lat", "L.Ankle.Med", "left_ankle"), ("RLFC", "RMFC", "right_knee"),
+    ("LLMAL", "LMMAL", "left_ankle"), ("RLEL", "RMEL", "right_elbow"), ("RFAradius", "RFAulna", "right_wrist"),
+    ("r_knee_study", "r_mknee_study", "right_knee"), ("L_lelbow_study", "L_melbow_study", "left_elbow"),
+    ("r_ankle", "r_mankle", "right_ankle"),
+])  # fmt: skip
+def test_between_two_markers_lies_the_joint(outside, inside, joint):
+    places = np.array([[[1.0, 2, 3], [3, 2, 1], [9, 9, 9]]])
+    table = renamed(JointTable(np.zeros(1), (outside, inside, "C7"), places))
+    assert table.names == (joint,)
+    np.testing.assert_array_equal(table.positions, [[[2, 2, 2]]])
+    alone = JointTable(np.zeros(1), (inside, "neck"), places[:, :2])
+    assert renamed(alone).names == ("neck",)  # one of the two is no joint
+    ours = JointTable(np.zeros(1), (outside, inside, joint), places)
+    np.testing.assert_array_equal(renamed(ours).positions, [[[9, 9, 9]]])
+
+
 def test_a_head_beside_a_nose_is_the_crown_and_the_pelvis_lies_between_the_hips():
     names = ("Nose", "Head", "Neck", "RHip", "LHip", "RKnee", "LKnee")
     table = renamed(JointTable(np.zeros(1), names, np.arange(21.0).reshape(1, 7, 3)))
@@ -189,7 +234,7 @@ def test_what_is_not_ours_is_said(tmp_path):
     write_joints(tmp_path / "markers.trc", JointTable(np.zeros(1), ("LASI", "RASI"), np.ones((1, 2, 3))))
     with pytest.raises(FormatError, match=r"markers\.trc: found no joint of a known name among 'LASI, RASI', expected such as pelvis"):
         read_motion(tmp_path / "markers.trc")
-    with pytest.raises(FormatError, match=r"film\.mp4: found the ending '\.mp4', expected one of \.amc, \.bvh, \.c3d, \.csv, \.trc"):
+    with pytest.raises(FormatError, match=r"film\.mp4: found the ending '\.mp4', expected one of \.amc, \.bvh, \.c3d, \.csv, "):
         read_motion(tmp_path / "film.mp4")
     with pytest.raises(FormatError, match=r"none\.BVH: cannot be read"):
         read_motion(tmp_path / "none.BVH")

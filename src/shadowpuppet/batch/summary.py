@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +13,7 @@ from typing import Any
 from shadowpuppet.batch.plan import Task
 from shadowpuppet.batch.task import RUNS, read_mark
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io._files import read_text, reason, write_whole
+from shadowpuppet.io._files import read_text, write_whole
 from shadowpuppet.io._table import csv_line
 
 TABLES = ("csv", "parquet")
@@ -76,12 +77,12 @@ def check_table(table: str) -> None:
     if table not in TABLES:
         raise ShadowPuppetError(f"table: found {table!r}, expected one of {', '.join(TABLES)}")
     if table == "parquet" and find_spec("pyarrow") is None:
-        raise ShadowPuppetError("table: parquet needs pyarrow, which is not installed; pip install pyarrow, or take csv")
+        raise ShadowPuppetError("table: parquet needs pyarrow, which is not installed; pip install 'shadowpuppet[formats]', or take csv")
 
 
 def _write_parquet(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path: Path) -> None:
-    import pyarrow  # pyright: ignore[reportMissingImports]
-    import pyarrow.parquet  # pyright: ignore[reportMissingImports]
+    import pyarrow
+    import pyarrow.parquet
 
     def column(name: str) -> list[Any]:
         values = [row.get(name) for row in rows]
@@ -89,13 +90,9 @@ def _write_parquet(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], pa
         return values if len(kinds) < 2 else [None if v is None else float(v) for v in values] if kinds <= {int, float} else [
             None if v is None else _cell(v) for v in values]  # fmt: skip
 
-    part = path.with_name(f"{path.name}.part")
-    try:
-        pyarrow.parquet.write_table(pyarrow.table({name: column(name) for name in columns}), part)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise ShadowPuppetError(f"{path}: cannot be written ({reason(error)})") from None
+    out = io.BytesIO()
+    pyarrow.parquet.write_table(pyarrow.table({name: column(name) for name in columns}), out)
+    write_whole(path, out.getvalue())
 
 
 def _cell(value: Any) -> str:

@@ -54,29 +54,36 @@ class Bvh:
         places = np.empty((len(self.values), len(self.nodes), 3))
         added = [self._is_added(n) for n in range(len(self.nodes))]
         for start in range(0, len(self.values), BLOCK):
-            places[start : start + BLOCK] = self._placed(self.values[start : start + BLOCK], added)
+            places[start : start + BLOCK] = self._placed(*self._turned(self.values[start : start + BLOCK], added))
         try:
-            return JointTable(np.arange(len(places), dtype=float) * self.step, _different([node.name for node in self.nodes]), places)
+            return JointTable(np.arange(len(places), dtype=float) * self.step, different([node.name for node in self.nodes]), places)
         except ShadowPuppetError as error:
             raise FormatError(f"{self.path}: {error}") from None
 
-    def _placed(self, values: Array, added: list[bool]) -> Array:
-        """Places (T, J, 3) of all nodes for channel values (T, C)."""
-        places, turns = np.empty((len(values), len(self.nodes), 3)), list[Array]()
+    def turned(self) -> tuple[Array, Array]:
+        """How each node is turned against its parent (T, J, 3, 3), and where it lies there (T, J, 3), the file's unit and axes."""
+        return self._turned(self.values, [self._is_added(n) for n in range(len(self.nodes))])
+
+    def _turned(self, values: Array, added: list[bool]) -> tuple[Array, Array]:
+        """The same of channel values (T, C)."""
+        turns, shifts = np.empty((len(values), len(self.nodes), 3, 3)), np.empty((len(values), len(self.nodes), 3))
         for n, (node, columns) in enumerate(zip(self.nodes, self._columns)):
-            own, shift = np.broadcast_to(np.eye(3), (len(values), 3, 3)), np.tile(node.offset, (len(values), 1))
+            own, shifts[:, n] = np.eye(3), node.offset
             for channel, column in zip(node.channels, columns):
                 if channel < 3:
-                    shift[:, channel] = values[:, column] + (node.offset[channel] if added[n] else 0.0)
+                    shifts[:, n, channel] = values[:, column] + (node.offset[channel] if added[n] else 0.0)
                 else:
                     own = own @ rotation_about(np.eye(3)[channel - 3], np.radians(values[:, column]))
-            if node.parent < 0:
-                places[:, n] = shift
-            else:
-                places[:, n] = places[:, node.parent] + (turns[node.parent] @ shift[:, :, None])[:, :, 0]
-                own = turns[node.parent] @ own
-            turns.append(own)
-        return places
+            turns[:, n] = own
+        return turns, shifts
+
+    def _placed(self, turns: Array, shifts: Array) -> Array:
+        """Places (T, J, 3) of nodes turned (T, J, 3, 3) and shifted (T, J, 3) against their parents."""
+        for n, node in enumerate(self.nodes):
+            if node.parent >= 0:
+                shifts[:, n] = shifts[:, node.parent] + (turns[:, node.parent] @ shifts[:, n, :, None])[:, :, 0]
+                turns[:, n] = turns[:, node.parent] @ turns[:, n]
+        return shifts
 
     @property
     def _columns(self) -> list[list[int]]:
@@ -237,7 +244,7 @@ def _numbers(words: list[str]) -> Array | None:
     return values if np.isfinite(values).all() and len(values) else None
 
 
-def _different(names: list[str]) -> tuple[str, ...]:
+def different(names: list[str]) -> tuple[str, ...]:
     """Names made different by numbers where they are not."""
     seen: dict[str, int] = {}
     out = []

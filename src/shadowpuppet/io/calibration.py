@@ -1,161 +1,282 @@
-"""Calibration files: the TOML schema that Pose2Sim, Anipose and Caliscope share."""
+"""Calibrations of any kind to cameras in metres, Z up, and back: which formats there are, and what is settled for all of them."""
 
 from __future__ import annotations
 
-import json
-import math
-import os
-import re
-import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetError
-from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
+from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices
+from shadowpuppet.geometry import Array, inverse, rigid
+from shadowpuppet.io._files import reason, write_whole
+from shadowpuppet.io._toml import FILE_LIMIT as FILE_LIMIT
+from shadowpuppet.io._toml import read_toml as read_toml
+from shadowpuppet.io.rigs.bouguet import read_bouguet
+from shadowpuppet.io.rigs.draft import Draft, Found
+from shadowpuppet.io.rigs.opencv import SUFFIXES, easymocap_texts, files_of, pair_of, read_opencv
+from shadowpuppet.io.rigs.qualisys import read_qualisys
+from shadowpuppet.io.rigs.tables import check_name, read_tables, tables_text
+from shadowpuppet.io.rigs.vicon import read_vicon
 
-FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
-"""What a camera's section must have; `name` is the section's own where it is missing, `fisheye` false."""
-
-FILE_LIMIT = 10_000_000
-"""Bytes; no calibration is longer, and a film given by mistake is not read."""
-BARE_KEY = r"[A-Za-z0-9_-]+"
-"""Section titles that TOML takes without quotes."""
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+"""Metres of what lengths may be in."""
+UPS = {"z": (0, 0, 1), "y": (0, 1, 0), "x": (1, 0, 0), "-z": (0, 0, -1), "-y": (0, -1, 0), "-x": (-1, 0, 0), "cameras": None}
+"""Directions of a file's world that may be up; `cameras`: what is up in the pictures, on the whole."""
 FARTHEST = 100.0
 """Metres; a camera farther from the world's origin was measured in millimetres."""
+SIZES = ((640, 480), (848, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024), (1440, 1080), (1600, 1200), (1920, 1080),
+         (1920, 1200), (2048, 1536), (2704, 1520), (2560, 1440), (3840, 2160), (4096, 2160))
+"""Pictures that there are; what a file without sizes is held against, with twice the principal point."""
+NEAR = 0.08
+"""How far twice the principal point may be from such a size, relatively."""
+PARALLEL, BORNE_OUT = 0.02, 0.8
+"""How much rows of pictures must differ in direction, and agree with what is up in them, to tell what is level."""
+HEAD = 4096
+"""Bytes by which a format is known."""
 
 
-def read_calibration(path: str | Path) -> tuple[Camera, ...]:
-    """Cameras of a calibration file, in its order.
+class Format(NamedTuple):
+    """A kind of calibration file."""
 
-    A section a camera: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to
-    camera, or a 3 x 3 matrix), `translation` (metres), `fisheye`. Other keys and sections are other programs' and skipped.
-    Raises `CalibrationError` with the file, section and field where something is missing or cannot be a camera's.
+    name: str
+    """As it is told."""
+    fits: Callable[[Path, str], bool]
+    """Whether a file is of this kind, by its path and how it begins."""
+    read: Callable[[Path], Found]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Cameras of a file, and how it was read."""
+
+    path: Path
+    format: str
+    cameras: tuple[Camera, ...]
+    """Metres, Z up as far as is known."""
+    unit: str
+    """What the file's lengths are in: m, cm or mm."""
+    told: bool
+    """Whether the file, its format or the user says so; metres otherwise."""
+    notes: tuple[str, ...]
+    """What a user should know of how it was read, a sentence each."""
+
+
+def _ends(path: Path, *endings: str) -> bool:
+    return path.suffix.lower() in endings
+
+
+QUALISYS = Format("Qualisys (.qca.txt)", lambda path, text: "<calibration" in text and "<camera" in text, read_qualisys)
+VICON = Format("Vicon (.xcp)", lambda path, text: "<Cameras" in text or _ends(path, ".xcp"), read_vicon)
+EASYMOCAP = Format("EasyMocap (intri.yml, extri.yml)",
+                   lambda path, text: path.stem in ("intri", "extri") and _ends(path, *SUFFIXES), read_opencv)
+OPENCV = Format("OpenCV (YAML, XML)",
+                lambda path, text: _ends(path, *SUFFIXES) or "<opencv_storage" in text or "!!opencv-matrix" in text, read_opencv)
+HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
+TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
+                lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
+FORMATS = (QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
+"""By what they are known, in this order."""
+
+
+def read_calibration(path: str | Path, *, unit: str | None = None, up: str | None = None,
+                     sizes: Callable[[str], tuple[int, int] | None] | None = None) -> tuple[Camera, ...]:
+    """Cameras of a calibration file, or folder of such, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
+
+    TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML, EasyMocap's pair, Qualisys'
+    .qca.txt, Vicon's .xcp, HumanEva's .cal; known by content. `unit` (m, cm, mm) is what its lengths are in, where it does not say; `up`
+    (`UPS`) which direction of its world is up. `sizes`: width and height of a camera's pictures by its name, for files without.
+    Raises `CalibrationError` with the file, camera and field where something is missing or cannot be a camera's.
     """
-    data = read_toml(path, CalibrationError)
-    sections = {title: table for title, table in data.items() if isinstance(table, dict) and any(key in table for key in FIELDS)}
-    if not sections:
-        raise CalibrationError(f"{path}: no camera in it, expected a section for each, such as [cam1], with {', '.join(FIELDS)}")
+    return look_into(path, unit, up, sizes).cameras
+
+
+def look_into(path: str | Path, unit: str | None = None, up: str | None = None,
+              sizes: Callable[[str], tuple[int, int] | None] | None = None) -> Calibration:
+    """As `read_calibration`, with how it was read."""
+    path = Path(path)
+    for what, value, known in (("unit", unit, UNITS), ("up", up, UPS)):
+        if value is not None and value not in known:
+            raise CalibrationError(f"{path}: {what}: found {value!r}, expected one of {', '.join(known)}")
+    kind = format_of(path)
+    found = kind.read(path)
+    used, notes = unit or found.unit or "m", list(found.notes)
     cameras: dict[str, Camera] = {}
-    for title, table in sections.items():
+    for draft in found.drafts:
         try:
-            camera = _camera(title, table)
+            camera = _camera(draft, UNITS[used], sizes, notes)
             if camera.name in cameras:
                 raise CalibrationError(f"name: found {camera.name!r}, which another section has; every camera needs its own")
         except CalibrationError as error:
-            raise CalibrationError(f"{path}: [{title}]: {error}") from None
+            where = draft.where or f"camera {draft.name!r}: "
+            raise CalibrationError(f"{path}: {'' if str(error).startswith(where) else where}{error}") from None
         cameras[camera.name] = camera
-    return tuple(cameras.values())
+    upright = stood_up(tuple(cameras.values()), up) if up else tuple(cameras.values())
+    return Calibration(path, kind.name, upright, used, bool(unit or found.unit), tuple(notes))
+
+
+def format_of(path: Path) -> Format:
+    """The kind of calibration that a file or folder is. Raises `CalibrationError` where it is none that is known."""
+    if path.is_dir():
+        if any(path.glob("*.cal")):
+            return HUMANEVA
+        if not files_of(path):
+            raise CalibrationError(f"{path}: is a directory, and no calibration is in it that takes a whole one, expected a file, a folder "
+                                   "with EasyMocap's intri.yml and extri.yml, or one with a .cal or OpenCV file a camera")
+        return EASYMOCAP if any(file.stem in ("intri", "extri") for file in files_of(path)) else OPENCV
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError as error:
+        raise CalibrationError(f"{path}: cannot be read ({reason(error)})") from None
+    if path.suffix.lower() in (".pickle", ".pkl") or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5"):
+        raise CalibrationError(f"{path}: is a pickle, as OpenCap saves calibrations: reading one runs any program that is in it, so it is "
+                               "not opened here; where you trust it, Pose2Sim makes TOML of it (calibration type convert, from opencap)")
+    text = head.decode("utf-8", "replace")
+    kind = next((kind for kind in FORMATS if kind.fits(path, text)), None)
+    if kind is None:
+        raise CalibrationError(f"{path}: found no calibration in it that is known, expected one of: {'; '.join(f.name for f in FORMATS)}")
+    return kind
+
+
+def is_calibration(path: Path) -> bool:
+    """Whether a file or folder is a calibration, by its beginning; whether it is a good one is said when it is read."""
+    try:
+        kind = format_of(path)
+    except CalibrationError:
+        return path.suffix.lower() in (".pickle", ".pkl")
+    if path.is_file() and kind is TABLES:
+        with path.open("rb") as file:
+            return b"matrix" in file.read(HEAD)
+    return True
+
+
+def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] | None] | None, notes: list[str]) -> Camera:
+    check_name(draft.name)
+    T = draft.T if draft.T is not None else Camera.from_fov((2, 2), 1.0).T_camera_world
+    distance = float(np.linalg.norm(T[:3, 3])) * metres
+    if not distance <= FARTHEST:
+        raise CalibrationError(f"translation: found {T[:3, 3].tolist()}, {distance:g} long, expected at most {FARTHEST:g} "
+                               "metres; it is probably in millimetres: divide it by 1000, or say so: --unit mm, or unit = \"mm\" in "
+                               "recording.toml")
+    size = draft.size or (sizes(draft.name) if sizes is not None else None) or _guessed(draft, notes)
+    lens = np.ravel(np.asarray(draft.distortion, float))
+    if not draft.fisheye:
+        lens = lens[:8] if lens.size > 8 and not lens[8:].any() else lens
+        lens = np.pad(lens, (0, 4 - lens.size)) if draft.where[:1] != "[" and 0 < lens.size < 4 else lens
+    scaled = rigid(T[:3, :3], T[:3, 3] * metres)
+    return Camera(draft.name, (size[0], size[1]), np.asarray(draft.matrix), lens, scaled, draft.fisheye, draft.oriented)  # pyright: ignore[reportArgumentType]
+
+
+def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
+    """A size for a file without, by twice the principal point."""
+    twice = 2 * np.asarray(draft.matrix, float)[:2, 2] + 1
+    if not (np.isfinite(twice).all() and (twice >= 2).all() and (twice < 1e5).all()):
+        raise CalibrationError(f"found no picture size, and a principal point of {((twice - 1) / 2).tolist()}, expected one in the picture")
+    known = [size for wide, high in SIZES for size in ((wide, high), (high, wide))]
+    off = np.abs(np.array(known) / twice - 1).max(1)
+    best = int(off.argmin())
+    size: tuple[float, float] = known[best] if off[best] < NEAR else (round(float(twice[0])), round(float(twice[1])))
+    notes.append(f"camera {draft.name!r}: no picture size in the file: taken for {size[0]} x {size[1]}, by the principal point")
+    return size
+
+
+def stood_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
+    """Cameras in a world that is turned so that its direction `up` (`UPS`) is Z."""
+    direction = UPS[up]
+    if direction is None:
+        direction = _level(cameras)
+    turn = _turn_to_z(np.asarray(direction, float))
+    return tuple(replace(camera, T_camera_world=camera.T_camera_world @ inverse(turn)) for camera in cameras)
+
+
+def _level(cameras: tuple[Camera, ...]) -> Array:
+    """What is up (3,) where cameras are not rolled: at right angles to the rows of all pictures, whatever they are tilted by.
+
+    What is up in the pictures on the whole, where rows are parallel, or do not bear it out.
+    """
+    mean = -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
+    rows = np.array([camera.T_camera_world[0, :3] for camera in cameras])
+    sizes, axes = np.linalg.eigh(rows.T @ rows / len(rows))
+    up = axes[:, 0] * np.sign(axes[:, 0] @ mean)
+    return up if sizes[1] > PARALLEL and up @ mean > BORNE_OUT * np.linalg.norm(mean) else mean
+
+
+def _turn_to_z(direction: Array) -> Array:
+    """The least turn (4, 4) that brings a direction (3,) to Z."""
+    length = float(np.linalg.norm(direction))
+    d = direction / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
+    v, c = np.cross(d, (0, 0, 1)), d[2]
+    if c < -1 + 1e-9:
+        return rigid(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
+    K = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return rigid(np.eye(3) + K + K @ K / (1 + c), np.zeros(3))
 
 
 def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
-    """Write cameras so that `read_calibration` gives them back. Raises `CalibrationError` where the file cannot be written."""
-    path, sections = Path(path), {}
-    for camera in cameras:
-        _check_name(camera.name)
-        if camera.name in sections:
-            raise CalibrationError(f"{path}: two cameras are called {camera.name!r}; every camera needs its own name")
-        sections[camera.name] = _section(camera)
-    text = "\n".join(sections.values())
-    part = path.with_name(f"{path.name}.part")
+    """Write cameras so that `read_calibration` gives them back, in metres: TOML as Pose2Sim and Anipose read it, or, where the path is a
+    folder or one of intri.yml and extri.yml, EasyMocap's two files.
+
+    Raises `CalibrationError` where that cannot be.
+    """
+    path, made = Path(path), list(cameras)
+    names = [camera.name for camera in made]
+    for name in names:
+        check_name(name)
+        if names.count(name) > 1:
+            raise CalibrationError(f"{path}: two cameras are called {name!r}; every camera needs its own name")
+    whole = {path: lambda: tables_text(made)}
+    if path.suffix.lower() in SUFFIXES or path.is_dir() or not path.suffix:
+        if path.suffix and path.name not in ("intri.yml", "extri.yml"):
+            raise CalibrationError(f"{path}: expected NAME.toml, or intri.yml or a folder for EasyMocap's two files")
+        folder = path.parent if path.suffix else path
+        whole = {folder / f"{stem}.yml": lambda n=n: easymocap_texts(made)[n] for n, stem in enumerate(("intri", "extri"))}
     try:
-        part.write_text(text, "utf-8")
-        os.replace(part, path)
+        texts = {file: text() for file, text in whole.items()}
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+    try:
+        for file, text in texts.items():
+            if not path.suffix:
+                file.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(file, text)
     except OSError as error:
-        raise CalibrationError(f"{path}: cannot be written ({error.strerror})") from None
+        raise CalibrationError(f"{path}: cannot be written ({reason(error)})") from None
+    except ShadowPuppetError as error:
+        raise CalibrationError(str(error)) from None
 
 
-def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any]:
-    """A TOML file's tables; a file that is missing, too large or no TOML raises `error` in a sentence."""
-    path = Path(path)
-    try:
-        if path.stat().st_size > FILE_LIMIT:
-            raise error(f"{path}: found {path.stat().st_size} bytes, expected a TOML file of at most {FILE_LIMIT}")
-        return tomllib.loads(path.read_text("utf-8-sig"))
-    except OSError as problem:
-        raise error(f"{path}: cannot be read ({(problem.strerror or 'unknown reason').lower()})") from None
-    except UnicodeDecodeError as problem:
-        raise error(f"{path}: found bytes that are no text at position {problem.start}, expected a TOML file") from None
-    except (ValueError, RecursionError) as problem:
-        raise error(f"{path}: not valid TOML: {problem}") from None
+def find_calibration(folder: Path) -> Path | None:
+    """The calibration that lies in a recording folder, or in its folder `calibration`; None where there is none.
+
+    calibration.toml is it, where it is there. Raises `CalibrationError` where there are several.
+    """
+    if (folder / "calibration.toml").exists():
+        return folder / "calibration.toml"
+    for place in (folder, folder / "calibration", folder / "Calibration"):
+        if not place.is_dir():
+            continue
+        files = [path for path in sorted(place.iterdir()) if path.is_file() and path.suffix.lower() in ENDINGS and path.name[0] != "."
+                 and path.name not in OTHERS and is_calibration(path)]
+        whole = {place if _in_pieces(path, files) else path for path in files}
+        if len(whole) > 1:
+            raise CalibrationError(f"{place}: found several calibrations ({choices(path.name for path in files)}); say in recording.toml "
+                                   f"which counts, as calibration = \"{files[0].name}\"")
+        if whole:
+            return whole.pop()
+    return None
 
 
-def _camera(title: str, table: dict[str, Any]) -> Camera:
-    name, fisheye, oriented = table.get("name", title), table.get("fisheye", False), table.get("oriented", True)
-    _check_name(name)
-    for key, value in (("fisheye", fisheye), ("oriented", oriented)):
-        if not isinstance(value, bool):
-            raise CalibrationError(f"{key}: found {value!r}, expected true or false")
-    missing = [key for key in FIELDS if key not in table]
-    if missing:
-        raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}")
-    size, matrix = _numbers(table, "size", [(2,)]), _numbers(table, "matrix", [(3, 3)])
-    distortions = _numbers(table, "distortions")
-    return Camera(name, (size[0], size[1]), matrix, distortions, rigid(_rotation(table), _translation(table)), fisheye, oriented)
+ENDINGS = (".toml", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".pickle", ".pkl")
+"""Of files that may be calibrations, in a folder."""
+OTHERS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml")
+"""Files of such endings that are known to be something else."""
 
 
-def _check_name(name: object) -> None:
-    # A camera's name is that of its film, too.
-    if not isinstance(name, str) or not name.strip(" .") or not name.isprintable() or "/" in name or "\\" in name:
-        raise CalibrationError(f"name: found {name!r}, expected a word that can be a file's name")
-
-
-def _rotation(table: dict[str, Any]) -> Array:
-    rotation = _numbers(table, "rotation", [(3,), (3, 3)])
-    if rotation.shape == (3, 3):
-        return rotation
-    angle = float(np.linalg.norm(rotation))
-    if angle > 2 * math.pi + 1e-6:
-        raise CalibrationError(f"rotation: found a vector of length {angle:g}, expected radians, at most a full turn: "
-                               "are these degrees?")
-    return rotation_from_vector(rotation)
-
-
-def _translation(table: dict[str, Any]) -> Array:
-    translation = _numbers(table, "translation", [(3,)])
-    distance = float(np.linalg.norm(translation))
-    if distance > FARTHEST:
-        raise CalibrationError(f"translation: found {translation.tolist()}, {distance:g} long, expected at most {FARTHEST:g} "
-                               "metres; it is probably in millimetres: divide it by 1000")
-    return translation
-
-
-def _numbers(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
-    """The finite numbers of a field, of one of the `shapes`, or any number of them in a row."""
-    value = table[key]
-    expected = " or ".join(" x ".join(map(str, s)) for s in shapes) + " finite numbers" if shapes else "a row of finite numbers"
-    try:
-        array = np.array(value, float) if _is_numeric(value) else None
-    except (ValueError, OverflowError):  # rows of unequal length, a whole number of 400 digits
-        array = None
-    fits = array is not None and (array.shape in shapes if shapes else array.ndim == 1) and bool(np.isfinite(array).all())
-    if array is None or not fits:
-        raise CalibrationError(f"{key}: found {_short(value)}, expected {expected}")
-    return array
-
-
-def _is_numeric(value: object) -> bool:
-    if isinstance(value, list):
-        return all(map(_is_numeric, value))
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _short(value: object) -> str:
-    text = str(value)
-    return text if len(text) <= 120 else text[:117] + "..."
-
-
-def _section(camera: Camera) -> str:
-    """A camera's section; a value a line, where JSON's spelling of printable words and finite numbers is TOML's, too."""
-    distortions = camera.distortion.tolist()
-    if not camera.fisheye:  # only as many as there are
-        distortions = distortions[: 8 if any(distortions[5:]) else 5 if distortions[4] else 4]
-    values = {"name": camera.name, "size": list(camera.size), "matrix": camera.matrix.tolist(), "distortions": distortions,
-              "rotation": vector_from_rotation(camera.T_camera_world[:3, :3]).tolist(),
-              "translation": camera.T_camera_world[:3, 3].tolist(), "fisheye": camera.fisheye}
-    values |= {} if camera.oriented else {"oriented": False}
-    title = camera.name if re.fullmatch(BARE_KEY, camera.name) else json.dumps(camera.name, ensure_ascii=False)
-    return f"[{title}]\n" + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())
+def _in_pieces(path: Path, files: list[Path]) -> bool:
+    """Whether a file is a part of its folder's calibration, not one alone."""
+    alike = [other for other in files if other.suffix == path.suffix]
+    return pair_of(path) is not None or (len(alike) > 1 and len(alike) == len(files) and path.suffix.lower() in (".cal", *SUFFIXES))

@@ -15,15 +15,15 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
-from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
-from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import read_text, write_whole
 from shadowpuppet.io.c3d import read_c3d
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joint_names import renamed
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.recording import Recording, View
+from shadowpuppet.io.rigs.bouguet import read_cal
 from shadowpuppet.motion import JointTable
 from shadowpuppet.video import open_frames
 
@@ -31,8 +31,6 @@ RATE = 60.0
 """Frames/s of all films."""
 FIRST = 6
 """The first frame that counts: films are valid from it on."""
-CALIBRATION = 22
-"""Numbers of a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
 PARTS = {
     "S1": {"Walking": (590, 1203), "Jog": (367, 740), "ThrowCatch": (473, 945), "Gestures": (395, 801), "Box": (385, 789)},
     "S2": {"Walking": (438, 876), "Jog": (398, 795), "ThrowCatch": (550, 1128), "Gestures": (500, 901), "Box": (382, 734)},
@@ -125,28 +123,6 @@ def write_humaneva(found: HumanEva, folder: str | Path) -> None:
               "video": {name: str(Path(str(view.video)).resolve()) for name, view in named.items()},
               "background": {name: str(view.background.resolve()) for name, view in named.items() if view.background is not None}}
     write_whole(notes, HEAD + tomli_w.dumps({key: value for key, value in values.items() if value}))
-
-
-def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
-    """A camera from a .cal file: numbers of Bouguet's toolbox, `Xc = R X + T` in millimetres. Raises `CalibrationError`."""
-    try:
-        values = np.array(read_text(path).split(), float)
-    except ValueError:
-        values = np.full(1, np.nan)
-    if len(values) < CALIBRATION or not np.isfinite(values).all():
-        raise CalibrationError(f"{path}: expected {CALIBRATION} numbers (fc, cc, alpha, kc, R row by row, T), found something else")
-    fc, cc, alpha, kc, R, T = np.split(values[:CALIBRATION], np.cumsum([2, 2, 1, 5, 9]))
-    skew = abs(float(alpha[0])) * size[1] / 2
-    if skew > 1:
-        raise CalibrationError(f"{path}: alpha: found {alpha[0]:g}, a skew of up to {skew:.4g} pixels, expected none")
-    if skew > 0.01:
-        warn(f"{path}: alpha: found {alpha[0]:g}, a skew, which cameras have not here: left out, up to {skew:.2f} pixels",
-             ShadowPuppetWarning, stacklevel=3)
-    matrix = np.array([[fc[0], 0, cc[0]], [0, fc[1], cc[1]], [0, 0, 1]])
-    try:
-        return Camera(name, size, matrix, kc, rigid(R.reshape(3, 3), T / 1000))
-    except CalibrationError as error:
-        raise CalibrationError(f"{path}: {error}") from None
 
 
 def read_sync(path: Path) -> Sync:

@@ -14,26 +14,39 @@ from shadowpuppet.motion import BONES, JointTable
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
 """Ours."""
 CENTRAL = {
-    "pelvis": ("pelvis", "hips", "midhip", "chip", "spinebase", "hip", "pelo"),
-    "neck": ("neck", "trxo"),
-    "head": ("head", "hedo"),
+    "pelvis": ("pelvis", "hips", "midhip", "chip", "spinebase", "hip", "pelo", "torsodistal"),
+    "neck": ("neck", "trxo", "thorax", "torsoproximal"),
+    "head": ("head", "hedo", "headbase", "headproximal"),
 }
 """Joints without a side and what they are called, in the order of preference; letters and digits only, small.
 
-`pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them; `hips`, `upleg`, `forearm` are
-Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's; `midhip` OpenPose's, `chip` Pose2Sim's.
+`pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them, and `torsodistal`, ... the same in
+its own programs; `hips`, `upleg`, `forearm` are Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's. COCO, HALPE_26 and BODY_25
+call joints as we do, with `midhip` (OpenPose), `chip` (Pose2Sim) or `hip` (HALPE_26) for the pelvis.
 """
 SIDED = {
-    "shoulder": ("arm", "upperarm", "uparm", "shldr", "shoulder", "clo"),  # beside `arm`, `shoulder` is a collar bone's
-    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "huo"),
-    "wrist": ("wrist", "hand", "rao"),
+    "shoulder": ("sjc", "arm", "upperarm", "uparm", "shldr", "shoulder", "clo", "upperarmproximal"),  # beside `arm`, a collar bone's
+    "elbow": ("ejc", "elbow", "forearm", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
+    "wrist": ("wjc", "wrist", "hand", "rao", "lowerarmdistal"),
     "hand": ("handmiddle1", "hand", "fingerbase", "middle1", "hno"),
-    "hip": ("upleg", "upperleg", "thigh", "hip", "fep"),
-    "knee": ("knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo"),
-    "ankle": ("ankle", "foot", "tio"),
+    "hip": ("hjc", "upleg", "upperleg", "thigh", "hip", "fep", "upperlegproximal"),
+    "knee": ("kjc", "knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo", "lowerlegproximal"),
+    "ankle": ("ajc", "ankle", "foot", "tio", "lowerlegdistal"),
 }
-"""The same of those with a side. `hand` is the wrist where nothing else is called that."""
-STEMS = {stem for stems in SIDED.values() for stem in stems}
+"""The same of those with a side. `hand` is the wrist where nothing else is called that; `hjc`, ... are joint centres of OpenSim's."""
+EITHER_SIDE = {
+    "elbow": (("lelbow", "melbow"), ("elbowlat", "elbowmed"), ("lel", "mel")),
+    "wrist": (("lwrist", "mwrist"), ("wristlat", "wristmed"), ("faradius", "faulna")),
+    "knee": (("knee", "mknee"), ("kneelat", "kneemed"), ("lfc", "mfc")),
+    "ankle": (("ankle", "mankle"), ("anklelat", "anklemed"), ("lmal", "mmal")),
+}
+"""Two markers on the skin, outside and inside, between which a joint lies: OpenCap's, OpenSim's Gait2392's and Rajagopal2015's. Where both
+are there they are meant, and not what else is called by the joint's name."""
+STEMS = {stem for stems in SIDED.values() for stem in stems} | {stem for pairs in EITHER_SIDE.values() for pair in pairs for stem in pair}
+SUFFIX = re.compile(r"_study$")
+"""What OpenCap sets behind the markers of its models."""
+HUMANEVA = re.compile(r"^(upper|lower)([LR])(Arm|Leg)(Proximal|Distal)$")
+"""HumanEva's names have the side in the middle."""
 PREFIXES = re.compile(r"^(?:.*[:|]|mixamorig\d*_|bip0*1[ _]|character1_)", re.IGNORECASE)
 """What may stand before a joint's own name: the person's, or the program's."""
 WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
@@ -44,14 +57,15 @@ LETTERS = {"l": "left", "r": "right", "left": "left", "right": "right"}
 def renamed(table: JointTable) -> JointTable:
     """The joints of a table that are ours, by our names and in our order, whatever they are called there.
 
-    `pelvis` is made where it is missing and both hips are there. A head beside a nose is the crown, as 2D detectors have it, and left
-    out. Raises `FormatError` where no joint is known.
+    Between two markers on either side of a joint the middle is it. `pelvis` is made where it is missing and both hips are there. A head
+    beside a nose is the crown, as 2D detectors have it, and left out. Raises `FormatError` where no joint is known.
     """
-    columns = columns_of(table.names)
-    if not columns:
+    columns, pairs = columns_of(table.names), pairs_of(table.names)
+    if not columns and not pairs:
         raise FormatError(f"found no joint of a known name among {shorten(table.names)!r}, expected such as {', '.join(JOINTS[:5])}; or "
                           "LeftArm, LeftForeArm, LeftUpLeg, ...; or LCLO, LHUO, LFEP, ... (Vicon)")
     places = {joint: table.positions[:, column] for joint, column in columns.items()}
+    places |= {joint: table.positions[:, pair].mean(1) for joint, pair in pairs.items()}
     if "pelvis" not in places and {"left_hip", "right_hip"} <= set(places):
         places["pelvis"] = (places["left_hip"] + places["right_hip"]) / 2
     names = tuple(joint for joint in JOINTS if joint in places)
@@ -75,9 +89,26 @@ def columns_of(names: Sequence[str]) -> dict[str, int]:
     return found
 
 
+def pairs_of(names: Sequence[str]) -> dict[str, list[int]]:
+    """For each of our joints that lies between two markers, and is not there by our own name, the indices of both."""
+    stems = {stem: n for n, stem in reversed([*enumerate(map(side_and_stem, names))])}
+    ours = {name.lower() for name in names}
+    found = {}
+    for side in ("left", "right"):
+        for joint, pairs in EITHER_SIDE.items():
+            there = [pair for pair in pairs if {(side, stem) for stem in pair} <= stems.keys()]
+            if there and f"{side}_{joint}" not in ours:
+                found[f"{side}_{joint}"] = [stems[side, stem] for stem in there[0]]
+    return found
+
+
 def side_and_stem(name: str) -> tuple[str, str]:
     """A name's side, `left`, `right` or none, and the rest, small and without signs."""
-    words = [word.lower() for word in WORDS.findall(PREFIXES.sub("", name))]
+    bare = SUFFIX.sub("", PREFIXES.sub("", name))
+    if limb := HUMANEVA.match(bare):
+        level, side, part, end = limb.groups()
+        return LETTERS[side.lower()], f"{level}{part}{end}".lower()
+    words = [word.lower() for word in WORDS.findall(bare)]
     if len(words) > 1 and words[0] in LETTERS:
         return LETTERS[words[0]], "".join(words[1:])
     if len(words) > 1 and words[-1] in LETTERS:

@@ -15,9 +15,11 @@ from shadowpuppet.io.bvh import read_bvh
 from shadowpuppet.io.c3d import read_c3d
 from shadowpuppet.io.joint_names import renamed
 from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.npz import read_npz
+from shadowpuppet.io.parquet import read_parquet
 from shadowpuppet.motion import JointTable
 
-ENDINGS = (".amc", ".bvh", ".c3d", ".csv", ".trc")
+ENDINGS = (".amc", ".bvh", ".c3d", ".csv", ".npz", ".parquet", ".trc")
 """Of the files that are read."""
 AMC_RATE = 120.0
 """Frames/s of files that tell none: the CMU laboratory's."""
@@ -34,22 +36,29 @@ TURNS = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0), (
 """Rotations by which each axis comes to point up."""
 
 
-def read_motion(path: str | Path, rate: float | None = None) -> JointTable:
-    """Joints from a file of motion: .csv or .trc (`read_joints`), .bvh, .c3d, or .amc with its .asf beside it.
+def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None) -> JointTable:
+    """Joints from a file of motion: .csv or .trc (`read_joints`), .bvh, .c3d, .npz, .parquet, or .amc with its .asf beside it.
 
-    Joints have our names, metres, Z up, whatever the file's names, unit and axes are; joints of other names are left out. What the file
-    does not tell, its unit (BVH) or which axis is up, is found from the person's legs and posture, and said as a warning. `rate`:
-    frames/s of an .amc file, which tells none (default 120). Raises `FormatError`, naming the file.
+    Joints have our names, metres, Z up, whatever the file's names, unit and axes are; joints of other names are left out, or all are kept
+    as they are called there (`own_names`). What the file does not tell, its unit (BVH) or which axis is up, is found from the person's legs
+    and posture, and said as a warning. `unit`: metres of a BVH file's unit, where that is known. `rate`: frames/s of an .amc file, which
+    tells none (default 120). Raises `FormatError`, naming the file.
     """
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(ENDINGS)}")
     if ending == ".amc":
-        return _ours(path, read_mocap(path).joints(rate or AMC_RATE))
-    table = read_bvh(path).joints() if ending == ".bvh" else read_c3d(path) if ending == ".c3d" else read_joints(path)
-    table = _ours(path, table)
-    return _upright(path, _in_metres(path, table) if ending == ".bvh" else table)
+        table = read_mocap(path).joints(rate or AMC_RATE)
+        return table if own_names else _ours(path, table)
+    table = read_bvh(path).joints() if ending == ".bvh" else READERS[ending](path)
+    scale, up = 1.0 if ending != ".bvh" else unit_of(path, table) if unit is None else unit, turn_of(path, table)
+    table = table if own_names else _ours(path, table)
+    return replace(table, positions=table.positions * scale @ up.T)
+
+
+READERS = {".c3d": read_c3d, ".csv": read_joints, ".npz": read_npz, ".parquet": read_parquet, ".trc": read_joints}
+"""How files are read that tell their unit."""
 
 
 def _ours(path: Path, table: JointTable) -> JointTable:
@@ -59,14 +68,22 @@ def _ours(path: Path, table: JointTable) -> JointTable:
         raise FormatError(f"{path}: {error}") from None
 
 
-def _in_metres(path: Path, table: JointTable) -> JointTable:
-    """A table in an unknown unit brought to metres by the length of the legs, or arms."""
-    length = leg_length(table)
+def _known(table: JointTable) -> JointTable:
+    """Those joints that are ours, by our names; none where none is."""
+    try:
+        return renamed(table)
+    except ShadowPuppetError:
+        return JointTable(table.times, (), np.empty((len(table.times), 0, 3)))
+
+
+def unit_of(path: Path, table: JointTable) -> float:
+    """Metres of the unknown unit of a table, by the length of the legs, or arms; said as a warning. Raises `FormatError`."""
+    length = leg_length(_known(table))
     for unit, (low, high, metres) in UNITS.items():
         if low <= length < high:
             if metres != 1:
                 warn(f"{path}: BVH files do not tell their unit; legs {length:.4g} long make it {unit}", ShadowPuppetWarning, stacklevel=3)
-            return replace(table, positions=table.positions * metres)
+            return metres
     raise FormatError(f"{path}: found legs {length:.4g} long in an unknown unit, expected a person's in metres, centimetres, millimetres "
                       "or inches")
 
@@ -85,18 +102,18 @@ def leg_length(table: JointTable) -> float:
     return np.nan
 
 
-def _upright(path: Path, table: JointTable) -> JointTable:
-    """The table with Z up, if another axis is: that along which the head is over the legs, for most of the time."""
-    axis = up_axis(table)
+def turn_of(path: Path, table: JointTable) -> Array:
+    """The rotation (3, 3) by which Z comes to point up: along that axis the head is over the legs for most of the time. Warns of one."""
+    axis = up_axis(_known(table))
     if axis not in TURNS:
-        return table
+        return np.eye(3)
     warn(f"{path}: {axis.upper()} points up there; turned so that Z does", ShadowPuppetWarning, stacklevel=3)
-    return replace(table, positions=table.positions @ np.array(TURNS[axis], float).T)
+    return np.array(TURNS[axis], float)
 
 
 def up_axis(table: JointTable) -> str:
     """The axis along which a person is upright, such as `+y`; `+z` where none is clearly."""
-    low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip"), ("neck", "head", "shoulder")))
+    low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip", "pelvis"), ("neck", "head", "shoulder")))
     up = high - low
     lengths = np.linalg.norm(up, axis=1, keepdims=True)
     known = np.isfinite(lengths[:, 0]) & (lengths[:, 0] > 0)

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import io
-import lzma
-import struct
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +10,13 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io._files import reason, write_whole
+from shadowpuppet.io.npz import BROKEN
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.subspaces import Subspaces
 
 FORMAT, VERSION = "shadowpuppet motion prior", 1
 NUMBERS = ("centres", "bases", "variances", "noise", "transitions", "initial", "rate")
 """Arrays of numbers in the file, as `Subspaces` and `MotionPrior` have them; `rate` is not a number where it is not known."""
-
-BROKEN = (EOFError, ValueError, TypeError, KeyError, OverflowError, MemoryError, RuntimeError, SyntaxError, struct.error, zlib.error,
-          lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
-"""What reading raises, beside `OSError`, where an archive is damaged, encrypted or none."""
 
 
 def read_prior(path: str | Path) -> MotionPrior:

@@ -11,7 +11,7 @@ from warnings import warn
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
-from shadowpuppet.io.calibration import read_calibration, read_toml
+from shadowpuppet.io.calibration import UNITS, UPS, find_calibration, read_calibration, read_toml
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
 from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
 
@@ -20,7 +20,7 @@ FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2t
 """Endings of the films that are looked for; one with another ending can be named in recording.toml."""
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
-KEYS = ("subject", "rate", "duration", "calibration", "truth", "training", "start", "video", "background", "masks")
+KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks")
 """Keys of recording.toml."""
 RATES = (0.1, 10_000.0)
 """What can be true, frames/s."""
@@ -115,7 +115,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
     if not films:
         raise RecordingError(f"{folder}: no films in it, expected video/<camera>.mp4, a folder of pictures video/<camera>/, or a "
                              "[video] table in recording.toml")
-    cameras = _cameras(folder, films, fov, calibration or notes.file("calibration") or _first(folder, "calibration", ["toml"]))
+    cameras = _cameras(folder, films, fov, calibration or notes.file("calibration") or find_calibration(folder), notes)
     for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
         _check_names(folder / kind, sources, cameras)
     missing = [c.name for c in cameras if c.name not in films]
@@ -161,6 +161,12 @@ class _Notes:
             expected = expected_metres(value, limits) if unit == "metres" else f"expected {limits[0]:g} to {limits[1]:g} {unit}"
             raise RecordingError(f"{self.path}: {'start.' if table == 'start' else ''}{key}: found {value!r}, {expected}")
         return float(value)
+
+    def choice(self, key: str, known: Iterable[str]) -> str | None:
+        value = self.data.get(key)
+        if value is not None and value not in list(known):
+            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected one of {', '.join(known)}")
+        return value
 
     def file(self, key: str) -> Path | None:
         return self._existing(key, self.data[key]) if key in self.data else None
@@ -210,11 +216,16 @@ def _only(paths: list[Path]) -> Path:
     return paths[0]
 
 
-def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration: Path | None) -> tuple[Camera, ...]:
+def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration: Path | None,
+             notes: _Notes | None = None) -> tuple[Camera, ...]:
     if calibration is not None and fov is not None:
         raise RecordingError(f"{folder}: found a field of view and a calibration ({calibration.name}), expected one of them")
     if calibration is not None:
-        return read_calibration(calibration)
+        def size(name: str) -> tuple[int, int] | None:
+            return open_frames(films[name]).size if name in films and camera_number(films[name]) is None else None
+
+        told = {key: notes.choice(key, known) for key, known in (("unit", UNITS), ("up", UPS))} if notes else {}
+        return read_calibration(calibration, sizes=size, **told)
     if len(films) > 1:
         raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several "
                              "cameras must be calibrated together")

@@ -16,8 +16,6 @@ import contextlib
 import io
 import json
 import platform
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib import metadata
@@ -32,6 +30,7 @@ from shadowpuppet.io._plain import for_json, for_toml, plain
 from shadowpuppet.io._table import Table, cells, csv_line, read_table, shorten
 from shadowpuppet.io.calibration import read_toml
 from shadowpuppet.io.joints import joint_columns, joint_names
+from shadowpuppet.io.npz import BROKEN
 from shadowpuppet.motion import STATUSES, Motion, MotionBuilder, MotionFrame
 
 FILES = ("joints.csv", "angles.csv", "motion.npz", "metrics.json", "overlay.mp4")
@@ -147,7 +146,7 @@ class RunWriter:
                 table.close()
         motion = self._motion.build()
         # What matters most is written first: where the disk is full, it is the rest that is missing.
-        write_whole(self.folder / "motion.npz", _npz(motion))
+        write_whole(self.folder / "motion.npz", motion_bytes(motion))
         counts = {"complete": complete, "frames": len(motion), "status": motion.status_counts}
         write_metrics(self.folder, counts | self.metrics)
         self._write_info(complete)
@@ -207,7 +206,7 @@ def _check_folder(folder: Path) -> bool:
     return True
 
 
-def _npz(motion: Motion) -> bytes:
+def motion_bytes(motion: Motion) -> bytes:
     """The motion's fields as an archive of arrays."""
     out = io.BytesIO()
     np.savez_compressed(out, allow_pickle=False, **{f.name: np.asarray(getattr(motion, f.name)) for f in fields(motion)})
@@ -223,7 +222,7 @@ def _read_npz(path: Path) -> Motion:
             arrays["body_name"] = str(arrays["body_name"])
             return Motion(**arrays)
         problem = f"no array {missing[0]!r}"
-    except (OSError, EOFError, ValueError, TypeError, zlib.error, zipfile.BadZipFile, ShadowPuppetError) as error:
+    except (OSError, *BROKEN, ShadowPuppetError) as error:
         problem = str(error)
     raise FormatError(f"{path}: not a motion ({problem}); without this file the run is read from joints.csv and angles.csv")
 

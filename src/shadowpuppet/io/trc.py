@@ -56,6 +56,7 @@ def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
     decimals = {"mm": 3, "cm": 4, "m": 6}[unit]
     frames = enumerate(zip(table.times.tolist(), scaled.tolist()), 1)
     rows = [[str(n), *cells([time]), *cells(row, decimals)] for n, (time, row) in frames]
+    rows = [row if row[-1] else [*row, ""] for row in rows]  # an empty last cell needs a tab behind it: OpenSim does not count it else
     write_whole(path, "".join("\t".join(line) + "\n" for line in [*head, *rows]))
 
 

@@ -1,0 +1,185 @@
+"""Where nobody is: what silhouettes rule out, which surface points do not tell.
+
+A limb that reaches out of a silhouette has nothing there to be drawn to, and what draws the body to surface points looks the other way.
+Here spheres along the limbs' axes are pushed into the silhouettes, of every camera, along the way that is shortest in its picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array
+from shadowpuppet.kernels import kernel, part
+from shadowpuppet.limbs import Limbs
+from shadowpuppet.masks import Mask
+from shadowpuppet.projection import NEAR, bend_within, make_lens
+
+APART = 0.07
+"""Spheres on a limb's axis are about this far apart, metres."""
+SLIM = 0.7
+"""A sphere's radius over the limb's smaller one: nobody is shaped like their model to the pixel."""
+TAU = 0.1
+"""How far (m) a sphere may reach out until it costs no longer the square."""
+OTHERS = 3
+"""So many others that see somebody at a place outvote a camera that does not: its silhouette may have lost a limb."""
+MARGIN = 24
+"""Pixels around the person to which the way back is looked up; farther out it is that to the nearest of these, and theirs."""
+
+
+class Spheres(NamedTuple):
+    """Spheres in a body's limbs."""
+
+    joints: NDArray[np.int64]
+    """Joint that each is fixed to, of shape (K,)."""
+    places: Array
+    """Middle, joint's frame, metres, of shape (K, 3)."""
+    radii: Array
+    """Metres, of shape (K,)."""
+
+
+class FreeSpace(NamedTuple):
+    """Distances to the silhouettes' outlines in C cameras' pictures, and what is known of these cameras."""
+
+    fields: NDArray[np.float32]
+    """Of all windows, row by row: pixels to the outline, less than 0 inside."""
+    windows: NDArray[np.int64]
+    """First value, left column, top row, width, height of each window, and the picture's size, of shape (C, 7)."""
+    views: Array
+    """World to camera, of shape (C, 3, 4)."""
+    matrices: Array
+    """Of the cameras, of shape (C, 3, 3)."""
+    bends: Array
+    """Distortion, padded (8), whether it is a fisheye's, whether there is any, and how far it holds, of shape (C, 11)."""
+    room: Array
+    """What each camera says of a sphere, of shape (C, 5)."""
+
+
+def spheres_in(limbs: Limbs) -> Spheres:
+    """Spheres along each limb's axis, from its start to its end."""
+    joints, places, radii = [], [], []
+    for s, length in enumerate(limbs.lengths):
+        for share in np.linspace(0, 1, max(2, round(length / APART) + 1)):
+            joints.append(limbs.joints[s])
+            places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
+            radii.append(SLIM * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
+    return Spheres(np.array(joints, np.int64), np.array(places), np.array(radii))
+
+
+def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
+    """Of cameras and what they see of a person, masks (H, W) of their size in which somebody is."""
+    fields, windows, start = [np.zeros(0, np.float32)], [], 0
+    for camera, mask in views:
+        field, left, top = _distances(mask)
+        fields.append(field.ravel())
+        windows.append((start, left, top, field.shape[1], field.shape[0], *camera.size))
+        start += field.size
+    lenses = [make_lens(camera) for camera, _ in views]
+    bends = [[*np.pad(k, (0, 8 - len(k))), fisheye, bent, reach] for _, k, fisheye, bent, reach in lenses]
+    return FreeSpace(
+        np.concatenate(fields),
+        np.array(windows, np.int64).reshape(-1, 7),
+        np.array([camera.T_camera_world[:3] for camera, _ in views], float).reshape(-1, 3, 4),
+        np.array([camera.matrix for camera, _ in views], float).reshape(-1, 3, 3),
+        np.array(bends, float).reshape(-1, 11),
+        np.empty((len(views), 5)),
+    )
+
+
+def _distances(mask: Mask) -> tuple[NDArray[np.float32], int, int]:
+    """Pixels to the outline, less than 0 inside, in a window around a person, and the window's first column and row."""
+    import cv2
+
+    seen = np.ascontiguousarray(mask).view(np.uint8)
+    x, y, width, height = cv2.boundingRect(seen)
+    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
+    seen = seen[top : y + height + MARGIN, left : x + width + MARGIN]
+    outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - seen, seen))
+    return np.asarray(outside - inside, np.float32), left, top
+
+
+@part
+def _look_up(fields, window, x, y):  # pragma: no cover
+    """Distance to the outline at a pixel (x, y), by bilinear interpolation, and its derivatives along x and y."""
+    width, height = window[3], window[4]
+    u, v = x - window[1], y - window[2]
+    a, b = min(max(u, 0.0), width - 1.001), min(max(v, 0.0), height - 1.001)
+    i, j = int(a), int(b)
+    s, t, at = a - i, b - j, window[0] + j * width + i
+    p, q, r, w = fields[at], fields[at + 1], fields[at + width], fields[at + width + 1]
+    distance = (1 - t) * ((1 - s) * p + s * q) + t * ((1 - s) * r + s * w)
+    along, down = (1 - t) * (q - p) + t * (w - r), (1 - s) * (r - p) + s * (w - q)
+    beyond = np.sqrt((u - a) ** 2 + (v - b) ** 2)
+    if beyond > 1:
+        distance, along, down = distance + beyond, (u - a) / beyond, (v - b) / beyond
+    return distance, along, down
+
+
+@part
+def _ask(c, space, p0, p1, p2, radius, said):  # pragma: no cover
+    """What camera c says of a sphere at (p0, p1, p2): how far (m) it reaches out of the silhouette, the same of its middle, and how these
+    grow along the world's axes (3), into said (5,). Whether it has a say: the sphere must be in its picture."""
+    V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
+    said[0], said[1] = -1.0, 0.0
+    z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
+    if z < NEAR:
+        return False
+    u = (V[0, 0] * p0 + V[0, 1] * p1 + V[0, 2] * p2 + V[0, 3]) / z
+    v = (V[1, 0] * p0 + V[1, 1] * p1 + V[1, 2] * p2 + V[1, 3]) / z
+    a, b = bend_within(u, v, lens, lens[8] > 0, lens[10]) if lens[9] > 0 else (u, v)
+    x, y = K[0, 0] * a + K[0, 2], K[1, 1] * b + K[1, 2]
+    if not (0 <= x < window[5] and 0 <= y < window[6]):
+        return False
+    distance, along, down = _look_up(space.fields, window, x, y)
+    ahead = -(along * u + down * v)
+    said[1] = distance * z / np.sqrt(K[0, 0] * K[1, 1])
+    said[0] = said[1] + radius
+    for i in range(3):
+        said[2 + i] = V[0, i] * along + V[1, i] * down + V[2, i] * ahead
+    return True
+
+
+@kernel
+def push_inside(T, spheres, space, weight, origin, sums, adding):  # pragma: no cover
+    """What it costs that spheres under transforms T (J, 3, 4) reach out of silhouettes: `weight` times the squared distances (m^2), beyond
+    `TAU` the distances; where `adding`, what that says of the parts' motion is added to sums (J, >= 27) (see `refinement`)."""
+    cameras = space.windows.shape[0]
+    if cameras == 0:
+        return 0.0
+    total, share = 0.0, weight / (spheres.radii.size * cameras)
+    for k in range(spheres.radii.size):
+        joint, place, own = T[spheres.joints[k]], spheres.places[k], sums[spheres.joints[k]]
+        p0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3]
+        p1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3]
+        p2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3]
+        inside = outside = 0
+        for c in range(cameras):
+            if _ask(c, space, p0, p1, p2, spheres.radii[k], space.room[c]):
+                outside += space.room[c, 1] > 0
+                inside += space.room[c, 1] <= 0
+        outvoted = outside == 1 and inside >= OTHERS
+        for c in range(cameras):
+            said = space.room[c]
+            if said[0] <= 0 or (outvoted and said[1] > 0):
+                continue
+            fade = min(1.0, TAU / said[0])
+            total += share * (said[0] ** 2 if fade == 1 else TAU * (2 * said[0] - TAU))
+            if adding:
+                _add(-said[2], -said[3], -said[4], p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, said[0], own)
+    return total
+
+
+@part
+def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
+    """Add to a joint's sums that a point x has to go a distance along n, as `refinement` does for surface points."""
+    row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
+    at = 0
+    for i in range(6):
+        for j in range(i, 6):
+            own[at] += weight * row[i] * row[j]
+            at += 1
+        own[21 + i] += weight * row[i] * distance

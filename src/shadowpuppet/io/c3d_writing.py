@@ -1,0 +1,141 @@
+"""C3D files written: points as floats with residuals, and angles as analog channels; `c3d.py` has the reading."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from warnings import warn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.clips import resampled
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.geometry import Array
+from shadowpuppet.io._files import write_whole
+from shadowpuppet.io._table import shorten
+from shadowpuppet.io.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
+from shadowpuppet.motion import JointTable
+from shadowpuppet.steady import steady
+
+MM = 1000.0
+"""The file's unit: millimetres of a metre."""
+MOST_BLOCKS, MOST_NAMES, LONGEST = 255, 255, 120
+"""What the format's bytes can count: blocks of parameters, names in a list, letters of one."""
+UNSEEN = -1.0
+"""The residual of a place that is not known."""
+Parameter = tuple[str, int, Sequence[int], bytes]
+"""Name, kind, shape and value."""
+Angles = Mapping[str, tuple[str, Array]]
+"""Names to units and values (T,)."""
+
+
+def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None) -> None:
+    """Write joints as points in millimetres, axes as they stand, and `angles` as analog channels, one value a frame.
+
+    spread: standard deviations (T, J), metres, as the points' residuals, whole millimetres; left out or not a number: 0. An unknown place
+    has the residual -1, as the format wants it. angles: not a number where unknown. Times become frames at one rate: missing ones are
+    unknown; where frames do not come at a constant rate they are found anew, which is said as a warning.
+    Raises `ShadowPuppetError` where there is no frame, a name is too long, or the file cannot be written.
+    """
+    path, angles = Path(path), angles or {}
+    bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= LONGEST]
+    if bad or not table.names:
+        raise ShadowPuppetError(f"{path}: found the name {shorten(bad, 60)!r}, expected points with names of at most {LONGEST} letters")
+    deviations = np.full(table.positions.shape[:2], np.nan) if spread is None else spread
+    count, points = len(table.times), len(table.names)
+    columns = [table.positions.reshape(count, 3 * points), deviations, *(values[:, None] for _, values in angles.values())]
+    rate, columns = _in_step(path, table.times, np.concatenate(columns, 1))
+    count = len(columns)
+    places, deviations, analog = np.split(columns, [3 * points, 4 * points], 1)
+    data = np.concatenate([_points(places.reshape(count, points, 3), deviations).reshape(count, -1), analog], 1).astype("<f4")
+    blocks, section = 0, b""
+    while True:  # where the data begins depends on how long that is told
+        section = _section(_groups(table.names, angles, rate, count, 2 + blocks), blocks)
+        if len(section) <= blocks * BYTES:
+            break
+        blocks = -(-len(section) // BYTES)
+    if blocks > MOST_BLOCKS:
+        raise ShadowPuppetError(f"{path}: found {points} points, whose names need more than this format holds ({MOST_BLOCKS} blocks)")
+    head = _header(points, len(angles), count, 2 + blocks, rate)
+    write_whole(path, head + section.ljust(blocks * BYTES, b"\0") + data.tobytes() + b"\0" * (-data.nbytes % BYTES))
+
+
+def _in_step(path: Path, times: Array, values: Array) -> tuple[float, Array]:
+    """Frames/s, and values (K, C) of values (T, C) there."""
+    try:
+        grid = steady(times)
+    except ShadowPuppetError as error:
+        raise ShadowPuppetError(f"{path}: {error}") from None
+    if grid.frames is not None:
+        return grid.rate, np.where((grid.frames >= 0)[:, None], values[np.maximum(grid.frames, 0)], np.nan)
+    warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were found anew at {grid.rate:g} frames/s",
+         ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+    return grid.rate, resampled(times, values, grid.rate)[1]
+
+
+def _points(places: Array, deviations: Array) -> Array:
+    """Points (T, J, 4) in the file's unit, with their residuals."""
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(2))
+    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), 255)), 0.0)
+    return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNSEEN)[..., None]], 2)
+
+
+def _header(points: int, analog: int, count: int, start: int, rate: float) -> bytes:
+    last = min(count, 0xFFFF)
+    head = struct.pack("<2B5HfHHf", 2, KEY, points, analog, 1, last, 0, -1.0, start, 1 if analog else 0, rate)
+    return head.ljust(BYTES, b"\0")
+
+
+def _groups(names: Sequence[str], angles: Angles, rate: float, count: int, start: int) -> dict[str, list[Parameter]]:
+    end = (count & 0xFFFF, count >> 16)
+    point = [_whole("USED", len(names)), _whole("FRAMES", min(count, 0xFFFF)), _whole("DATA_START", start), _real("SCALE", -1.0),
+             _real("RATE", rate), _real("LONG_FRAMES", count), *_words("LABELS", names), *_words("DESCRIPTIONS", [" "] * len(names)),
+             _word("UNITS", "mm"), _word("X_SCREEN", "+X"), _word("Y_SCREEN", "+Z")]  # fmt: skip
+    used = len(angles)
+    analog = [_whole("USED", used), _real("RATE", rate), _real("GEN_SCALE", 1.0), _word("FORMAT", "SIGNED"), _whole("BITS", 16)]
+    if used:
+        units = [unit for unit, _ in angles.values()]
+        analog += [*_words("LABELS", tuple(angles)), *_words("DESCRIPTIONS", [" "] * used), *_words("UNITS", units),
+                   ("SCALE", FLOAT, (used,), np.ones(used, "<f4").tobytes()), ("OFFSET", INT, (used,), np.zeros(used, "<i2").tobytes())]
+    trial = [("ACTUAL_START_FIELD", INT, (2,), struct.pack("<2H", 1, 0)), ("ACTUAL_END_FIELD", INT, (2,), struct.pack("<2H", *end)),
+             _real("CAMERA_RATE", rate)]
+    return {"POINT": point, "ANALOG": analog, "TRIAL": trial, "MANUFACTURER": [_word("SOFTWARE", "shadowpuppet")]}
+
+
+def _whole(name: str, value: int) -> Parameter:
+    return name, INT, (), struct.pack("<H", value)
+
+
+def _real(name: str, value: float) -> Parameter:
+    return name, FLOAT, (), struct.pack("<f", value)
+
+
+def _word(name: str, word: str) -> Parameter:
+    return name, CHAR, (len(word),), word.encode()
+
+
+def _words(name: str, words: Sequence[str]) -> list[Parameter]:
+    """A list of words; what is more than it can hold goes into NAME2, NAME3, ..."""
+    parts = [[word.encode() for word in words[n : n + MOST_NAMES]] for n in range(0, len(words), MOST_NAMES)]
+    widths = [max(map(len, part)) for part in parts]
+    return [(f"{name}{n if n > 1 else ''}", CHAR, (width, len(part)), b"".join(word.ljust(width) for word in part))
+            for n, (part, width) in enumerate(zip(parts, widths), 1)]  # fmt: skip
+
+
+def _section(groups: Mapping[str, Sequence[Parameter]], blocks: int) -> bytes:
+    """The section of parameters, without what fills its last block."""
+    records = list[bytes]()
+    for n, (group, parameters) in enumerate(groups.items(), 1):
+        records.append(_record(group, -n, b"\0"))
+        for name, kind, shape, value in parameters:
+            records.append(_record(name, n, struct.pack("<bB", kind, len(shape)) + bytes(shape) + value + b"\0"))
+    return bytes([1, KEY, blocks & 0xFF, INTEL]) + b"".join(records) + b"\0\0"
+
+
+def _record(name: str, group: int, content: bytes) -> bytes:
+    """A group or parameter, with the distance to the next: from where that stands."""
+    return struct.pack("<2b", len(name), group) + name.encode() + struct.pack("<H", 2 + len(content)) + content
+
+

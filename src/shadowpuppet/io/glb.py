@@ -1,0 +1,169 @@
+"""glTF 2.0 animations written as one binary file (GLB): a skinned puppet that moves, for Blender, game engines and browsers."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+from warnings import warn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.animation import Y_UP, Animation
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.geometry import Array
+from shadowpuppet.io._files import write_whole
+from shadowpuppet.puppet_mesh import Mesh
+
+FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
+"""Kinds of numbers in buffers."""
+POINTS, INDICES = 34962, 34963
+"""What a buffer is for: corners, or triangles."""
+WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+TURN = 1e-7
+"""A joint whose rotations differ by no more than this is not animated."""
+
+
+def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
+    """Write a skinned mesh and its animation: metres, Y up, times from 0.
+
+    Frames that are not known have no keys: there the puppet has no size, so that it is not to be seen, and `extras.unknown` of the
+    animation lists them as pairs of seconds, from and to. That is said as a warning. Raises `ShadowPuppetError` where no frame is known or
+    the file cannot be written.
+    """
+    path, known = Path(path), np.flatnonzero(animation.known)
+    if not len(known):
+        raise ShadowPuppetError(f"{path}: found no frame in which the whole skeleton is known, expected one at least")
+    gaps = len(animation.times) - len(known)
+    if gaps:
+        told = f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them"
+        warn(told, ShadowPuppetWarning, stacklevel=2)
+    buffer = _Buffer()
+    primitive = _primitive(buffer, mesh)
+    skin = buffer.add(_inverse_bind(animation), "MAT4", FLOAT)
+    motion = _motion(buffer, animation, known)
+    joints = _nodes(animation, int(known[0]))
+    content = {
+        "asset": {"version": "2.0", "generator": "shadowpuppet"},
+        "scene": 0, "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"name": "puppet", "mesh": 0, "skin": 0}, *joints],
+        "meshes": [{"name": "puppet", "primitives": [primitive]}],
+        "skins": [{"inverseBindMatrices": skin, "skeleton": 1, "joints": list(range(1, 1 + len(joints)))}],
+        "materials": [{"name": "puppet", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.8},
+                       "doubleSided": mesh.two_sided}],
+        "animations": [motion],
+        "accessors": buffer.accessors, "bufferViews": buffer.views, "buffers": [{"byteLength": len(buffer.data)}],
+    }  # fmt: skip
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(buffer.data), b"BIN\0") + bytes(buffer.data)
+    write_whole(path, struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+
+
+class _Buffer:
+    """Arrays one after another, each with the accessor that finds it."""
+
+    def __init__(self) -> None:
+        self.data, self.views, self.accessors = bytearray(), list[dict[str, Any]](), list[dict[str, Any]]()
+
+    def add(self, values: NDArray, kind: str, number: int, bounds: bool = False, target: int | None = None) -> int:
+        """Append values (N, width of `kind`); returns their accessor. `bounds`: tell the least and the greatest."""
+        dtype = {FLOAT: "<f4", BYTE: "u1", SHORT: "<u2", INT: "<u4"}[number]
+        flat = np.ascontiguousarray(values).astype(dtype).reshape(-1, WIDTHS[kind])
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": flat.nbytes}
+        self.views.append(view | ({"target": target} if target else {}))
+        accessor: dict[str, Any] = {"bufferView": len(self.views) - 1, "componentType": number, "count": len(flat), "type": kind}
+        if bounds:
+            accessor |= {"min": flat.min(0).tolist(), "max": flat.max(0).tolist()}
+        self.accessors.append(accessor)
+        self.data += flat.tobytes() + b"\0" * (-flat.nbytes % 4)
+        return len(self.accessors) - 1
+
+
+def _primitive(buffer: _Buffer, mesh: Mesh) -> dict[str, Any]:
+    """The mesh: every point is carried by one joint alone."""
+    joints = np.stack([mesh.joints, *[np.zeros_like(mesh.joints)] * 3], 1)
+    attributes = {
+        "POSITION": buffer.add(mesh.points, "VEC3", FLOAT, bounds=True, target=POINTS),
+        "NORMAL": buffer.add(mesh.normals, "VEC3", FLOAT, target=POINTS),
+        "COLOR_0": buffer.add(mesh.colours, "VEC3", FLOAT, target=POINTS),
+        "JOINTS_0": buffer.add(joints, "VEC4", BYTE if mesh.joints.max() < 256 else SHORT, target=POINTS),
+        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(joints), 1)), "VEC4", FLOAT, target=POINTS),
+    }
+    triangles = buffer.add(mesh.triangles, "SCALAR", INT if len(mesh.points) > 0xFFFF else SHORT, target=INDICES)
+    return {"attributes": attributes, "indices": triangles, "material": 0}
+
+
+def _inverse_bind(animation: Animation) -> Array:
+    """From the mesh at rest to each joint's axes (J, 4, 4), column after column."""
+    matrices = np.tile(np.eye(4), (len(animation.names), 1, 1))
+    matrices[:, :3, 3] = -animation.rest
+    return np.swapaxes(matrices, 1, 2)
+
+
+def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
+    """A node a joint, as it is in a frame, so that viewers that show no motion show a posture."""
+    shifts = _shifts(animation)
+    nodes = []
+    for j, name in enumerate(animation.names):
+        turns = quaternions(_turns(animation, j)[[frame]])[0]
+        node: dict[str, Any] = {"name": name, "translation": shifts[frame, j].tolist(), "rotation": turns.tolist()}
+        children = [child + 1 for child, parent in enumerate(animation.parents) if parent == j]
+        nodes.append(node | ({"children": children} if children else {}))
+    return nodes
+
+
+def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> dict[str, Any]:
+    """Samplers and channels: rotations of joints that turn, places of those that move, and the size 0 where nothing is known."""
+    times = animation.times - animation.times[0]
+    keys, shifts = buffer.add(times[known], "SCALAR", FLOAT, bounds=True), _shifts(animation)[known]
+    samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()
+
+    def animate(joint: int, path: str, values: Array, at: int = keys, how: str = "LINEAR") -> None:
+        output = buffer.add(values, "VEC4" if path == "rotation" else "VEC3", FLOAT)
+        samplers.append({"input": at, "output": output, "interpolation": how})
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": joint + 1, "path": path}})
+
+    for j in range(len(animation.names)):
+        turns = _turns(animation, j)[known]
+        if j == 0 or j in animation.moving:
+            animate(j, "translation", shifts[:, j])
+        if j == 0 or np.abs(turns - np.eye(3)).max() > TURN:
+            animate(j, "rotation", quaternions(turns))
+    gaps = _gaps(animation)
+    if gaps:
+        changes = np.flatnonzero(np.diff(animation.known.astype(int), prepend=-1))
+        at = buffer.add(times[changes], "SCALAR", FLOAT, bounds=True)
+        animate(0, "scale", np.repeat(animation.known[changes, None].astype(float), 3, 1), at, "STEP")
+    found: dict[str, Any] = {"name": "motion", "samplers": samplers, "channels": channels}
+    return found | ({"extras": {"unknown": gaps}} if gaps else {})
+
+
+def _gaps(animation: Animation) -> list[list[float]]:
+    """Seconds from which and to which nothing is known: from the first such frame to the next known one, or the last."""
+    times, edges = animation.times - animation.times[0], np.diff((~animation.known).astype(int), prepend=0, append=0)
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return [[float(times[start]), float(times[min(end, len(times) - 1)])] for start, end in zip(starts, ends)]
+
+
+def _turns(animation: Animation, joint: int) -> Array:
+    """Rotations (T, 3, 3) of a joint in the file's world."""
+    return animation.rotations[:, joint] if joint else Y_UP @ animation.rotations[:, 0]
+
+
+def _shifts(animation: Animation) -> Array:
+    shifts = animation.shifts.copy()
+    shifts[:, 0] = shifts[:, 0] @ Y_UP.T
+    return shifts
+
+
+def quaternions(rotations: Array) -> Array:
+    """Unit quaternions x, y, z, w (T, 4) of rotations (T, 3, 3), each on the side of the one before, so that none goes the long way."""
+    from scipy.spatial.transform import Rotation
+
+    found = Rotation.from_matrix(rotations).as_quat()
+    flips = np.cumprod(np.where((found[1:] * found[:-1]).sum(1) < 0, -1.0, 1.0))
+    found[1:] *= flips[:, None]
+    return found

@@ -1,0 +1,66 @@
+"""Parquet files (Apache): tables of columns, with the extra `formats`, which installs pyarrow."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.io._files import write_whole
+from shadowpuppet.io._table import Table, shorten
+from shadowpuppet.io.joints import joint_columns, joint_names
+from shadowpuppet.io.motion_table import Columns
+from shadowpuppet.motion import JointTable
+
+TOLD = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up; radians"}
+"""Metadata of a file."""
+
+
+def write_parquet(path: str | Path, columns: Columns) -> None:
+    """Write columns; null where not a number. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
+    arrow, parquet = _arrow(path)
+    values = {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()}
+    arrays = {name: arrow.array(column, from_pandas=True) for name, column in values.items()}
+    out = io.BytesIO()
+    parquet.write_table(arrow.table(arrays).replace_schema_metadata(TOLD), out)
+    write_whole(Path(path), out.getvalue())
+
+
+def read_parquet(path: str | Path) -> JointTable:
+    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; other columns are skipped, nulls are unknown places.
+
+    Raises `FormatError` where the file is malformed; `ShadowPuppetError` where pyarrow is missing.
+    """
+    path = Path(path)
+    arrow, parquet = _arrow(path)
+    try:
+        with path.open("rb") as file:
+            source = parquet.ParquetFile(file)
+            columns = tuple(source.schema_arrow.names)
+            if "time" not in columns:
+                raise FormatError(f"{path}: no column 'time'; columns there: {shorten(columns)}")
+            names = joint_names(Table(path, columns, [], []))
+            wanted = ["time", *joint_columns(names)]
+            table = source.read(wanted)
+            values = np.stack([table.column(name).cast(arrow.float64()).to_numpy() for name in wanted], 1)
+    except FormatError:
+        raise
+    except (OSError, arrow.ArrowException, ValueError, KeyError) as error:
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise FormatError(f"{path}: no Parquet table of joints ({shorten([first])})") from None
+    try:
+        return JointTable(values[:, 0], names, values[:, 1:].reshape(len(values), len(names), 3))
+    except ShadowPuppetError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def _arrow(path: str | Path) -> tuple[ModuleType, ModuleType]:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ShadowPuppetError(f"{path}: Parquet needs pyarrow, which is not installed: pip install 'shadowpuppet[formats]'") from None
+    return pyarrow, pyarrow.parquet

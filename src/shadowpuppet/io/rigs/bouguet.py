@@ -1,0 +1,53 @@
+"""HumanEva's calibrations (.cal): the numbers of Bouguet's toolbox, `Xc = R X + T` in millimetres, one camera a file; no sizes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from warnings import warn
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import CalibrationError, ShadowPuppetWarning
+from shadowpuppet.geometry import rigid
+from shadowpuppet.io.rigs.draft import Draft, Found, text_of
+
+CALIBRATION = 22
+"""Numbers of a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
+HIGHEST = 480
+"""Rows of HumanEva's pictures; by how many pixels a skew leans over half of so many is told where the size is not known."""
+
+
+def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
+    """A camera from a .cal file. Raises `CalibrationError`."""
+    draft = draft_of(path, name, size)
+    assert draft.T is not None
+    try:
+        return Camera(name, size, np.array(draft.matrix), np.array(draft.distortion), rigid(draft.T[:3, :3], draft.T[:3, 3] / 1000))
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+
+
+def read_bouguet(path: Path) -> Found:
+    """The camera of a .cal file, or of all in a folder, named by the files. Raises `CalibrationError`."""
+    files = sorted(path.glob("*.cal")) if path.is_dir() else [path]
+    return Found(tuple(draft_of(file, file.stem) for file in files), "mm")
+
+
+def draft_of(path: Path, name: str, size: tuple[int, int] | None = None) -> Draft:
+    """A .cal file's camera."""
+    try:
+        values = np.array(text_of(path).split(), float)
+    except ValueError:
+        values = np.full(1, np.nan)
+    if len(values) < CALIBRATION or not np.isfinite(values).all():
+        raise CalibrationError(f"{path}: expected {CALIBRATION} numbers (fc, cc, alpha, kc, R row by row, T), found something else")
+    fc, cc, alpha, kc, R, T = np.split(values[:CALIBRATION], np.cumsum([2, 2, 1, 5, 9]))
+    skew = abs(float(alpha[0])) * (size[1] if size is not None else HIGHEST) / 2
+    if skew > 1:
+        raise CalibrationError(f"{path}: alpha: found {alpha[0]:g}, a skew of up to {skew:.4g} pixels, expected none")
+    if skew > 0.01:
+        warn(f"{path}: alpha: found {alpha[0]:g}, a skew, which cameras have not here: left out, up to {skew:.2f} pixels",
+             ShadowPuppetWarning, stacklevel=3)
+    matrix = np.array([[fc[0], 0, cc[0]], [0, fc[1], cc[1]], [0, 0, 1]])
+    return Draft(name, matrix, kc, rigid(R.reshape(3, 3), T), size)

@@ -1,0 +1,50 @@
+"""Qualisys' calibrations (.qca.txt), as QTM exports them: XML.
+
+Positions are in millimetres, `r11` to `r33` turn the world to the camera's axes, which are x right, y up and z backward: y and z are
+turned round. Focal lengths and the principal point are in 64ths of a pixel of the whole sensor, `fov_video` says which part of it is
+the film. Distortion is of the undistorted place over the focal length, as OpenCV's; Pose2Sim (0.10) divides it by 64 too, after which
+a Miqus camera would have none: here it is taken as it stands.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import rigid
+from shadowpuppet.io.rigs.draft import Draft, Found
+from shadowpuppet.io.rigs.markup import Entry, entries, tree_of
+
+SUBPIXELS = 64
+BACKWARD = np.diag([1.0, -1.0, -1.0])
+"""From axes of which z is backward and y up."""
+
+
+def read_qualisys(path: Path) -> Found:
+    """Cameras of a .qca.txt file; where some are video cameras, these. Raises `CalibrationError`."""
+    cameras = [entry for entry in entries(path, tree_of(path), ".//cameras/camera", "serial") if entry.element.get("active", "1") != "0"]
+    films = [entry for entry in cameras if "video" in entry.element.get("model", "").lower()]
+    used = films or cameras
+    if not used:
+        raise CalibrationError(f"{path}: no active camera in it, expected <cameras> with a <camera> each")
+    left_out = [entry.camera for entry in cameras if entry not in used]
+    notes = [f"cameras for markers are left out: {', '.join(left_out)}"] if left_out else []
+    turned = [entry.camera for entry in used if entry.element.get("viewrotation", "0") not in ("0", "")]
+    if turned:
+        notes.append(f"the view of {', '.join(turned)} was turned in QTM: films must have been exported without turning")
+    return Found(tuple(map(_draft, used)), "mm", tuple(notes))
+
+
+def _draft(entry: Entry) -> Draft:
+    view, lens, place = entry.child("fov_video"), entry.child("intrinsic"), entry.child("transform")
+    left, top, right, bottom = (view.number(key) for key in ("left", "top", "right", "bottom"))
+    fu, fv, cu, cv = (lens.number(key) / SUBPIXELS for key in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV"))
+    radial = [lens.number(f"radialDistortion{n}", "0") for n in (1, 2, 3)]
+    tangential = [lens.number(f"tangentalDistortion{n}", "0") for n in (1, 2)]  # sic
+    R = BACKWARD @ np.array([[place.number(f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
+    centre = np.array([place.number(axis) for axis in "xyz"])
+    return Draft(name=entry.camera, matrix=[[fu, 0, cu - left], [0, fv, cv - top], [0, 0, 1]],
+                 distortion=[*radial[:2], *tangential, radial[2]], T=rigid(R, -R @ centre),
+                 size=(right - left + 1, bottom - top + 1))

@@ -1,0 +1,157 @@
+"""Calibrations in TOML: the schema that Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export share, and Caliscope's own.
+
+A section a camera: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to camera, or a
+3 x 3 matrix), `translation`, `fisheye`. Caliscope's own file (camera_array.toml) has its sections below `cameras`, by number.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import CalibrationError, choices
+from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
+from shadowpuppet.io._toml import read_toml
+from shadowpuppet.io.rigs.draft import Draft, Found
+
+FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
+"""What a camera's section must have; `name` is the section's own where it is missing, `fisheye` false."""
+BARE_KEY = r"[A-Za-z0-9_-]+"
+"""Section titles that TOML takes without quotes."""
+SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
+"""Sizes of a board's squares by which the unit is known; FreeMoCap writes down what its user gave."""
+
+
+def read_tables(path: Path) -> Found:
+    """Cameras of a TOML file. Raises `CalibrationError` with the section and field where something is missing or cannot be."""
+    data = read_toml(path, CalibrationError)
+    nested = data.get("cameras")
+    if isinstance(nested, dict) and nested and all(isinstance(table, dict) for table in nested.values()):
+        return _caliscope(path, nested)
+    sections = {title: table for title, table in data.items() if isinstance(table, dict) and any(key in table for key in FIELDS)}
+    if not sections:
+        raise CalibrationError(f"{path}: no camera in it, expected a section for each, such as [cam1], with {', '.join(FIELDS)}")
+    unit, notes = _freemocap(data.get("metadata"))
+    return Found(tuple(_draft(path, title, table, table.get("name", title)) for title, table in sections.items()), unit, notes)
+
+
+def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Found:
+    """Those that are placed and not set aside, by the names of Caliscope's films and export, cam_0, cam_1, ..."""
+    def name(number: str, table: dict[str, Any]) -> str:
+        return table.get("name") or (f"port_{number}" if "port" in table and "cam_id" not in table else f"cam_{number}")
+
+    aside = [number for number, table in cameras.items() if table.get("ignore") is True]
+    bare = [number for number, table in cameras.items() if number not in aside and not {"rotation", "translation"} <= set(table)]
+    used = {number: table for number, table in cameras.items() if number not in aside + bare}
+    if not used:
+        raise CalibrationError(f"{path}: found {len(cameras)} cameras, none with a rotation and translation: Caliscope has calibrated "
+                               "lenses only; finish its extrinsic calibration")
+    notes = [f"{why}, left out: {choices(map(str, numbers))}" for why, numbers in (("set aside in Caliscope", aside), ("not placed", bare))
+             if numbers]
+    drafts = [_draft(path, f"cameras.{number}", table, name(number, table)) for number, table in used.items()]
+    return Found(tuple(drafts), None, tuple(notes))
+
+
+def _freemocap(metadata: object) -> tuple[str | None, tuple[str, ...]]:
+    """The unit that FreeMoCap's notes of its board tell."""
+    square = metadata.get("charuco_square_size") if isinstance(metadata, dict) else None
+    if not isinstance(square, (int, float)) or isinstance(square, bool):
+        return None, ()
+    for unit, (least, most) in SQUARES.items():
+        if least <= square <= most:
+            return unit, (f"FreeMoCap's, with squares of {square:g} {unit}",)
+    return None, (f"FreeMoCap's, with squares of {square:g}: in which unit, it does not say",)
+
+
+def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft:
+    try:
+        check_name(name)
+        missing = [key for key in FIELDS if key not in table]
+        for key in ("fisheye", "oriented"):
+            if not isinstance(table.get(key, True), bool):
+                raise CalibrationError(f"{key}: found {table[key]!r}, expected true or false")
+        if missing:
+            raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}")
+        size, matrix = _numbers(table, "size", [(2,)]), _numbers(table, "matrix", [(3, 3)])
+        T = rigid(_rotation(table), _flat(table, "translation", [(3,)]))
+        return Draft(str(name), matrix, _flat(table, "distortions"), T, size.tolist(), table.get("fisheye", False),
+                     table.get("oriented", True), f"[{title}]: ")
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: [{title}]: {error}") from None
+
+
+def check_name(name: object) -> None:
+    """Raise `CalibrationError` for what cannot be a camera's name, which is that of its film, too."""
+    if not isinstance(name, str) or not name.strip(" .") or not name.isprintable() or "/" in name or "\\" in name:
+        raise CalibrationError(f"name: found {_short(repr(name))}, expected a word that can be a file's name")
+
+
+def _rotation(table: dict[str, Any]) -> Array:
+    rotation = _flat(table, "rotation", [(3,), (3, 3)])
+    if rotation.shape == (3, 3):
+        return rotation
+    angle = float(np.linalg.norm(rotation))
+    if angle > 2 * math.pi + 1e-6:
+        raise CalibrationError(f"rotation: found a vector of length {angle:g}, expected radians, at most a full turn: "
+                               "are these degrees?")
+    return rotation_from_vector(rotation)
+
+
+def _flat(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
+    """As `_numbers`; a row in a list, or a column, is as good: OpenCV gives such."""
+    value = table[key]
+    if isinstance(value, list) and len(value) == 1 and isinstance(value[0], list):
+        value = value[0]
+    elif isinstance(value, list) and value and all(isinstance(row, list) and len(row) == 1 for row in value):
+        value = [row[0] for row in value]
+    return _numbers({key: value}, key, shapes)
+
+
+def _numbers(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
+    """The finite numbers of a field, of one of the `shapes`, or any number of them in a row."""
+    value = table[key]
+    expected = " or ".join(" x ".join(map(str, s)) for s in shapes) + " finite numbers" if shapes else "a row of finite numbers"
+    try:
+        array = np.array(value, float) if _is_numeric(value) else None
+    except (ValueError, OverflowError):  # rows of unequal length, a whole number of 400 digits
+        array = None
+    fits = array is not None and (array.shape in shapes if shapes else array.ndim == 1) and bool(np.isfinite(array).all())
+    if array is None or not fits:
+        raise CalibrationError(f"{key}: found {_short(value)}, expected {expected}")
+    return array
+
+
+def _is_numeric(value: object) -> bool:
+    if isinstance(value, list):
+        return all(map(_is_numeric, value))
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= 120 else text[:117] + "..."
+
+
+def tables_text(cameras: Iterable[Camera]) -> str:
+    """A TOML file that `read_tables`, Pose2Sim and Anipose read; metres."""
+    return "\n".join(map(_section, cameras))
+
+
+def _section(camera: Camera) -> str:
+    """A camera's section; a value a line, where JSON's spelling of printable words and finite numbers is TOML's, too."""
+    distortions = camera.distortion.tolist()
+    if not camera.fisheye:  # only as many as there are
+        distortions = distortions[: 8 if any(distortions[5:]) else 5 if distortions[4] else 4]
+    values = {"name": camera.name, "size": list(camera.size), "matrix": camera.matrix.tolist(), "distortions": distortions,
+              "rotation": vector_from_rotation(camera.T_camera_world[:3, :3]).tolist(),
+              "translation": camera.T_camera_world[:3, 3].tolist(), "fisheye": camera.fisheye}
+    values |= {} if camera.oriented else {"oriented": False}
+    title = camera.name if re.fullmatch(BARE_KEY, camera.name) else json.dumps(camera.name, ensure_ascii=False)
+    return f"[{title}]\n" + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())

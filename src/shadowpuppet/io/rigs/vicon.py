@@ -1,0 +1,103 @@
+"""Vicon's calibrations (.xcp), of Nexus, Shogun and Blade: XML.
+
+`POSITION` is the camera's place in millimetres, `ORIENTATION` the quaternion (x y z w) that turns the world to the camera's axes, which
+are OpenCV's. Vicon goes from the seen pixel to the straight one, by 1 + k1 r^2 + k2 r^4 + k3 r^6 with r in pixels from a centre of
+distortion; OpenCV goes the other way. So OpenCV's coefficients are fitted to it over the whole picture, by least squares.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.io.rigs.draft import Draft, Found, numbers_of
+from shadowpuppet.io.rigs.markup import Entry, entries, tree_of
+
+GRID = 33
+"""Pixels to a side at which distortion is compared."""
+ABSURD = 5.0
+"""Relative displacement at the picture's corner by k1 r^2 with r in pixels: beyond, r is over the focal length."""
+OFF = 0.5
+"""Pixels by which the fitted distortion may be off without a note."""
+
+
+class Bend(NamedTuple):
+    """Vicon's distortion."""
+
+    centre: Array
+    """Pixels (2,)."""
+    k: Array
+    """Of r^2, r^4, r^6 (3,), r in pixels."""
+
+
+def read_vicon(path: Path) -> Found:
+    """Cameras of an .xcp file; where some are video cameras, these. Raises `CalibrationError`."""
+    cameras = list(entries(path, tree_of(path), ".//Camera", "DEVICEID"))
+    used = [entry for entry in cameras if "video" in entry.element.get("TYPE", "").lower()] or cameras
+    posed = [entry for entry in used if entry.element.find("KeyFrames/KeyFrame") is not None]
+    if not posed:
+        raise CalibrationError(f"{path}: no calibrated camera in it, expected <Camera> with <KeyFrames><KeyFrame> in it")
+    notes: list[str] = []
+    if len(used) < len(cameras):
+        notes.append(f"cameras for markers are left out: {', '.join(entry.camera for entry in cameras if entry not in used)}")
+    if len(posed) < len(used):
+        notes.append(f"not calibrated, left out: {', '.join(entry.camera for entry in used if entry not in posed)}")
+    return Found(tuple(_draft(entry, notes) for entry in posed), "mm", tuple(notes))
+
+
+def _draft(entry: Entry, notes: list[str]) -> Draft:
+    frame = entry.child("KeyFrames/KeyFrame")
+    size = entry.numbers("SENSOR_SIZE", (2,))
+    focal, aspect = frame.number("FOCAL_LENGTH"), entry.number("PIXEL_ASPECT_RATIO", "1")
+    if not (focal > 0 and aspect > 0 and (size > 0).all() and (size < 1e5).all()):
+        raise CalibrationError(f"{entry.path}: camera {entry.camera!r}: found a focal length of {focal:g}, an aspect ratio of {aspect:g} "
+                               f"and a sensor of {size.tolist()}, expected positive numbers")
+    principal = frame.numbers("PRINCIPAL_POINT", (2,))
+    matrix = np.array([[focal, 0, principal[0]], [0, focal / aspect, principal[1]], [0, 0, 1]])
+    R, place = _rotation(frame), frame.numbers("POSITION", (3,))
+    lens, off = opencv_distortion(matrix, size, _bend(frame, principal, size, focal))
+    if off > OFF:
+        notes.append(f"camera {entry.camera!r}: OpenCV's distortion follows Vicon's within {off:.1f} pixels only")
+    return Draft(name=entry.camera, matrix=matrix, distortion=lens, T=rigid(R, -R @ place), size=size.tolist())
+
+
+def _rotation(frame: Entry) -> Array:
+    x, y, z, w = q = frame.numbers("ORIENTATION", (4,))
+    length = float(np.linalg.norm(q))
+    if abs(length - 1) > 0.01:
+        raise CalibrationError(f"{frame.path}: camera {frame.camera!r}: ORIENTATION: found a quaternion of length {length:g}, expected 1")
+    x, y, z, w = q / length
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+def _bend(frame: Entry, principal: Array, size: Array, focal: float) -> Bend:
+    told = frame.element.get("VICON_RADIAL2")
+    values = numbers_of(told.partition(" ")[2] if told and told[:1].isalpha() else told, (5,))
+    if values is not None:
+        centre, k = values[:2], values[2:]
+    else:
+        centre, k = principal, np.append(frame.numbers("VICON_RADIAL", (2,), "0 0"), 0.0)
+    corner = float(np.linalg.norm(size)) / 2
+    return Bend(centre, k / focal ** np.array([2, 4, 6]) if abs(k[0]) * corner**2 > ABSURD else k)
+
+
+def opencv_distortion(matrix: Array, size: Array, bend: Bend) -> tuple[Array, float]:
+    """OpenCV's k1 k2 p1 p2 k3 of Vicon's distortion, and by how many pixels they are off at most, over a picture (2,)."""
+    across = [np.linspace(0, side - 1, GRID) for side in size]
+    seen = np.stack(np.meshgrid(*across), -1).reshape(-1, 2)
+    r2 = ((seen - bend.centre) ** 2).sum(1)
+    straight = bend.centre + (seen - bend.centre) * (1 + r2 * (bend.k[0] + r2 * (bend.k[1] + r2 * bend.k[2])))[:, None]
+    focal, principal = np.diag(matrix)[:2], matrix[:2, 2]
+    (x, y), moved = ((straight - principal) / focal).T, (seen - straight) / focal
+    r2 = x * x + y * y
+    rows = np.concatenate([np.stack([x * r2, x * r2**2, 2 * x * y, r2 + 2 * x * x, x * r2**3], 1),
+                           np.stack([y * r2, y * r2**2, r2 + 2 * y * y, 2 * x * y, y * r2**3], 1)])
+    wanted = moved.T.ravel()
+    lens = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    return lens, float(np.abs((rows @ lens - wanted).reshape(2, -1) * focal[:, None]).max())

@@ -1,0 +1,180 @@
+"""A body's shapes as a mesh that its joints carry: for programs that show skinned puppets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.animation import Animation
+from shadowpuppet.body import Body, Hulls, Quads
+from shadowpuppet.body_animation import TO_REST, BodyTree
+from shadowpuppet.geometry import Array
+from shadowpuppet.limbs import Limbs
+
+AROUND, ALONG, DOME = 24, 6, 5
+"""Points around a limb; rings along it; rings of a dome."""
+BALL = 10
+"""Rings of an ellipsoid."""
+LEFT, RIGHT, MIDDLE = (0.86, 0.48, 0.30), (0.30, 0.56, 0.80), (0.72, 0.72, 0.70)
+"""Colours by which a mirror image is seen at once, linear RGB."""
+STICK = 0.12
+"""Radius of a bone of whose shape nothing is known, as a share of its length."""
+THICKEST = 0.05
+"""Metres, of such a bone."""
+
+
+class Mesh(NamedTuple):
+    """Triangles, each corner carried by one joint."""
+
+    points: Array
+    """In the axes of skeletons at rest, the root at the origin, of shape (V, 3), metres."""
+    normals: Array
+    """Outward unit vectors, of shape (V, 3)."""
+    triangles: NDArray[np.int64]
+    """Indices of corners, counterclockwise from outside, of shape (F, 3)."""
+    joints: NDArray[np.int64]
+    """The animation's joint that carries each point, of shape (V,)."""
+    colours: Array
+    """Linear RGB, 0..1, of shape (V, 3)."""
+    two_sided: bool = False
+    """Whether it is made of sheets that are seen from either side."""
+
+
+class _Patch(NamedTuple):
+    points: Array
+    triangles: NDArray[np.int64]
+    joints: NDArray[np.int64]
+    colour: tuple[float, float, float]
+
+
+def body_mesh(body: Body) -> Mesh:
+    """The body's shapes, as `BodyTree.animation` of it carries them: limbs where it has them, else hulls of ellipsoids, or cards."""
+    tree = BodyTree(body)
+    nodes = np.array([tree.node_of(j) for j in range(len(body.skeleton.joints))])
+    at = _rest(tree.offsets, [node.parent for node in tree.nodes])[nodes]
+    shapes = body.shapes
+    if body.limbs is not None:
+        patches = [_of_limb(body.limbs, n) for n in range(len(body.limbs.parts))]
+    elif isinstance(shapes, Quads):
+        patches = [_Patch(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.repeat(joint, 4), _colour(part))
+                   for joint, corners, part in zip(shapes.joints, shapes.corners, body.parts)]  # fmt: skip
+    else:
+        patches = [_of_hull(shapes, n, body.parts[n], at) for n in range(len(body.parts))]
+    moved = [patch._replace(points=patch.points @ TO_REST.T + at[patch.joints], joints=nodes[patch.joints]) for patch in patches]
+    return _joined(moved, two_sided=isinstance(shapes, Quads))
+
+
+def bone_mesh(animation: Animation) -> Mesh:
+    """A tapered stick along every bone of a skeleton of which no more is known."""
+    patches, rest = list[_Patch](), animation.rest
+    bones = [(parent, animation.offsets[n]) for n, parent in enumerate(animation.parents) if parent >= 0]
+    bones += [(n, np.array(end)) for n, end in animation.ends.items()]
+    for joint, along in bones:
+        length = float(np.linalg.norm(along))
+        if length > 1e-6:
+            wide = min(STICK * length, THICKEST) * np.array([1.0, 0.4])
+            points, triangles = _tube(np.stack([wide, wide], 1), length, np.zeros(2), wide)
+            turned = points @ _toward(along / length).T + rest[joint]
+            patches.append(_Patch(turned, triangles, np.full(len(points), joint), _colour(animation.names[joint])))
+    if not patches:  # one joint alone
+        points, triangles = _tube(np.full((2, 2), THICKEST), THICKEST, np.zeros(2), np.full(2, THICKEST))
+        patches = [_Patch(points, triangles, np.zeros(len(points), np.int64), MIDDLE)]
+    return _joined(patches)
+
+
+def _rest(offsets: Array, parents: Sequence[int]) -> Array:
+    places = offsets.copy()
+    for n, parent in enumerate(parents):
+        if parent >= 0:
+            places[n] += places[parent]
+    return places
+
+
+def _colour(part: str) -> tuple[float, float, float]:
+    small = part.lower()
+    return LEFT if small.startswith(("left", "l_")) else RIGHT if small.startswith(("right", "r_")) else MIDDLE
+
+
+def _joined(patches: Sequence[_Patch], two_sided: bool = False) -> Mesh:
+    counts = [len(patch.points) for patch in patches]
+    first = np.cumsum([0, *counts[:-1]])
+    points = np.concatenate([patch.points for patch in patches])
+    triangles = np.concatenate([patch.triangles + start for patch, start in zip(patches, first)])
+    colours = np.repeat(np.array([patch.colour for patch in patches]), counts, axis=0)
+    return Mesh(points, _normals(points, triangles), triangles, np.concatenate([patch.joints for patch in patches]), colours, two_sided)
+
+
+def _normals(points: Array, triangles: NDArray[np.int64]) -> Array:
+    """Normals (V, 3) by the triangles around each point, the larger ones counting more."""
+    a, b, c = (points[triangles[:, n]] for n in range(3))
+    sums = np.zeros_like(points)
+    for n in range(3):
+        np.add.at(sums, triangles[:, n], np.cross(b - a, c - a))
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(lengths > 0, sums / np.where(lengths > 0, lengths, 1), [0.0, 1.0, 0.0])
+
+
+def _of_limb(limbs: Limbs, n: int) -> _Patch:
+    points, triangles = _tube(limbs.radii[n], limbs.lengths[n], limbs.shears[n], limbs.caps[n])
+    placed = points @ limbs.rotations[n].T + limbs.starts[n]
+    return _Patch(placed, triangles, np.full(len(points), limbs.joints[n]), _colour(limbs.parts[n]))
+
+
+def _tube(radii: Array, length: float, shear: Array, caps: Array) -> tuple[Array, NDArray[np.int64]]:
+    """A tapered elliptic cylinder along z from the origin, with domes of heights `caps`, closed: points (V, 3) and triangles (F, 3).
+
+    radii (2, 2): of the ellipses at start and end, along x and y; shear (2,): how far the end lies off along them.
+    """
+    falls = np.pi / 2 * np.arange(1, DOME) / DOME
+    start = [(0.0, np.cos(fall), -caps[0] * np.sin(fall)) for fall in falls[::-1]]
+    end = [(1.0, np.cos(fall), caps[1] * np.sin(fall)) for fall in falls]
+    rings = [*start, *((share, 1.0, 0.0) for share in np.linspace(0, 1, ALONG)), *end]
+    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    circle = np.stack([np.cos(turn), np.sin(turn)], 1)
+    points = [np.concatenate([shear * share + wide * ((1 - share) * radii[0] + share * radii[1]) * circle,
+                              np.full((AROUND, 1), share * length + up)], 1) for share, wide, up in rings]  # fmt: skip
+    poles = np.array([[0.0, 0.0, -caps[0]], [*shear, length + caps[1]]])
+    return np.concatenate([*points, poles]), _closed(len(rings))
+
+
+def _closed(rings: int) -> NDArray[np.int64]:
+    """Triangles of rings of `AROUND` points, one above the other, counterclockwise from above, and a pole beneath and above."""
+    n, last = np.arange(AROUND), rings * AROUND
+    after = (n + 1) % AROUND
+    sides = [np.stack([AROUND * ring + step for step in corner], 1) for ring in range(rings - 1)
+             for corner in ((n, after, AROUND + after), (n, AROUND + after, AROUND + n))]  # fmt: skip
+    beneath, top = np.stack([np.full(AROUND, last), after, n], 1), (rings - 1) * AROUND
+    return np.concatenate([*sides, beneath, np.stack([np.full(AROUND, last + 1), top + n, top + after], 1)])
+
+
+def _of_hull(shapes: Hulls, n: int, part: str, at: Array) -> _Patch:
+    """The convex hull at rest of a shape's ellipsoids; each point is carried by its ellipsoid's joint. `at`: the joints' places (J, 3)."""
+    from scipy.spatial import ConvexHull
+
+    count = int(shapes.numbers[n])
+    ball = _ball()
+    points = np.concatenate([shapes.centres[n, e] + shapes.radii[n, e] * ball for e in range(count)])
+    joints = np.repeat(shapes.joints[n, :count], len(ball))
+    placed = points @ TO_REST.T + at[joints]
+    hull = ConvexHull(placed)
+    outward = (np.cross(*np.diff(placed[hull.simplices], axis=1).swapaxes(0, 1)) * hull.equations[:, :3]).sum(1) > 0
+    triangles = np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1])
+    used, compact = np.unique(triangles, return_inverse=True)
+    return _Patch(points[used], compact.reshape(-1, 3), joints[used], _colour(part))
+
+
+def _ball() -> Array:
+    """Points (V, 3) all over a unit ball."""
+    up, turn = np.linspace(-np.pi / 2, np.pi / 2, BALL + 1)[1:-1], 2 * np.pi * np.arange(AROUND) / AROUND
+    rings = np.stack([np.outer(np.cos(up), np.cos(turn)), np.outer(np.cos(up), np.sin(turn)), np.repeat(np.sin(up)[:, None], AROUND, 1)], 2)
+    return np.concatenate([rings.reshape(-1, 3), [[0, 0, -1.0], [0, 0, 1.0]]])
+
+
+def _toward(along: Array) -> Array:
+    """A rotation (3, 3) whose z is a unit vector (3,)."""
+    x = np.cross(np.eye(3)[int(np.abs(along).argmin())], along)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(along, x), along], 1)

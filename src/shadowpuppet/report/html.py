@@ -1,0 +1,34 @@
+"""Bits of HTML: what is in files or names is text there, never markup."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+
+def plain(text: object) -> str:
+    """Text as it is shown, whatever signs are in it."""
+    return escape(str(text))
+
+
+def figure(svg: str, caption: str) -> str:
+    """A plot with what it shows below."""
+    return f"<figure>{svg}<figcaption>{caption}</figcaption></figure>"
+
+
+def rows(cells: Iterable[Sequence[str]], sums: int = 0) -> str:
+    """Rows of a table, the last `sums` of them set off."""
+    made = ["<td>" + "</td><td>".join(map(plain, row)) + "</td>" for row in cells]
+    first = len(made) - sums
+    return "".join(f"<tr{' class=sum' if n >= first else ''}>{row}</tr>" for n, row in enumerate(made))
+
+
+def table(head: Sequence[str], body: str) -> str:
+    """A table with a head."""
+    return (f'<div class="scroll"><table><thead><tr><th>{"</th><th>".join(map(plain, head))}</th></tr></thead><tbody>{body}</tbody></table>'
+            "</div>")
+
+
+def definitions(pairs: Iterable[tuple[str, str]]) -> str:
+    """Names beside what they are; the latter may have markup."""
+    return "<dl>" + "".join(f"<dt>{plain(name)}</dt><dd>{text}</dd>" for name, text in pairs) + "</dl>"

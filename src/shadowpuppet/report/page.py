@@ -1,0 +1,155 @@
+"""The page itself: one file that needs nothing else, and from which no request leaves."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation import Evaluation, check_output
+from shadowpuppet.evaluation_words import coverage_words
+from shadowpuppet.intervals import LEVELS
+from shadowpuppet.io._files import write_whole
+from shadowpuppet.measures import aligned_distances
+from shadowpuppet.report import charts
+from shadowpuppet.report.html import figure, plain, rows, table
+from shadowpuppet.report.pictures import Chosen, chosen_frames, pictures
+from shadowpuppet.report.sections import axes_table, body_tables, cards, facts, joint_table, meanings, notes, ways
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+"""What a browser may fetch for this page: nothing."""
+
+
+def check_report(path: str | Path, folder: str | Path) -> None:
+    """Raise `ShadowPuppetError` where no page can be made at a path."""
+    check_output(path, folder, ".html")
+    if importlib.util.find_spec("matplotlib") is None:
+        raise ShadowPuppetError(f"{path}: a report needs matplotlib: pip install 'shadowpuppet[report]'")
+
+
+def write_report(path: str | Path, of: Evaluation) -> None:
+    """Write a page about an evaluation. Raises `ShadowPuppetError` where it cannot be written, or matplotlib is not there."""
+    check_report(path, of.run.folder)
+    write_whole(Path(path), page(of))
+
+
+def page(of: Evaluation) -> str:
+    """The page's text (HTML)."""
+    name = of.run.folder.resolve().name
+    css = files("shadowpuppet").joinpath("report/page.css").read_text("utf-8")
+    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+            f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{plain(name)}: evaluation</title>\n'
+            f"<style>\n{css}</style></head>\n<body>\n" + "\n".join(_parts(of, name)) + "\n</body></html>\n")
+
+
+def _parts(of: Evaluation, name: str) -> Iterator[str]:
+    chosen = chosen_frames(of)
+    shots, source = pictures(of, chosen)
+    yield f"<header><h1>{plain(name)}</h1>{_under(of)}</header>"
+    yield cards(of)
+    yield notes(of, "" if shots else source)
+    if of.errors is not None:
+        yield from _errors(of, chosen)
+    if shots:
+        yield _frames(of, chosen, shots, source)
+    if of.errors is not None:
+        yield from _joints(of)
+        yield from _motion(of)
+        yield body_tables(of)
+    yield _silhouettes(of)
+    if of.errors is not None:
+        yield _intervals(of)
+    yield meanings(of)
+    yield facts(of)
+
+
+def _silhouettes(of: Evaluation) -> str:
+    head = ("<h2>Silhouettes</h2><p class=said>How well the drawn body matches the silhouettes, as the run recorded it; for this no truth "
+            "is needed.</p>")
+    if not len(of.run.motion):
+        return head + "<p>The run has no frames.</p>"
+    said = "Above the overlap (intersection over union), below the cost: the area in which model and silhouette differ."
+    return head + figure(charts.fit_over_time(of), said)
+
+
+def _under(of: Evaluation) -> str:
+    truth = of.measured["truth"]
+    against = f" against <b>{plain('/'.join(Path(truth).parts[-2:]))}</b>" if truth else ", without a truth"
+    return f'<p class="under">{plain(str(of.run.info.get("method", "a run")))}; {len(of.run.motion)} frames{against}</p>'
+
+
+def _errors(of: Evaluation, chosen: Sequence[Chosen]) -> Iterator[str]:
+    marks = {each.letter: each.time for each in chosen if not each.usual}
+    yield "<h2>Error over time</h2>"
+    said = ("Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, and all of them. Letters "
+            "are the worst frames, shown below; the strip tells the run's own status.")
+    yield figure(charts.over_time(of, marks), said)
+    yield figure(charts.by_joint_and_time(of), "The same by joint, darker where it is farther off; grey where the run has no pose.")
+
+
+def _frames(of: Evaluation, chosen: Sequence[Chosen], shots: Mapping[str, bytes], source: str) -> str:
+    white = ", with the truth's bones in white" if of.truth is not None else ""
+    wide = " wide" if len(of.cameras) > 1 or source == "overlay.mp4" else ""
+    tiles = "".join(_shot(of, each, shots[each.letter]) for each in chosen if each.letter in shots)
+    worst = "largest error" if of.errors is not None else "least overlap"
+    usual = ", and two usual ones" if any(each.usual for each in chosen) else ""
+    return (f'<h2>Worst frames</h2><p class="said">The frames of {worst}, some time apart{usual}. From {source}{white}.</p>'
+            f'<div class="shots{wide}">{tiles}</div>')
+
+
+def _shot(of: Evaluation, each: Chosen, image: bytes) -> str:
+    motion = of.run.motion
+    said = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
+    said += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
+    worst = ", ".join(f"{plain(name.replace('_', ' '))} {off:.0f}" for name, off in each.worst)
+    error = f"<b>{each.error:.0f} mm</b> in the mean; farthest off: {worst}. " if each.error == each.error else ""
+    data = base64.b64encode(image).decode()
+    return (f'<figure><img alt="frame {each.frame}" src="data:image/jpeg;base64,{data}"><figcaption><span class="badge'
+            f'{" usual" if each.usual else ""}">{each.letter}</span> {error}{", ".join(said)}{", a usual frame" if each.usual else ""}'
+            "</figcaption></figure>")
+
+
+def _joints(of: Evaluation) -> Iterator[str]:
+    assert of.table is not None
+    assert of.truth is not None
+    assert of.errors is not None
+    yield "<h2>Joints</h2>" + joint_table(of)
+    distances = aligned_distances(of.errors, of.table, of.truth)
+    left = figure(charts.by_joint(of), "Half of the frames lie in the box, nine tenths on the line; the stroke is the median, the ring the "
+                                       "mean. Green is the person's left, pink the right.")
+    right = figure(charts.shares(distances, of.errors.known), "How many joints are nearer than so much, as they stand and in posture "
+                                                              "alone.")
+    yield f'<div class="pair">{left}{right}</div>'
+    yield f'<div class="pair"><div><h3>Laid over each other</h3>{ways(of)}</div><div><h3>Along the world\'s axes, run less truth</h3>' \
+          f"{axes_table(of)}</div></div>"
+
+
+def _motion(of: Evaluation) -> Iterator[str]:
+    assert of.errors is not None
+    joints = of.measured["errors"]["joints"]
+    worst = max(joints, key=lambda name: joints[name]["mean_mm"])
+    yield "<h2>Motion</h2>"
+    name = plain(worst.replace("_", " "))
+    yield figure(charts.path_of(of, worst), f"Where the joint that is farthest off, {name}, was over time, run and truth.")
+    moves = of.measured["acceleration"]
+    if moves:
+        text = (f"<p>The run's joints accelerate by {moves['run_m_s2']:.1f} m/s² (root mean square), the truth's by "
+                f"{moves['truth_m_s2']:.1f}. What is more is jitter, what is less has been smoothed away. The difference between the two, "
+                f"as vectors, is {moves['difference_m_s2']:.1f} m/s² in the mean. Compare runs of one film, at one frame rate.</p>")
+        yield f'<div class="pair">{figure(charts.jitter_by_joint(of), "Accelerations by joint.")}<div>{text}</div></div>'
+
+
+def _intervals(of: Evaluation) -> str:
+    coverage = of.measured["coverage"]
+    text = f"<h2>Stated uncertainty</h2><p>{plain(coverage_words(coverage)).capitalize()}.</p>"
+    if coverage is None:
+        return text
+    cells = ((name.replace("_", " "), *(f"{100 * row[f'within_{level}']:.0f}" for level in LEVELS), f"{row['rms_z']:.2f}",
+              f"{row['sd_mean_mm']:.1f}") for name, row in coverage["joints"].items())  # fmt: skip
+    by_joint = table(["joint", *(f"{level} %" for level in LEVELS), "rms z", "mean sd, mm"], rows(cells))
+    said = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
+    return f'{text}<div class="pair">{figure(charts.honesty(coverage, list(LEVELS)), said)}<div>{by_joint}</div></div>'
+

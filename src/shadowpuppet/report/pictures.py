@@ -1,0 +1,281 @@
+"""Frames that show what a run did, worst first: from its overlay, or drawn over the recording; with the truth's bones where it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation import Evaluation
+from shadowpuppet.footage import footage_of, opened
+from shadowpuppet.geometry import Array
+from shadowpuppet.metrics import LOST
+from shadowpuppet.motion import BLANK, BONES, JointTable
+from shadowpuppet.options import Options, make_options
+from shadowpuppet.overlay import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
+from shadowpuppet.rig import chosen_views
+from shadowpuppet.rig_overlay import grid_of
+from shadowpuppet.synchrony import at_times, match, step_of
+
+if TYPE_CHECKING:
+    from shadowpuppet.video import Image
+
+WORST, TYPICAL, MOST_LOST = 6, 2, 2
+"""Frames that are shown, and how many of them may be without a pose."""
+BETWEEN = 0.5
+"""Seconds between the worst frames, less in short runs and more in long ones: neighbours show the same."""
+VIEWS = 5
+"""Cameras that are shown side by side, of several those that see the person largest."""
+WIDEST = 1280
+"""Pixels of a picture's width in the page."""
+SHARP = 440
+"""Pixels of height from which on thin lines are drawn well."""
+QUALITY = 82
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A frame to show."""
+
+    letter: str
+    frame: int
+    """Of the run."""
+    time: float
+    """Seconds."""
+    error: float
+    """Mean over the joints, mm; not a number without a truth."""
+    worst: tuple[tuple[str, float], ...]
+    """The joints that are farthest off, and by how many mm."""
+    usual: bool
+    """Whether it is shown for being usual, not bad."""
+
+
+def chosen_frames(of: Evaluation) -> list[Chosen]:
+    """The worst frames, a while apart, and two usual ones; without a truth those that overlap the silhouettes worst."""
+    motion = of.run.motion
+    if not len(motion):
+        return []
+    if of.errors is None or of.table is None:
+        badness, times = np.where(np.isfinite(motion.overlap), 1 - motion.overlap, np.nan), motion.times
+        means = np.full(len(motion), np.nan)
+    else:
+        means, times = _means(of.errors.distance, of.errors.known), of.table.times
+        badness = means
+    index, there = match(motion.times, times)
+    blank = np.isin(motion.status[index], BLANK)
+    badness = np.where(there, badness, np.nan)
+    letters = iter("ABCDEFGHIJKLMNOP")
+    frames = [(n, False) for n in _worst(badness, times, blank)] + [(n, True) for n in _usual(badness, times, blank)]
+    return [Chosen(next(letters), int(index[n]), float(times[n]), float(1000 * means[n]), _off(of, n), usual) for n, usual in frames]
+
+
+def pictures(of: Evaluation, chosen: Sequence[Chosen]) -> tuple[dict[str, bytes], str]:
+    """JPEG by letter, and where they are from; none, and why, where there is neither an overlay nor the recording."""
+    wanted = {each.frame: each.letter for each in chosen}
+    film = of.run.folder / "overlay.mp4"
+    if not wanted:
+        return {}, "no frame to show"
+    try:
+        found = _of_overlay(film, of, wanted) if film.exists() else _of_recording(of, wanted)
+        return {letter: _jpeg(image) for letter, image in found}, "overlay.mp4" if film.exists() else "the recording"
+    except ShadowPuppetError as error:
+        return {}, f"no pictures: {error}"
+
+
+def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
+    """Frames of the run's overlay, the rows of a single camera side by side, the truth's bones over what shows them best."""
+    from shadowpuppet.video import open_frames
+
+    cameras, last = of.cameras, max(wanted)
+    for n, frame in enumerate(open_frames(film)):
+        if n in wanted:
+            image, places = np.array(in_colour(frame.image)), _truth_at(of, n)
+            if len(cameras) <= 1:
+                rows = [_scaled(row, height=max(len(row), SHARP)) for row in np.split(image[: len(image) // 3 * 3], 3)]
+                if cameras and places is not None:
+                    draw_bones(rows[2], cameras[0], places)
+                image = np.concatenate(rows, axis=1)
+            else:
+                image = _of_grid(image, of, n)
+            yield wanted[n], image
+        if n >= last:
+            return
+
+
+def _of_grid(image: Image, of: Evaluation, frame: int) -> Image:
+    """The person in the tiles of an overlay of several cameras, with the truth's bones."""
+    columns, rows, _ = grid_of([camera.size for camera in of.cameras])
+    image = _scaled(image, height=max(image.shape[0], 2 * SHARP * rows))  # so that lines are thin
+    height, width = image.shape[0] // rows, image.shape[1] // columns
+    tiles = [image[y * height : (y + 1) * height, x * width : (x + 1) * width] for y in range(rows) for x in range(columns)]
+    truth = _truth_at(of, frame)
+    for tile, camera in zip(tiles, of.cameras):
+        if truth is not None:
+            draw_bones(tile, camera, truth)
+    return _side_by_side(tiles[: len(of.cameras)], of.cameras, [table for table, _ in _tables(of, frame)])
+
+
+def _side_by_side(images: Sequence[Image], cameras: Sequence[Camera], tables: Sequence[JointTable]) -> Image:
+    """The person cut out of the pictures of several cameras, those that see them largest."""
+    boxes = [_box(image, camera, tables) for image, camera in zip(images, cameras)]
+    shares = [(box[0].stop - box[0].start) / len(image) if box else 0.0 for image, box in zip(images, boxes)]
+    chosen = sorted(sorted(range(len(images)), key=lambda n: -shares[n])[:VIEWS])
+    cut = []
+    for n in chosen:
+        image = _scaled(np.ascontiguousarray(images[n][boxes[n] or ...]), height=SHARP)
+        write_text(image, cameras[n].name, 0, WHITE, size=SHARP)
+        cut.append(image)
+    return np.concatenate(cut, axis=1)
+
+
+def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
+    """Frames of the recording, up to four cameras side by side, with the run's bones and the truth's."""
+    path, settings = of.run.info.get("recording"), of.run.settings
+    if not isinstance(path, str) or not Path(path).exists():
+        raise ShadowPuppetError(f"the run has no overlay.mp4, and its recording, {path}, is not there")
+    options = make_options(settings) if settings else Options()
+    recording = opened(path, options)
+    views = chosen_views(recording, options.camera)
+    motion = of.run.motion
+    seen: dict[int, dict[Camera, Image]] = {frame: {} for frame in wanted}
+    for view in views:
+        footage = footage_of(recording, view, options)
+        for frame, image in _at(footage.shots(False), motion.times, sorted(wanted)):
+            image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * SHARP))
+            for places, own in _tables(of, frame):
+                draw_bones(image, footage.camera, places, own)
+            seen[frame][footage.camera] = image
+    for frame, images in seen.items():
+        if len(views) == 1:
+            yield from ((wanted[frame], image) for image in images.values())
+        elif images:
+            yield wanted[frame], _side_by_side([*images.values()], [*images], [table for table, _ in _tables(of, frame)])
+
+
+def _at(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int, Image]]:
+    """The shots that are nearest to the times of some frames (increasing)."""
+    held, waiting = None, list(frames)
+    for shot in shots:
+        while waiting and shot.time >= times[waiting[0]]:
+            nearer = held if held is not None and times[waiting[0]] - held.time < shot.time - times[waiting[0]] else shot
+            yield waiting.pop(0), nearer.image
+        if not waiting:
+            return
+        held = shot
+    if held is not None and waiting and times[waiting[0]] - held.time <= step_of(times):
+        yield waiting[0], held.image
+
+
+def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False) -> None:
+    """Draw a table of one frame's bones into a picture (H, W, 3) of a camera, at whatever size; the run's `own` in the sides' colours, the
+    truth's thin and white."""
+    import cv2
+
+    pixels = dict(zip(places.names, _pixels(image, camera, places)))
+    unit = image.shape[0] / 400
+    for a, b in BONES:
+        ends = [pixels[name] for name in (a, b) if name in pixels]
+        if len(ends) < 2 or not np.isfinite(ends).all():
+            continue
+        start, end = (tuple(np.clip(np.round(point * (1 << SUBPIXEL)), -(1 << 20), 1 << 20).astype(int).tolist()) for point in ends)
+        colour = SIDES.get(b.split("_")[0], MIDDLE) if own else WHITE
+        for ink, extra in ((BLACK, 2), (colour, 0)):
+            cv2.line(image, start, end, ink, max(1, round((4 if own else 1.6) * unit)) + extra, cv2.LINE_AA, SUBPIXEL)
+
+
+def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:
+    """Where one frame's joints (J, 2) are in a camera's picture, at whatever size."""
+    scale = min(image.shape[1] / camera.size[0], image.shape[0] / camera.size[1])
+    return (camera.project(places.positions[0]) + 0.5) * scale - 0.5
+
+
+def _box(image: Image, camera: Camera, tables: Sequence[JointTable]) -> tuple[slice, slice] | None:
+    """Rows and columns around the person, three by four; None where nobody is known."""
+    pixels = np.concatenate([_pixels(image, camera, table) for table in tables])
+    pixels = np.clip(pixels[np.isfinite(pixels).all(1)], 0, [image.shape[1], image.shape[0]])
+    if len(pixels) < 3:
+        return None
+    (left, top), (right, bottom) = pixels.min(0), pixels.max(0)
+    half_high = min(max(0.64 * (bottom - top), 0.8 * (right - left), 0.12 * image.shape[0]), image.shape[0] / 2)
+    half_wide = min(0.75 * half_high, image.shape[1] / 2)
+    y = np.clip((top + bottom) / 2, half_high, image.shape[0] - half_high)
+    x = np.clip((left + right) / 2, half_wide, image.shape[1] - half_wide)
+    return slice(round(y - half_high), round(y + half_high)), slice(round(x - half_wide), round(x + half_wide))
+
+
+def _worst(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
+    """The worst frames, in the order of time."""
+    length = float(times[-1] - times[0])
+    apart = max(min(BETWEEN, length / (2 * WORST)), length / (10 * WORST))
+    found: list[int] = []
+    for n in np.argsort(-np.nan_to_num(badness, nan=-np.inf), kind="stable"):
+        if len(found) == WORST or not np.isfinite(badness[n]):
+            break
+        crowded = any(abs(times[n] - times[m]) < apart for m in found)
+        if not crowded and not (blank[n] and blank[found].sum() >= MOST_LOST):
+            found.append(int(n))
+    return sorted(found)
+
+
+def _usual(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
+    """Frames whose error is nearest to the median, one of each half of the run."""
+    known = np.flatnonzero(np.isfinite(badness) & ~blank)
+    if len(known) < 4 * (WORST + TYPICAL):
+        return []
+    middle = np.median(badness[known])
+    return [int(part[np.abs(badness[part] - middle).argmin()]) for part in np.array_split(known, TYPICAL)]
+
+
+def _means(distance: Array, known: NDArray[np.bool_]) -> Array:
+    """The mean error (T,), metres, of the joints whose truth is known."""
+    counts = known.sum(1)
+    return np.where(counts > 0, np.where(known, distance, 0).sum(1) / np.maximum(counts, 1), np.nan)
+
+
+def _off(of: Evaluation, n: int) -> tuple[tuple[str, float], ...]:
+    """The three joints that are farthest off in a frame."""
+    if of.errors is None:
+        return ()
+    distance = np.where(of.errors.known[n], of.errors.distance[n], -1)
+    order = [int(j) for j in np.argsort(-distance)[:3] if distance[j] >= 0]
+    return tuple((of.errors.names[j], LOST * 1000 if of.errors.lost[n, j] else float(1000 * distance[j])) for j in order)
+
+
+def _tables(of: Evaluation, frame: int) -> list[tuple[JointTable, bool]]:
+    """The run's joints in a frame, and the truth's where it is known; with whether they are the run's own."""
+    truth = _truth_at(of, frame)
+    return [(_run_at(of, frame), True)] + ([(truth, False)] if truth is not None else [])
+
+
+def _truth_at(of: Evaluation, frame: int) -> JointTable | None:
+    return None if of.truth is None else at_times(of.truth, of.run.motion.times[frame : frame + 1])
+
+
+def _run_at(of: Evaluation, frame: int) -> JointTable:
+    motion = of.run.motion
+    return JointTable(motion.times[frame : frame + 1], motion.joint_names, motion.joints[frame : frame + 1])
+
+
+def _scaled(image: Image, *, height: int | None = None, width: int | None = None) -> Image:
+    import cv2
+
+    scale = height / image.shape[0] if height else (width or image.shape[1]) / image.shape[1]
+    if scale == 1:
+        return image
+    size = (max(1, round(scale * image.shape[1])), height or max(1, round(scale * image.shape[0])))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC), np.uint8)
+
+
+def _jpeg(image: Image) -> bytes:
+    import cv2
+
+    small = _scaled(image, width=WIDEST) if image.shape[1] > WIDEST else image
+    done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    assert done
+    return data.tobytes()

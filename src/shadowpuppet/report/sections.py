@@ -1,0 +1,161 @@
+"""What the page says in cards, notes and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from shadowpuppet.evaluation import Evaluation
+from shadowpuppet.evaluation_words import WAYS, bones_words, clock_words, losses_words, said_root, world_words
+from shadowpuppet.metrics import FAR, LOST
+from shadowpuppet.report.html import definitions, plain, rows, table
+
+
+def cards(of: Evaluation) -> str:
+    """The figures that are looked at first."""
+    made = "".join(f'<div class="card"><span class="name">{name}</span><b>{value} <small>{unit}</small></b><span>{said}</span></div>'
+                   for name, value, unit, said in _cards(of))
+    return f'<div class="cards">{made}</div>'
+
+
+def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
+    measured = of.measured
+    if of.errors is not None:
+        errors, aligned, human, moves = (measured[key] for key in ("errors", "aligned_mm", "humaneva", "acceleration"))
+        yield "Joint error", f"{errors['mean_mm']:.1f}", "mm", f"mean of {len(errors['joints'])} joints; rmse {errors['rmse_mm']:.1f}"
+        if "mean_mm" in human:
+            yield "HumanEva", f"{human['mean_mm']:.1f}", "mm", f"mean of its 15 joints; sd over frames {human['sd_mm']:.1f}"
+        yield "Posture alone", f"{aligned['rigid']:.1f}", "mm", "each frame moved and turned onto the truth"
+        if "depth_mm" in errors:
+            yield "Depth", f"{errors['depth_mm']:.1f}", "mm", f"along the camera's axis; {errors['plane_mm']:.1f} across it"
+        yield "Far off", f"{100 * errors['far']:.1f}", "%", f"of joints are over {1000 * FAR:.0f} mm off; worst {errors['max_mm']:.0f} mm"
+        if moves:
+            yield "Acceleration", f"{moves['run_m_s2']:.1f}", "m/s²", f"the truth's {moves['truth_m_s2']:.1f}: more is jitter"
+    if measured["overlap"]["count"]:
+        fit = measured["overlap"]
+        yield "Overlap", f"{fit['mean']:.3f}", "", f"with the silhouettes; 5 % of frames under {fit['p5']:.3f}"
+    lost = measured["losses"]
+    yield "Without a pose", str(lost["frames"]), "frames", (f"{100 * lost['share']:.1f} %, the longest {lost['longest_s']:.2f} s"
+                                                            if lost["frames"] else "none was lost")
+
+
+def notes(of: Evaluation, no_pictures: str) -> str:
+    """What must be known to read the figures."""
+    made = "".join(f'<li{"" if grave else " class=fine"}>{plain(text)}</li>' for grave, text in _notes(of, no_pictures))
+    return f'<ul class="notes">{made}</ul>' if made else ""
+
+
+def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
+    measured = of.measured
+    if not measured["complete"]:
+        yield True, "The run did not come to its end: what it had by then is measured."
+    if of.errors is None:
+        yield True, "There is no truth to compare with: what follows tells how well the silhouettes are matched, not where the joints were."
+    else:
+        world, clock, errors = measured["world"], measured["clock"], measured["errors"]
+        if world.get("moved"):
+            yield False, world_words(world)[0].upper() + world_words(world)[1:] + "."
+        elif world.get("apart"):
+            yield True, (f"The run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run "
+                         "is moved and turned as a whole: are they in two worlds, or is the distance wrong? (--align)")
+        if errors["lost"]:
+            yield True, (f"{errors['lost']} of {errors['frames']} frames of the truth have no pose of the run; each joint counts "
+                         f"{1000 * LOST:.0f} mm there.")
+        if clock["offset_s"]:
+            yield False, "Clock: " + clock_words(clock) + "."
+        if clock.get("rival_s") is not None:
+            yield True, f"An offset of {clock['rival_s']:.3f} s fits nearly as well: the motion repeats itself."
+    if no_pictures:
+        yield False, no_pictures[0].upper() + no_pictures[1:] + "."
+
+
+def joint_table(of: Evaluation) -> str:
+    """Errors of every joint, and of all."""
+    errors = of.measured["errors"]
+    keys = [key for key in ("mean_mm", "rmse_mm", "p50_mm", "p90_mm", "p95_mm", "max_mm", "plane_mm", "depth_mm") if key in errors]
+    names = {"p50_mm": "median", "p90_mm": "90 %", "p95_mm": "95 %"}
+    made = rows(((name.replace("_", " "), *(f"{row[key]:.1f}" for key in keys), f"{100 * row['far']:.1f} %")
+                 for name, row in [*errors["joints"].items(), ("all", errors)]), sums=1)
+    return table(["mm", *(names.get(key, key.removesuffix("_mm")) for key in keys), f"over {1000 * FAR:.0f}"], made)
+
+
+def ways(of: Evaluation) -> str:
+    """Mean errors after less and less is asked."""
+    aligned = of.measured["aligned_mm"]
+    said = ((words.format(root=said_root(aligned)), f"{aligned[way]:.1f}") for way, words in WAYS.items() if way in aligned)
+    return table(["", "mean, mm"], rows(said))
+
+
+def axes_table(of: Evaluation) -> str:
+    """Signed errors along the axes."""
+    axes = of.measured["axes_mm"]
+    if not axes:
+        return "<p>No joint is known in both.</p>"
+    said = ((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}") for axis in "xyz")
+    return table(["", "mean, mm", "sd", "rmse"], rows(said))
+
+
+def body_tables(of: Evaluation) -> str:
+    """Bones, bends and angles."""
+    measured = of.measured
+    parts = []
+    if measured["bone_errors"]:
+        bones = rows((name.replace("_", " ").replace("-", " to "), f"{b['run_mm']:.1f}", f"{b['truth_mm']:.1f}", f"{b['longer_mm']:+.1f}",
+                      f"{b['run_sd_mm']:.2f}", f"{b['truth_sd_mm']:.2f}") for name, b in measured["bone_errors"].items())
+        words = bones_words(measured["bone_errors"])
+        parts.append(f"<h3>Bones, mm</h3><p class=said>{plain(words[0].upper() + words[1:])}.</p>"
+                     + table(["", "run", "truth", "longer", "run's sd", "truth's sd"], bones))
+    if measured["bends_deg"]:
+        parts.append("<h3>How far elbows and knees are bent, degrees</h3>" + _angles(measured["bends_deg"]))
+    if "angles_deg" in measured:
+        turns = rows(((name.replace("_", " "), f"{value:.1f}") for name, value in measured["angles_deg"].items()), sums=1)
+        parts.append(f'<div class="pair"><div><h3>Turns of joints, degrees</h3>{table(["", "rmse"], turns)}</div><div><h3>Single angles, '
+                     f'degrees</h3>{_angles(measured["dofs_deg"])}</div></div>')
+    return "<h2>Body</h2>" + "".join(parts) if parts else ""
+
+
+def _angles(angles: Mapping[str, Mapping[str, float]]) -> str:
+    """A table of errors of angles."""
+    said = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
+    return table(["", "run less truth", "mean size", "rmse"], rows(said))
+
+
+def meanings(of: Evaluation) -> str:
+    """What each figure is, and how it comes about."""
+    said = [("Overlap", "Intersection over union of drawn body and silhouette, from 0 to 1, as recorded by the run."),
+            ("Cost", "The area in which drawn body and silhouette differ (XOR), as recorded by the run.")]
+    if of.errors is not None:
+        root = plain(said_root(of.measured["aligned_mm"]))
+        said = [
+            ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
+                            f"has no pose, each joint counts {1000 * LOST:.0f} mm, so that leaving out bad frames never helps. "
+                            "<span class=formula>rmse = √(mean of d²)</span>."),
+            ("HumanEva", "The mean distance over 15 joints (pelvis, neck, head; shoulders, elbows, wrists, hips, knees, ankles) in each "
+                         "frame, then over the frames (Sigal, Balan and Black 2010)."),
+            ("Laid over each other", "Run and truth compared after less and less is asked of the run: one rigid motion of the whole; each "
+                                     f"frame's mean offset; distances from the {root}; the best rigid motion of each frame (Procrustes); "
+                                     "that with a scale, which papers call PA-MPJPE. The first alone says where the person was."),
+            ("Acceleration", "Root mean square of second differences of the joints' places, of run and truth at the same times."),
+            ("Bent", "The angle between the bones before and after an elbow or knee; 0 is straight."),
+            ("Times", "Run and truth are compared at the times of the slower one; the other is interpolated between frames at most one and "
+                      "a half steps apart, and never beyond its ends."),
+            *said,
+        ]
+    return "<h2>What the figures mean</h2>" + definitions(said)
+
+
+def facts(of: Evaluation) -> str:
+    """What the run was."""
+    info, measured = of.run.info, of.measured
+    settings = of.run.settings
+    said = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")),
+            ("Body", of.run.motion.body_name),
+            ("Preset and seed", f"{settings.get('preset', 'default')}, {settings.get('seed', 'unknown')}" if settings else None),
+            ("Frames", ", ".join(f"{count} {status}" for status, count in measured["status"].items())),
+            ("No pose", losses_words(measured["losses"])),
+            ("Clock", clock_words(measured["clock"]) if "clock" in measured else None),
+            ("World", world_words(measured["world"]) if measured.get("world") else None),
+            ("Made with", ", ".join(f"{name} {version}" for name, version in info.get("versions", {}).items()))]
+    joints = f"; joints compared: {', '.join(of.errors.names)}" if of.errors is not None else ""
+    return ("<h2>The run</h2>" + definitions((name, plain(text)) for name, text in said if text)
+            + f"<footer>Made by shadowpuppet evaluate. All of it is in this file{plain(joints.replace('_', ' '))}.</footer>")
+
