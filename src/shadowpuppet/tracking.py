@@ -207,7 +207,8 @@ class MultiviewTracker:
         for cycle in range(s.cycles):
             around, scale = pose, s.cooling**cycle
             particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
-                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale))  # noqa: B023
+                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale,  # noqa: B023
+                                                                       evidence.differing))
             weights = normalise(particles.log_weights)
             pose = particles.best if s.estimate == "best" else weights @ particles.poses
         return self.judge(pose, pose - state.pose, particles, evidence, weigh)

@@ -1,0 +1,68 @@
+"""Many runs at once: the one place that knows how, so that it can be done otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from functools import lru_cache
+from multiprocessing import get_context
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from shadowpuppet.errors import ShadowPuppetError
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], workers: int = 1) -> list[Result]:
+    """`task` of every job, in their order; `what` they are is shown while they run.
+
+    With several workers, in processes that are spawned, each with one thread: `task` must be a function of a module, and jobs and
+    results must be picklable and small; what is large is read from files that the job names. Raises what a task raises, and
+    `ShadowPuppetError` where a process is killed.
+    """
+    with _shown() as progress:
+        bar = progress.add_task(what, total=len(jobs))
+        if workers <= 1 or len(jobs) <= 1:
+            return [_counted(progress, bar, task(job)) for job in jobs]
+        waiting = [_crew(workers).submit(task, job) for job in jobs]
+        try:
+            for done in as_completed(waiting):
+                _counted(progress, bar, done.result())
+            return [done.result() for done in waiting]
+        except BrokenProcessPool:
+            _crew.cache_clear()
+            raise ShadowPuppetError(f"{what}: a process was killed (is there enough memory?); try again with fewer --workers") from None
+        finally:
+            for left in waiting:
+                left.cancel()
+
+
+@lru_cache(maxsize=1)
+def _crew(workers: int) -> ProcessPoolExecutor:
+    """Processes that stay for the next time: each takes seconds to start."""
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_alone)
+
+
+def _alone() -> None:
+    """One thread: there are other processes."""
+    import cv2
+    from threadpoolctl import threadpool_limits
+
+    cv2.setNumThreads(1)
+    threadpool_limits(1)
+
+
+def _shown() -> Progress:
+    console = Console(stderr=True)
+    return Progress(TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeRemainingColumn(), console=console,
+                    transient=True, disable=not console.is_terminal)
+
+
+def _counted(progress: Progress, bar: TaskID, result: Result) -> Result:
+    progress.advance(bar)
+    return result

@@ -1,0 +1,162 @@
+"""Make docs/reproduction.md of what experiments left behind.
+
+    python -m papers.common.reproduction FOLDER...
+
+Folders are those that `python -m papers.liu2011 all -o FOLDER` and `python -m papers.ni2008 all -o FOLDER` wrote. A paper's first folder
+gives its pictures and tables; what further ones of the same paper, such as those of another recording, say of its claims stands beside.
+The part of a paper of which no folder is named stays as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from papers.common.claims import ANSWERS, all_of
+from papers.common.plotting import LARGEST
+from papers.common.writing import markdown
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.io._files import read_text, write_whole
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = "reproduction.md"
+KEYS = ("paper", "number", "name", "title", "command", "short", "recordings", "runs", "seconds", "environment", "said", "claims", "tables",
+        "pictures")  # fmt: skip
+
+Summary = dict[str, Any]
+"""What an experiment's NAME.json holds."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Parse, build; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m papers.common.reproduction", description="Make docs/reproduction.md of results.")
+    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
+    parser.add_argument("--docs", type=Path, default=DOCS, help="the folder of the page, with assets/ in it")
+    args = parser.parse_args(argv)
+    try:
+        build(args.folders, args.docs)
+    except ShadowPuppetError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def build(folders: Sequence[Path], docs: Path) -> None:
+    """Replace the parts of all papers that the folders have results of. Raises `ShadowPuppetError`."""
+    results = [(folder, read_results(folder)) for folder in folders]
+    page = read_text(docs / PAGE)
+    for paper in dict.fromkeys(result["paper"] for _, found in results for result in found):
+        own = [(folder, [each for each in found if each["paper"] == paper]) for folder, found in results]
+        own = [(folder, found) for folder, found in own if found]
+        place = re.compile(rf"(<!-- {paper} -->\n).*?(<!-- end of {paper} -->)", re.DOTALL)
+        if not place.search(page):
+            raise ShadowPuppetError(f"{docs / PAGE}: found no place for the results of {paper}, expected a line <!-- {paper} -->")
+        text = section([found for _, found in own])
+        page = place.sub(lambda match, text=text: f"{match[1]}\n{text}\n{match[2]}", page)
+        copy_pictures(*own[0], docs / "assets")
+    write_whole(docs / PAGE, page)
+
+
+def read_results(folder: Path) -> list[Summary]:
+    """All experiments' summaries in a folder, in the paper's order. Raises `ShadowPuppetError` where there is none."""
+    found = []
+    for path in sorted(folder.glob("*.json")):
+        try:
+            result = json.loads(read_text(path))
+        except json.JSONDecodeError as error:
+            raise ShadowPuppetError(f"{path}: found no JSON in line {error.lineno} ({error.msg.lower()})") from None
+        if not isinstance(result, dict) or any(key not in result for key in KEYS):
+            raise ShadowPuppetError(f"{path}: found no experiment's summary, expected a table with {', '.join(KEYS)}")
+        found.append(result)
+    if not found:
+        raise ShadowPuppetError(f"{folder}: found no NAME.json of an experiment in it")
+    return sorted(found, key=lambda result: result["number"])
+
+
+def section(folders: Sequence[Sequence[Summary]]) -> str:
+    """A paper's part of the page."""
+    first = folders[0]
+    machine = first[0]["environment"]
+    where = f"On {machine['cpu']}, {machine['cores']} cores, {machine['vectors']}; Python {machine['python']}, NumPy {machine['numpy']}."
+    parts = [where + short_warning(first), "### What the paper says, and what we got", count(first), claims(folders), contradictions(first)]
+    return "\n\n".join([part for part in parts if part] + [experiment(result) for result in first]) + "\n"
+
+
+def short_warning(results: Sequence[Summary]) -> str:
+    """Says so where results are of short versions."""
+    return " **These are results of the short versions, and mean little.**" if any(result["short"] for result in results) else ""
+
+
+def count(results: Sequence[Summary]) -> str:
+    """How many claims hold."""
+    same = [claim["same"] for result in results for claim in result["claims"]]
+    return (f"Of {len(same)} conclusions {same.count(True)} are the same here, {same.count(False)} are not, and for {same.count(None)} the "
+            "runs do not tell. What counts as the same is said in each row, and computed.")
+
+
+def claims(folders: Sequence[Sequence[Summary]]) -> str:
+    """The table of all claims; of further folders a pair of columns each."""
+    rows: dict[tuple[str, str], list[list[Summary]]] = {}
+    for k, results in enumerate(folders):
+        for claim in (claim for result in results for claim in result["claims"]):
+            rows.setdefault((claim["claim"], claim["where"]), [[] for _ in folders])[k].append(claim)
+    named = [recordings(results) for results in folders]
+    columns = ["paper said", "where"]
+    for name in named:
+        columns += ["we got", "same conclusion?"] if len(folders) == 1 else [f"we got: {name}", "same?"]
+    return markdown(columns, [[*key, *(cell for each in row for cell in judged(each))] for key, row in rows.items()])
+
+
+def judged(found: Sequence[Summary]) -> tuple[str, str]:
+    """What was got for a claim, of one or several recordings, and whether it holds for all of them."""
+    if not found:
+        return "", ""
+    return "; ".join(claim["got"] for claim in found), ANSWERS[all_of([claim["same"] for claim in found])]
+
+
+def recordings(results: Sequence[Summary]) -> str:
+    """What they were done on."""
+    return ", ".join(dict.fromkeys(name for result in results for name in result["recordings"]))
+
+
+def contradictions(results: Sequence[Summary]) -> str:
+    """What is not as the paper says, and what shows it."""
+    lines = [f"- *{claim['claim']}* ({claim['where']}): {claim['got']}; see [`{result['name']}`](#{anchor(result)})."
+             for result in results for claim in result["claims"] if claim["same"] is False]  # fmt: skip
+    return "\n\n".join(["**Where our runs contradict the paper:**", "\n".join(lines)]) if lines else ""
+
+
+def anchor(result: Summary) -> str:
+    """Where an experiment stands in the page."""
+    return f"{result['paper']}-{result['name']}".replace("_", "-")
+
+
+def experiment(result: Summary) -> str:
+    """An experiment's part: how it is made, what it says, pictures, tables."""
+    runs = f", {result['runs']} runs" if result["runs"] > 1 else ""
+    parts = [f"### {result['title']} {{ #{anchor(result)} }}", f"`{result['command']}`{runs}, {result['seconds']:.0f} s."]
+    pictures = [f"![{Path(name).stem.replace('_', ' ')}](assets/{result['paper']}_{name})" for name in result["pictures"]]
+    tables = [markdown(table["columns"], table["rows"]) for table in result["tables"].values()]
+    return "\n\n".join([*parts, *pictures, *(["\n".join(f"- {line}" for line in result["said"])] if result["said"] else []), *tables])
+
+
+def copy_pictures(folder: Path, results: Sequence[Summary], assets: Path) -> None:
+    """The pictures, under the paper's name. Raises `ShadowPuppetError` where one is missing or too large."""
+    for result in results:
+        for name in result["pictures"]:
+            source, goal = folder / name, assets / f"{result['paper']}_{name}"
+            if not source.is_file():
+                raise ShadowPuppetError(f"{source}: not there, expected a picture of the experiment {result['name']}")
+            if source.stat().st_size > LARGEST:
+                raise ShadowPuppetError(f"{source}: found {source.stat().st_size} bytes, expected at most {LARGEST}")
+            shutil.copyfile(source, goal)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
