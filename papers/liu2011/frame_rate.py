@@ -41,8 +41,8 @@ def make(request: Request) -> Outcome:
             outcome.tables[f"{name}_particles"] = Table(("N", "ms_a_frame"), list(zip(numbers, growth)))
             outcome.verdicts.append(verdict(case, stages, f"{name}.png"))
             outcome.settings |= told(case)
-    outcome.said.append("Processor time, so that other work on the machine does not count: the least of some rounds. The paper's processor is "
-                        "of 2009.")
+    outcome.said.append("Processor time, so that other work on the machine does not count: the least of some rounds. The paper's processor "
+                        "is of 2009.")
     return outcome
 
 
