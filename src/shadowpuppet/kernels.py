@@ -10,7 +10,8 @@ BLOCK = 32
 """Poses side by side in memory, so that one instruction works on eight (AVX-512) or four (AVX2) of them."""
 BARE: dict[str, Any] = {"cache": True, "nogil": True, "_nrt": False, "error_model": "numpy"}
 """A kernel gets all its arrays and makes none, so that Numba counts no references: where arrays are sliced in inner loops, that took more
-time than the work. Nor are divisions checked, which would keep loops from being vectorised: no kernel divides by zero.
+time than the work. Nor are divisions checked, which would keep loops from being vectorised: no kernel divides by zero. Python's lock is let
+go, so that several cameras are worked on at once: who keeps arrays for a kernel to work in keeps them from other threads meanwhile.
 
 Numba keeps what it compiled until the kernel's own file changes: after a change in a file that it calls into, remove `__pycache__`."""
 kernel = numba.njit(**BARE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +47,10 @@ def unpack(bits: Bits, width: int) -> NDArray[np.bool_]:
 def count(bits: Bits) -> int:
     """Number of pixels set."""
     return int(np.bitwise_count(bits).sum())
+
+
+IN_USE = Lock()
+"""Held while a kernel draws: pictures keep room for it, and may be used by several threads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,12 +176,13 @@ class Picture:
         joints = self._every if joints is None else joints
         block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses), np.int64)
-        _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
-                 (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
+        with IN_USE:
+            _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
+                     (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
         return out
 
     def _room(self, shapes: int, size: int) -> tuple:
-        """Room for a comparison, made once: a kernel keeps Python's lock while it uses it, and leaves nothing in it that counts."""
+        """Room for a comparison, made once: a kernel has it for itself (`IN_USE`), and leaves nothing in it that counts."""
         if (shapes, size) not in self._rooms:
             block = self._block(shapes, size)
             words, height = self.empty().shape

@@ -7,6 +7,7 @@ is its screw (`screws.py`), so that forces, moments and normal equations are pro
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ SUMS = 29
 """Sums of a part: of the normal equations 21 + 6, of the forces 3 + 3 + 1 + 3 + 6, at most."""
 COST, EQUATIONS, FORCES, ROBUST, MODULATED = 0, 1, 4, 1, 2
 """What a pass is for; to `FORCES` are added whether they are bounded, and whether they go by the normals."""
+IN_USE = Lock()
+"""Held while a kernel works: refiners keep room for it, and may be used by several threads."""
 STEP = 0.5
 """No DOF moves farther than this (rad or m) in one iteration."""
 
@@ -66,8 +69,9 @@ class Refiner:
     def costs(self, poses: Array, cloud: Cloud, tau: float | None = None) -> Array:
         """D of eq. 31 for poses (N, D): mean over the points of min(d^2, tau^2), m^2, of shape (N,). `tau`: another than the settings'."""
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses))
-        _costs(poses, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud), self._room,
-               out)
+        with IN_USE:
+            _costs(poses, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud),
+                   self._room, out)
         return out / max(cloud.total, 1e-9)
 
     def gauss_newton(self, poses: Array, passes: Sequence[Pass | tuple[Cloud, int, float]], centre: Array, pull: Array,
@@ -81,9 +85,10 @@ class Refiner:
         centre = np.ascontiguousarray(np.atleast_2d(centre), float)
         for each in passes:
             cloud, iterations, tau, space, emptiness = each if isinstance(each, Pass) else Pass(*each)
-            _gauss_newton(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
-                          max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room, self._system,
-                          self._spheres, space or self._nowhere, emptiness)
+            with IN_USE:
+                _gauss_newton(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
+                              max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room, self._system,
+                              self._spheres, space or self._nowhere, emptiness)
         return poses
 
     def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
@@ -91,8 +96,9 @@ class Refiner:
         poses = self.body.skeleton.checked(poses).copy()
         mode = FORCES + ROBUST * settings.robust + MODULATED * settings.modulated
         gains = settings.translation, settings.rotation
-        _forces(poses, mode, settings.hierarchical, gains, settings.iterations, self._chain, self._limbs, cloud.rows, cloud.spheres,
-                cloud.origin, self._numbers(), self._which(cloud), self._room, self._system[2])
+        with IN_USE:
+            _forces(poses, mode, settings.hierarchical, gains, settings.iterations, self._chain, self._limbs, cloud.rows, cloud.spheres,
+                    cloud.origin, self._numbers(), self._which(cloud), self._room, self._system[2])
         return poses
 
     def _numbers(self, tau: float | None = None) -> tuple[np.float32, np.float32]:

@@ -36,6 +36,8 @@ FEW, SMALLEST = 50, 0.5
 """Surface points, and their extent (m), from which on somebody may be there."""
 MANY, FEWER, ENOUGH = 40, 16, 6
 """Particles with few cameras, with many, and how many are that."""
+SUDDEN = 0.2
+"""An overlap that is less than the last one by this is as good as lost: limbs that are drawn to somebody who is elsewhere may overlap."""
 SETTLED = 10
 """Cycles on the first frame, after the search."""
 SETTLE = 10
@@ -180,14 +182,15 @@ class MultiviewTracker:
     """Poses (L, D) that the person may begin in, such as those of the training motion; None: a few usual ones."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
-        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, or comes back, is searched for afresh."""
+        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes
+        back, is searched for afresh."""
         evidence = Evidence(self.stage, points, masks)
         if not self.is_present(evidence):
             return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
         if state.status == "absent":
             return self.search(rng, evidence)
         after = self.cycle(rng, state, evidence)
-        if after.status == "lost":
+        if after.status == "lost" or after.overlap < state.overlap - SUDDEN:
             found = self.search(rng, evidence)
             return found if found.overlap > after.overlap else after
         return after
