@@ -91,7 +91,7 @@ def test_the_architecture_names_every_module():
     assert {name for name in named if not (PACKAGE / name).is_dir() and not (PACKAGE / f"{name}.py").is_file()} <= OUTSIDE
 
 
-OUTSIDE = {"tests", "benchmarks", "examples", "docs", "conftest", "src"}
+OUTSIDE = {"tests", "benchmarks", "papers", "examples", "docs", "conftest", "src"}
 
 
 def test_the_manual_documents_every_public_name():

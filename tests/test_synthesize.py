@@ -27,6 +27,7 @@ from shadowpuppet.synthetic import (
     Spec,
     Viewpoint,
     around,
+    humaneva,
     motions,
     named_specs,
     proving_ground,
@@ -36,6 +37,7 @@ from shadowpuppet.synthetic import (
     spec_text,
     synthesize,
 )
+from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded, gestures_from
 from shadowpuppet.synthetic.specfile import HEAD, seed_of
 from shadowpuppet.video import open_frames
@@ -110,7 +112,7 @@ def test_a_spec_with_a_ring_comes_back(ring):
 def test_named_specs_are_theirs_by_name_and_can_be_written():
     named = named_specs()
     assert {"demo", "ring_walking", "man_reach"} <= set(named)
-    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(proving_rings())
+    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(humaneva()) + len(proving_rings())
     for name, spec in named.items():
         assert spec.name == name
         assert spec_from(tomllib.loads(spec_text(spec))) == spec
@@ -445,3 +447,53 @@ def test_a_file_that_cannot_be_used_removes_nothing(shell, tmp_path):
     assert code == 2
     assert "gone.amc: " in err
     assert len(frames(tmp_path / "made" / "video" / "cam.mp4")) == 15
+
+
+# A part of a motion
+
+
+def test_a_film_may_show_a_part_of_the_motion():
+    whole = Spec(motion=gestures_from("walk 6"), rate=20)
+    times, figure = perform(whole, np.random.default_rng(1))
+    some, part = perform(replace(whole, begin=3, frames=11), np.random.default_rng(1))
+    np.testing.assert_allclose(some, times[:11])
+    assert np.linalg.norm(part.joints[0, 0] - figure.joints[0, 0]) > 0.3  # they are on their way
+    np.testing.assert_allclose(np.ptp(part.joints, axis=0), np.ptp(figure.joints[60:71], axis=0), atol=0.02)  # but for sway and tremor
+    to_the_end, _ = perform(replace(whole, begin=3), np.random.default_rng(1))
+    assert len(to_the_end) == len(times) - 60
+
+
+def test_a_film_longer_than_its_motion_is_told(tmp_path):
+    spec = Spec(motion=gestures_from("walk 4"), rate=10, begin=2, frames=40)
+    with pytest.raises(SettingsError, match=r"frames: found 40 pictures at 10 a second after 2 s, expected at most 37"):
+        perform(spec, np.random.default_rng(1))
+    with pytest.raises(SettingsError, match=r"found 1 pictures .* after 60 s, expected at most 0"):
+        perform(replace(spec, frames=None, begin=60), np.random.default_rng(1))
+
+
+def test_training_and_bystanders_of_a_part(tmp_path):
+    scene = Scene(empty_seconds=0.3, bystanders=(Bystander(),))
+    spec = Spec(motion=gestures_from("walk 4"), rate=10, begin=1.0, frames=3, training_frames=7, ring=Ring(count=2, size=(64, 48)),
+                scene=scene)
+    folder = synthesize(spec, tmp_path / "made")
+    assert len(read_joints(folder / "truth.csv").times) == 3
+    assert len(read_joints(folder / "training.csv").times) == 7
+    assert len(frames(folder / "people" / "cam1.mkv")) == 3
+
+
+def test_recordings_like_humanevas_are_of_the_papers_sizes():
+    for spec, (motion, count) in zip(humaneva(), (("walk", 433), ("jog", 393), ("box", 377)), strict=True):
+        times, figure = perform(spec, np.random.default_rng(spec.seed))
+        assert [gesture.motion for gesture in spec.motion] == [motion]
+        assert (len(times), spec.training_frames, spec.rate, len(spec.views())) == (count, 100, 60.0, 7)
+        hips = figure.joints[:, :1]
+        if motion != "box":  # from the first picture to the last they go
+            assert np.linalg.norm(np.diff(hips[:, 0, :2], axis=0), axis=1).min() > 0.5 / 60
+        else:  # and hands move in every half second
+            hands = figure.joints - hips
+            assert min(np.ptp(hands[n : n + 30], axis=0).max() for n in range(0, count - 30, 10)) > 0.05
+        for view in spec.views():
+            pixels = view.camera().project(figure.joints.reshape(-1, 3))
+            assert view.size == (640, 480)
+            assert (pixels > 20).all()
+            assert (pixels < np.array(view.size) - 20).all()  # nobody is cut

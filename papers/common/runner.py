@@ -34,7 +34,7 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
     if wrong := [name for name in args.names if name not in (*known, "all")]:
         parser.error(f"found {wrong[0]!r}, expected one of {', '.join([*known, 'all'])}")
     more = {name: value for name, value in vars(args).items() if name not in own}
-    flags = tuple(f"--{name.replace('_', '-')} {value}" for name, value in more.items() if value != parser.get_default(name))
+    flags = tuple(_flag(name, value) for name, value in more.items() if value != parser.get_default(name))
     request = Request(args.output, tuple(args.recording), 1, args.seed, args.short, args.workers, _tell, more, flags)
     try:
         _make_folder(request.output)
@@ -102,6 +102,12 @@ def _make_folder(folder: Path) -> None:
 
 def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
+
+
+def _flag(name: str, value: object) -> str:
+    """An option of the paper's own as it is given; of a folder its name alone."""
+    said = f"--{name.replace('_', '-')}"
+    return said if value is True else f"{said} {value.name if isinstance(value, Path) else value}"
 
 
 def _positive(text: str) -> int:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import calibration_commands, evaluation_commands, motion_commands
+from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.flags import (
     CAMERAS,
@@ -256,6 +256,7 @@ app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
 app.command(motion_commands.export)
 app.command(motion_commands.convert)
+app.command(batch_commands.batch)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
@@ -279,14 +280,14 @@ def _show_live(folder: Path, metrics: Mapping[str, Any]) -> None:
 
 
 def main(tokens: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit: 0, or 2 for a user's mistake, or 130 after Ctrl-C."""
+    """Run the command line and exit: 0, or 2 for a user's mistake, or 130 after Ctrl-C; 3 where some of many runs failed."""
     sys.exit(run(tokens))
 
 
 def run(tokens: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
-        app(list(tokens) if tokens is not None else None, exit_on_error=False, print_error=False, result_action="return_value")
+        code = app(list(tokens) if tokens is not None else None, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except (ShadowPuppetError, CycloptsError) as error:
         return _fail(error)
@@ -295,7 +296,8 @@ def run(tokens: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:  # as of `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
+        return 0
+    return code if isinstance(code, int) else 0
 
 
 def _fail(error: Exception) -> int:

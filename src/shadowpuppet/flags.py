@@ -13,7 +13,7 @@ from pydantic import BeforeValidator
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.options import PATHS, Options, default_of, make_options, read_options, settings_of
+from shadowpuppet.options import PATHS, Options, default_of, make_options, over, read_options, settings_of
 from shadowpuppet.settings import PriorSettings, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded
@@ -69,12 +69,7 @@ def options_from(flags: Any, config: Path | None) -> Options:
     """Options from flags over a file over the defaults. Raises `SettingsError`."""
     read = read_options(config) if config is not None else {}
     make_options(read, str(config))  # so that what is wrong in the file is said with its name
-    return make_options(_over(read, given(flags)), "flags")
-
-
-def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    both = {key: _over(below[key], value) for key, value in above.items() if isinstance(value, Mapping) and key in below}
-    return {**below, **above, **both}
+    return make_options(over(read, given(flags)), "flags")
 
 
 def _bare(hint: Any) -> Any:
@@ -107,12 +102,14 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = DemoFlags = SessionFlags = LiveFlags = PriorFlags = SpecFlags = Any
+    Flags = LookFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = PriorFlags = SpecFlags = Any
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
     LookFlags = flags_of(Options, without=("overlay",))
     """Those that matter where nothing is tracked."""
+    BatchFlags = flags_of(Options, without=("seed",))
+    """Those that many runs with seeds of their own may share."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
     """Those that matter where the recording is known."""
     SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training", "multiview"))

@@ -24,7 +24,11 @@ APART = 0.07
 SLIM = 0.7
 """A sphere's radius over the limb's smaller one: nobody is shaped like their model to the pixel."""
 TAU = 0.1
-"""How far (m) a sphere may reach out until it costs no longer the square: a silhouette may have lost a limb."""
+"""How far (m) a sphere may reach out until it costs no longer the square."""
+OTHERS = 3
+"""So many others that see somebody at a place outvote a camera that does not: its silhouette may have lost a limb."""
+MOST = 200
+"""Spheres of a body, at most."""
 MARGIN = 24
 """Pixels around the person to which the way back is looked up; farther out it is that to the nearest of these, and theirs."""
 
@@ -53,6 +57,8 @@ class FreeSpace(NamedTuple):
     """Of the cameras, of shape (C, 3, 3)."""
     bends: Array
     """Distortion, padded (8), whether it is a fisheye's, whether there is any, and how far it holds, of shape (C, 11)."""
+    room: Array
+    """What each camera says of each sphere, of shape (C, `MOST`, 4)."""
 
 
 def spheres_in(limbs: Limbs) -> Spheres:
@@ -63,7 +69,7 @@ def spheres_in(limbs: Limbs) -> Spheres:
             joints.append(limbs.joints[s])
             places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
             radii.append(SLIM * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
-    return Spheres(np.array(joints, np.int64), np.array(places), np.array(radii))
+    return Spheres(*(np.array(each)[:MOST] for each in (joints, places, radii)))
 
 
 def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
@@ -82,6 +88,7 @@ def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
         np.array([camera.T_camera_world[:3] for camera, _ in views], float).reshape(-1, 3, 4),
         np.array([camera.matrix for camera, _ in views], float).reshape(-1, 3, 3),
         np.array(bends, float).reshape(-1, 11),
+        np.empty((len(views), MOST, 4)),
     )
 
 
@@ -114,51 +121,75 @@ def _look_up(fields, window, x, y):  # pragma: no cover
     return distance, along, down
 
 
+@part
+def _ask(T, spheres, space, c, said):  # pragma: no cover
+    """What camera c says of the spheres, into said (K, 4): how far (m) a sphere reaches out of the silhouette, and how that grows along the
+    camera's axes. Nothing, less than any radius, of spheres that are not in its picture."""
+    V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
+    fisheye, bends, reach, focal = lens[8] > 0, lens[9] > 0, lens[10], np.sqrt(K[0, 0] * K[1, 1])
+    for k in range(spheres.radii.size):
+        joint, place, own = T[spheres.joints[k]], spheres.places[k], said[k]
+        own[0] = -np.inf
+        p0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3]
+        p1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3]
+        p2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3]
+        z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
+        if z < NEAR:
+            continue
+        u = (V[0, 0] * p0 + V[0, 1] * p1 + V[0, 2] * p2 + V[0, 3]) / z
+        v = (V[1, 0] * p0 + V[1, 1] * p1 + V[1, 2] * p2 + V[1, 3]) / z
+        a, b = bend_within(u, v, lens, fisheye, reach) if bends else (u, v)
+        x, y = K[0, 0] * a + K[0, 2], K[1, 1] * b + K[1, 2]
+        if not (0 <= x < window[5] and 0 <= y < window[6]):
+            continue
+        distance, along, down = _look_up(space.fields, window, x, y)
+        own[0] = distance * z / focal + spheres.radii[k]
+        own[1], own[2], own[3] = along, down, -(along * u + down * v)
+
+
 @kernel
 def push_inside(T, spheres, space, weight, origin, sums, adding):  # pragma: no cover
     """What it costs that spheres under transforms T (J, 3, 4) reach out of silhouettes: `weight` times the squared distances (m^2), beyond
     `TAU` the distances; where `adding`, what that says of the parts' motion is added to sums (J, >= 27) (see `refinement`)."""
-    if space.windows.shape[0] == 0:
+    cameras, number = space.windows.shape[0], spheres.radii.size
+    if cameras == 0:
         return 0.0
-    total, row = 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    share = weight / (spheres.radii.size * space.windows.shape[0])
-    for k in range(spheres.radii.size):
-        joint, place, own = T[spheres.joints[k]], spheres.places[k], sums[spheres.joints[k]]
-        p0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3]
-        p1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3]
-        p2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3]
-        for c in range(space.windows.shape[0]):
-            V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
-            z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
-            if z < NEAR:
-                continue
-            u = (V[0, 0] * p0 + V[0, 1] * p1 + V[0, 2] * p2 + V[0, 3]) / z
-            v = (V[1, 0] * p0 + V[1, 1] * p1 + V[1, 2] * p2 + V[1, 3]) / z
-            a, b = bend_within(u, v, lens, lens[8] > 0, lens[10]) if lens[9] > 0 else (u, v)
-            x, y = K[0, 0] * a + K[0, 2], K[1, 1] * b + K[1, 2]
-            if not (0 <= x < window[5] and 0 <= y < window[6]):
-                continue
-            distance, along, down = _look_up(space.fields, window, x, y)
-            pixels = np.sqrt(K[0, 0] * K[1, 1]) / z
-            r = distance / pixels + spheres.radii[k]
-            if r <= 0:
+    total, share = 0.0, weight / (number * cameras)
+    for c in range(cameras):
+        _ask(T, spheres, space, c, space.room[c])
+    for k in range(number):
+        inside = outside = 0
+        for c in range(cameras):
+            middle = space.room[c, k, 0] - spheres.radii[k]
+            outside += middle > 0
+            inside += -np.inf < middle <= 0
+        outvoted = outside == 1 and inside >= OTHERS
+        for c in range(cameras):
+            said, V = space.room[c, k], space.views[c]
+            r = said[0]
+            if r <= 0 or (outvoted and r > spheres.radii[k]):
                 continue
             fade = min(1.0, TAU / r)
             total += share * (r * r if fade == 1 else TAU * (2 * r - TAU))
-            if not adding:
-                continue
-            # the direction, in the world, in which the sphere gets back the fastest
-            g0, g1 = -along, -down
-            g2 = -(g0 * u + g1 * v)
-            n0 = V[0, 0] * g0 + V[1, 0] * g1 + V[2, 0] * g2
-            n1 = V[0, 1] * g0 + V[1, 1] * g1 + V[2, 1] * g2
-            n2 = V[0, 2] * g0 + V[1, 2] * g1 + V[2, 2] * g2
-            x0, x1, x2 = p0 - origin[0], p1 - origin[1], p2 - origin[2]
-            row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
-            at = 0
-            for i in range(6):
-                for j in range(i, 6):
-                    own[at] += share * fade * row[i] * row[j]
-                    at += 1
-                own[21 + i] += share * fade * row[i] * r
+            if adding:
+                joint, place = T[spheres.joints[k]], spheres.places[k]
+                x0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3] - origin[0]
+                x1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3] - origin[1]
+                x2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3] - origin[2]
+                n0 = -(V[0, 0] * said[1] + V[1, 0] * said[2] + V[2, 0] * said[3])
+                n1 = -(V[0, 1] * said[1] + V[1, 1] * said[2] + V[2, 1] * said[3])
+                n2 = -(V[0, 2] * said[1] + V[1, 2] * said[2] + V[2, 2] * said[3])
+                _add(n0, n1, n2, x0, x1, x2, share * fade, r, sums[spheres.joints[k]])
     return total
+
+
+@part
+def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
+    """Add to a joint's sums that a point x has to go a distance along n, as `refinement` does for surface points."""
+    row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
+    at = 0
+    for i in range(6):
+        for j in range(i, 6):
+            own[at] += weight * row[i] * row[j]
+            at += 1
+        own[21 + i] += weight * row[i] * distance

@@ -79,6 +79,6 @@ class PartialCost:
 
 def silhouette_costs(picture: Picture, observation: Observation, poses: ArrayLike) -> Array:
     """Eq. 2: pixels (N,) in which the drawn body and the silhouette differ, of whole poses (N, D)."""
-    poses = np.ascontiguousarray(poses, float)
-    every = PartialCost(picture, np.arange(len(picture.body.skeleton.dofs)))
-    return every.costs(observation, poses[0])(poses)
+    every, fixed = np.arange(len(picture.body.parts)), observation.ignore
+    added = picture.added(np.ascontiguousarray(poses, float), every, observation.silhouette, fixed)
+    return count(fixed ^ observation.silhouette) + added.astype(float)

@@ -88,17 +88,27 @@ class Prepared:
 
 def prepare(path: str, options: Options, rng: np.random.Generator) -> Prepared:
     """Look at a recording, and find the person. Raises a `ShadowPuppetError` where something cannot be used."""
+    return with_person(survey(path, options), options, rng)
+
+
+def survey(path: str, options: Options) -> Prepared:
+    """Look at a recording, without the person: what takes no chance, and is the same for every seed. Raises as `prepare` does."""
     footage = open_footage(path, options)
     sample = take_sample(footage, options.masks)
     seen = silhouettes(footage, sample, options)
     look = _first_look(footage, sample, seen)
     clear = seen if look.refusal else clear_silhouettes(footage, sample, seen, options)
-    prepared = Prepared(footage, sample, seen, clear, None, look)
-    if look.refusal is not None:
+    return Prepared(footage, sample, seen, clear, None, look)
+
+
+def with_person(prepared: Prepared, options: Options, rng: np.random.Generator) -> Prepared:
+    """A survey with the person found, where the look does not refuse. Raises as `prepare` does."""
+    if prepared.look.refusal is not None:
         return prepared
-    found = find(footage, sample, clear, options, rng)
+    clear, look = prepared.clear, prepared.look
+    found = find(prepared.footage, prepared.sample, clear, options, rng)
     guess = found.fit.guess
-    others = clear.segmenter.key if clear is not seen and clear.segmenter is not None else None
+    others = clear.segmenter.key if clear is not prepared.silhouettes and clear.segmenter is not None else None
     person = {"source": found.source, "silhouettes": others, "height": float(guess.height), "distance": float(guess.distance),
               "elevation": float(guess.elevation), "overlaps": dict(found.fit.overlaps), "start_overlap": found.start,
               "sizes": dict(zip(guess.sizes.names(), guess.sizes.to_array().tolist()))}

@@ -131,13 +131,24 @@ def make_options(values: Mapping[str, Any] | None = None, source: str = "setting
 def read_options(path: str | Path) -> dict[str, Any]:
     """Plain values from a TOML file of settings, or from the run.toml of an earlier run. Raises `SettingsError`."""
     path = Path(path)
-    data = read_toml(path, SettingsError)
-    if isinstance(data.get("settings"), dict) and "versions" in data:
-        data = data["settings"]
+    return settings_in(read_toml(path, SettingsError), path)
+
+
+def settings_in(data: Mapping[str, Any], path: Path, source: str | None = None) -> dict[str, Any]:
+    """Plain values from what a TOML file says, or a table of it; files are told from its folder on. Raises `SettingsError`."""
+    data = dict(data["settings"] if isinstance(data.get("settings"), dict) and "versions" in data else data)
     unknown = set(data) - {f.name for f in fields(Options)}
     if unknown:
-        raise SettingsError(f"{path}: unknown setting {min(unknown)!r}; there are: {choices(f.name for f in fields(Options))}")
+        names = choices(f.name for f in fields(Options))
+        raise SettingsError(f"{source or path}: unknown setting {min(unknown)!r}; there are: {names}")
     return data | {key: str(path.parent / data[key]) for key in PATHS if isinstance(data.get(key), str)}
+
+
+def over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain values with others in their place, tables within tables."""
+    both = {key: over(below[key], value) for key, value in above.items()
+            if isinstance(value, Mapping) and isinstance(below.get(key), Mapping)}  # fmt: skip
+    return {**below, **above, **both}
 
 
 def plain_options(options: Options) -> dict[str, Any]:

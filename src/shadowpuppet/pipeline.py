@@ -24,6 +24,7 @@ from shadowpuppet.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.overlay import OverlayWriter
 from shadowpuppet.rasterize import Picture
+from shadowpuppet.repeats import Repeats
 from shadowpuppet.rig import chosen_views, open_rig
 from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.rig_look import RigLook, check_rig, look_at_rig
@@ -57,8 +58,10 @@ def look_at(recording: str | Path, options: Options | None = None) -> Look | Rig
 
 @one_blas_thread()
 def track_recording(recording: str | Path, folder: str | Path, options: Options | None = None,
-                    listener: Listener | None = None) -> Summary:
+                    listener: Listener | None = None, repeats: Repeats | None = None) -> Summary:
     """Track a recording (folder, or film with `Options.fov`) into a run folder; one of several cameras as `rig_run` does.
+
+    `repeats` keeps what the next run of the same film can use; metrics.json tells `kept_silhouettes` of one that did.
 
     Beside what `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the camera) and, when
     asked for, overlay.mp4. An interrupted run keeps what it has. Raises a `ShadowPuppetError` where something cannot be used;
@@ -73,7 +76,8 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
         for_look, for_track = generators(options)
         listener.begin("looking")
         start = time.perf_counter()
-        prepared = prepare(str(recording), options, for_look)
+        prepared = prepare(str(recording), options, for_look) if repeats is None else repeats.prepare(recording, options, for_look)
+        run.metrics |= {"kept_silhouettes": True} if repeats is not None and repeats.reused else {}
         run.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         run.info |= {"truth": str(truth.resolve())} if (truth := prepared.footage.recording.truth) else {}

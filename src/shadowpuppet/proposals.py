@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
@@ -14,8 +16,8 @@ from shadowpuppet.whole_skeleton import GLOBAL
 
 REACH = (0.3, 1.0, 2.0)
 """What the noise of a defensive proposal is multiplied by, one of these each."""
-EXPLORED = 0.4
-"""Noise about a usual arm that is tried, rad."""
+EXPLORED, TRIED = 0.4, 16
+"""Noise about an arm that is tried, its own or a usual one (rad), and of how many the one is taken that is most like the silhouettes."""
 MOVED = 0.3
 """Chance of each joint to be moved by it: a limb that was lost is found again while all else stays."""
 
@@ -41,15 +43,17 @@ class Proposals:
                                         f"{', '.join(skeleton.dof_names)}: it is of another body")
             self.modelled = skeleton.dof_indices(prior.names)
 
-    def __call__(self, rng: np.random.Generator, poses: Array, last: Array, velocity: Array, scale: float = 1.0) -> Array:
+    def __call__(self, rng: np.random.Generator, poses: Array, last: Array, velocity: Array, scale: float = 1.0,
+                 unlike: Callable[[Array], Array] | None = None) -> Array:
         """Poses (N, D) to new ones: a share by plain dynamics, the others by the prior, where there is one.
 
-        The first of the plain ones is `last` (D,) itself, moved on by its `velocity` (D,), of which only place and heading count.
+        The first of the plain ones is `last` (D,) itself, moved on by its `velocity` (D,), of which only place and heading count. `unlike`:
+        how much poses (M, D) differ from the silhouettes (M,), by which arms that are tried are chosen; left out, any arm will do.
         """
         plain = round(self.settings.defensive * len(poses)) if self.prior is not None else len(poses)
         out = poses.copy()
         out[:, self.root] += self.settings.velocity * velocity[self.root]
-        out[:plain] = self._diffused(rng, out[:plain], scale)
+        out[:plain] = self._diffused(rng, out[:plain], scale, unlike)
         if plain:
             out[0] = last
             out[0, self.root] += self.settings.velocity * velocity[self.root]
@@ -59,17 +63,30 @@ class Proposals:
             out[plain:, walk] += scale * self.sigma[walk] * rng.standard_normal((len(poses) - plain, len(walk)))
         return self.skeleton.clamp(out)
 
-    def _diffused(self, rng: np.random.Generator, poses: Array, scale: float) -> Array:
+    def _diffused(self, rng: np.random.Generator, poses: Array, scale: float, unlike: Callable[[Array], Array] | None) -> Array:
         """Gaussian noise on all DOF (Table II's particle filter), or, where poses are refined afterwards, on some joints, near and far;
         some poses get another arm."""
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
         if self.settings.method == "particle_filter":
             return poses + noise
-        explored = range(len(poses) - round(self.settings.explore * len(poses)), len(poses))
+        explored = round(self.settings.explore * len(poses))
         far = rng.choice(REACH, size=(len(poses), 1))
         moved = rng.random((len(poses), len(self.skeleton.joints))) < MOVED
         out = poses + noise * far * moved[:, self.owners]
-        for n in explored:
-            dofs, arms = self.arms[rng.integers(2)]
-            out[n, dofs] = arms[rng.integers(len(arms))] + EXPLORED * rng.standard_normal(len(dofs))
+        if explored:
+            out[-explored:] = self._other_arms(rng, out[-explored:], unlike)
         return out
+
+    def _other_arms(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array] | None) -> Array:
+        """Poses (N, D) with another arm each: of some near its own and near usual ones, the most like what is seen."""
+        tried = 1 if unlike is None else TRIED
+        out = np.repeat(poses, tried, axis=0)
+        for n, pose in enumerate(poses):
+            dofs, arms = self.arms[rng.integers(2)]
+            usual = arms[rng.integers(len(arms), size=tried)]
+            about = np.where(rng.random((tried, 1)) < 0.5, pose[dofs], usual) if tried > 1 else usual
+            out[n * tried : (n + 1) * tried, dofs] = about + EXPLORED * rng.standard_normal((tried, len(dofs)))
+        if unlike is None:
+            return out
+        out = self.skeleton.clamp(out)
+        return out[np.arange(len(poses)) * tried + unlike(out).reshape(-1, tried).argmin(1)]

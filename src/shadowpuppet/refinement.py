@@ -79,7 +79,8 @@ class Refiner:
         """
         poses = self.body.skeleton.checked(poses).copy()
         centre = np.ascontiguousarray(np.atleast_2d(centre), float)
-        for cloud, iterations, tau, space, emptiness in (Pass(*each) for each in passes):
+        for each in passes:
+            cloud, iterations, tau, space, emptiness = each if isinstance(each, Pass) else Pass(*each)
             _gauss_newton(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
                           max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room, self._system,
                           self._spheres, space or self._nowhere, emptiness)

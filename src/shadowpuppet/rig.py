@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import os
 import time
 import warnings
 from collections.abc import Callable, Generator, Sequence
@@ -19,6 +18,7 @@ from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarni
 from shadowpuppet.footage import Footage, Mask, Shot, footage_of, opened
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.options import Options
+from shadowpuppet.threads import usable_cores
 from shadowpuppet.video import Image
 from shadowpuppet.video.frames import ASSUMED_RATE
 
@@ -141,11 +141,6 @@ def follow(rig: Rig, seen: Sequence[Callable[[Shot], Mask]], *, ready: bool = Fa
                 continue
             yield FrameSet(moment, tuple(t.image for t in taken), tuple(t.mask for t in taken), sum(t.decoding for t in taken),
                            sum(t.segmenting for t in taken))
-
-
-def usable_cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class _Taken(NamedTuple):

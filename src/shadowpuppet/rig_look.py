@@ -19,8 +19,9 @@ from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouet
 from shadowpuppet.look import GOOD, mean_overlap, quality_of
 from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
-from shadowpuppet.rig import Rig, follow, usable_cores
+from shadowpuppet.rig import Rig, follow
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.threads import usable_cores
 
 OPENING, OPENED = 2.0, 40
 """The first seconds in which the person is measured, and at most how many sets of silhouettes of them are kept."""

@@ -261,8 +261,7 @@ class GaussNewtonSettings:
     fine_tau: Positive = 0.04
     """The same in the fine ones."""
     emptiness: NonNegative = 2.0
-    """Weight of the mean squared distance by which limbs reach out of the silhouettes; in the fine iterations with few cameras
-    only."""
+    """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras."""
     damping: Positive = 0.03
     """Share of its own curvature by which each DOF is held back at first."""
     pull: NonNegative = 1e-5

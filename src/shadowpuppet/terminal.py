@@ -30,10 +30,10 @@ class Terminal(LiveListener):
     def __init__(self, quiet: bool = False) -> None:
         """`quiet`: nothing but warnings."""
         self.quiet, self.frames = quiet, 0
-        self._console = Console(stderr=True, highlight=False)
+        self.console = Console(stderr=True, highlight=False)
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
-                                  TimeRemainingColumn(), console=self._console, transient=True,
-                                  disable=quiet or not self._console.is_terminal)
+                                  TimeRemainingColumn(), console=self.console, transient=True,
+                                  disable=quiet or not self.console.is_terminal)
         self._task: TaskID | None = None
         self._said: set[str] = set()
         self._noted: dict[str, float] = {}
@@ -71,7 +71,7 @@ class Terminal(LiveListener):
         line = f"warning: {' '.join(message.split())}"
         if line not in self._said:
             self._said.add(line)
-            self._console.print(line, markup=False, soft_wrap=True)
+            self.console.print(line, markup=False, soft_wrap=True)
 
     def note(self, message: str) -> None:
         """Show what is to be known now; as a line where it was not said just before."""
@@ -79,12 +79,12 @@ class Terminal(LiveListener):
         if not self.quiet:
             self.begin(message)
             if text not in self._noted or now - self._noted[text] > REPEATED:
-                self._console.print(message, markup=False, soft_wrap=True)
+                self.console.print(message, markup=False, soft_wrap=True)
             self._noted[text] = now
 
     def trouble(self, message: str) -> None:
         """Say that no pictures come."""
-        self._console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
+        self.console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
 
     def stop(self) -> None:
         """Take the bar away."""
@@ -105,7 +105,9 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         warnings.showwarning = shown._show_warning
         try:
             yield shown
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            if interrupt.args:
+                raise  # it tells by itself what was kept
             kept = f"the {shown.frames} frames so far are in {folder}" if shown.frames and folder else nothing
             raise KeyboardInterrupt(kept) from None
         finally:

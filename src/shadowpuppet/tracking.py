@@ -207,7 +207,8 @@ class MultiviewTracker:
         for cycle in range(s.cycles):
             around, scale = pose, s.cooling**cycle
             particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
-                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale))  # noqa: B023
+                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale,  # noqa: B023
+                                                                       evidence.differing))
             weights = normalise(particles.log_weights)
             pose = particles.best if s.estimate == "best" else weights @ particles.poses
         return self.judge(pose, pose - state.pose, particles, evidence, weigh)
@@ -244,10 +245,10 @@ class MultiviewTracker:
             some, half = evidence.cloud(g.share), s.forces.iterations // 2  # far from the goal, some of the points are enough
             coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
             return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), evidence.full, fine)
-        # silhouettes bring limbs back that reach out of them, but have faults of their own: the surface of many cameras needs no more
-        space = evidence.space if g.emptiness else None
+        # many cameras' surface tells enough, and costs more time already
+        space = evidence.space if g.emptiness and len(self.cameras) < ENOUGH else None
         coarse = Pass(evidence.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
-        fine = Pass(evidence.full, g.fine, g.fine_tau, space, g.emptiness if len(self.cameras) < ENOUGH else 0.0)
+        fine = Pass(evidence.full, g.fine, g.fine_tau, space, g.emptiness)
         centre, pull = self.usual.held(last, g.pull, s.posture)
         return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, named_specs, proving_ground, proving_rings
+from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, humaneva, named_specs, proving_ground, proving_rings
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Bystander, Gesture, Scene, Spec, spec_from
@@ -29,6 +29,7 @@ __all__ = [
     "around",
     "demo_ring_spec",
     "demo_spec",
+    "humaneva",
     "named_specs",
     "proving_ground",
     "proving_rings",

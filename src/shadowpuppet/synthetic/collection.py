@@ -101,6 +101,35 @@ def around() -> tuple[Spec, ...]:
     return tuple(specs)
 
 
+HUMANEVA: tuple[tuple[str, Kind, int, str, float, int, float, float, tuple[int, int]], ...] = (
+    # name, kind and seed of the body, gestures, seconds of them before the film, its frames (Ni 2008, Table I), distance (m) and field of
+    # view (degrees) of the cameras, seeds of clothes and room
+    ("humaneva_walking", "man", 21, "walk 11", 2.0, 433, 4.8, 48, (92, 92)),
+    ("humaneva_jogging", "woman", 22, "jog 10", 2.0, 393, 4.8, 48, (81, 81)),
+    ("humaneva_boxing", "man", 23, "box 10", 1.2, 377, 4.2, 42, (91, 92)),
+)
+TRAINING_FRAMES = 100
+"""Frames that Ni 2008 learns from (Table I)."""
+
+
+def humaneva() -> tuple[Spec, ...]:
+    """Recordings as those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 pictures a second, 433, 393 and 377 pictures of
+    somebody who walks, jogs and boxes from the first to the last, and 100 frames of the same person's joints to learn from.
+
+    HumanEva itself needs a licence (`io.humaneva`). Here people move by published angles, not by motion capture, and what is learnt from is
+    another performance of the same motion.
+    """
+    return tuple(_humaneva(n, *row) for n, row in enumerate(HUMANEVA))
+
+
+def _humaneva(n: int, name: str, kind: Kind, seed: int, gestures: str, begin: float, frames: int, radius: float,
+              fov: float, look: tuple[int, int]) -> Spec:  # fmt: skip
+    body, scene = Mannequin.draw(np.random.default_rng(seed), kind), Scene(clothing=look[0], room=look[1])
+    ring = Ring(count=7, radius=radius, fov_deg=fov, jitter=0.5, seed=10 + n, size=VGA, distortion=PLAIN_LENS)
+    return Spec(name=name, body=body, motion=gestures_from(gestures), begin=begin, frames=frames, training_frames=TRAINING_FRAMES,
+                ring=ring, scene=scene, rate=60, tells="height", seed=(3, n))
+
+
 VGA, WIDE_LENS, PLAIN_LENS = (640, 480), (-0.22, 0.06, 0.0, 0.0), (-0.09, 0.05, 0.0, 0.0)
 Row = tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float]
 
@@ -149,4 +178,4 @@ def proving_rings() -> tuple[Spec, ...]:
 
 def named_specs() -> dict[str, Spec]:
     """All of them by name: the demo's, the proving ground's, and those of several cameras."""
-    return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *proving_ground(), *around(), *proving_rings())}
+    return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *proving_ground(), *around(), *humaneva(), *proving_rings())}

@@ -11,7 +11,7 @@ from warnings import warn
 import numpy as np
 
 from shadowpuppet.camera import Camera
-from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
+from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions
 from shadowpuppet.synthetic.kinematics import Figure, pose
@@ -63,18 +63,26 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
 
 
 def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
-    """Times (T,), seconds, and the figure of `spec` in its motion at those times."""
+    """Times (T,), seconds from the first picture, and the figure of `spec` in its motion at those times.
+
+    Raises `SettingsError` where the motion is over before the film is.
+    """
     from shadowpuppet.synthetic.performance import perform, seconds_of
 
-    times = np.arange(int(seconds_of(spec.motion) * spec.rate + 1e-6) + 1) / spec.rate
-    return times, perform(spec.body, spec.motion, times, rng, spec.still, np.radians(spec.turn_deg))
+    there = int((seconds_of(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
+    if there < max(spec.frames or 1, 1):
+        raise SettingsError(f"frames: found {spec.frames or 1} pictures at {spec.rate:g} a second after {spec.begin:g} s, expected at most "
+                            f"{max(there, 0)}: then the motion is over")
+    times = np.arange(spec.frames or there) / spec.rate
+    return times, perform(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
     """A bystander in `count` pictures, where they stand."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
-    _, figure = perform(replace(spec, body=body_of(someone), motion=gestures, turn_deg=someone.turn_deg), rng)
+    always = replace(spec, body=body_of(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
+    _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
@@ -136,7 +144,7 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
     write_truth(folder / "truth", times, figure.joints, spec.rate)
     own = spec.motion if spec.training is None else spec.training
     if len(cameras) > 1 and own and not (own == spec.motion and any(gesture.file for gesture in own)):  # a file plays the same every time
-        again, rehearsal = perform(replace(spec, motion=own), rng)
+        again, rehearsal = perform(replace(spec, motion=own, frames=spec.training_frames), rng)
         write_truth(folder / "training", again, rehearsal.joints, spec.rate)
 
 

@@ -128,6 +128,12 @@ class Spec:
     """Gestures, one after another."""
     training: tuple[Gesture, ...] | None = None
     """With several cameras, gestures of the motion to learn from: left out, the same ones a second time; an empty list, there is none."""
+    begin: Annotated[float, Field(ge=0, le=3600)] = 0.0
+    """Seconds of the motion, its 0.8 s of standing included, that are over when the film and the training motion begin."""
+    frames: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    """Pictures of the film; left out, to the motion's end."""
+    training_frames: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    """Frames of the training motion; left out, to its end."""
     cameras: Annotated[tuple[Viewpoint, ...], Field(min_length=1)] = (Viewpoint(),)
     """One camera, or several."""
     ring: Ring | None = None

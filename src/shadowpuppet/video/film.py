@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.threads import thread_limit
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, reason, size_of
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
         if not streams or container.format.name == "tty":  # FFmpeg draws text files as pictures
             raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
         streams[0].thread_type = "AUTO"
+        streams[0].codec_context.thread_count = thread_limit() or 0  # 0: as FFmpeg likes
         yield container, streams[0]
 
 

@@ -1,0 +1,131 @@
+"""Reading a recording into the arrays of a `Case`: silhouettes, surface points, sizes, and the poses that stand for truth and training."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from papers.ni2008.inputs import BODY, Source
+from shadowpuppet.bodies import make_body
+from shadowpuppet.camera import Camera
+from shadowpuppet.errors import RecordingError
+from shadowpuppet.geometry import Array
+from shadowpuppet.inverse_kinematics import fit_poses
+from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.recording import read_recording
+from shadowpuppet.masks import Mask
+from shadowpuppet.measuring import measure, spread_of
+from shadowpuppet.motion import JointTable
+from shadowpuppet.options import make_options
+from shadowpuppet.rasterize import Picture
+from shadowpuppet.rig import follow, open_rig
+from shadowpuppet.rig_look import check_rig, look_at_rig
+from shadowpuppet.settings import make_multiview_settings
+from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+
+OPENING, OPENED, FEW = 2.0, 24, 5
+"""The first seconds in which the person is measured; how many frames of them are taken; and of small pictures."""
+
+
+class Seen(NamedTuple):
+    """One set of silhouettes."""
+
+    time: float
+    masks: list[Mask | None]
+
+
+def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
+    """A recording's cameras and arrays, as `shadowpuppet track` would see it."""
+    assert source.path is not None
+    recording, options = read_recording(source.path), make_options({"preset": "ni2008", "masks": source.masks})
+    for what, path in (("truth", recording.truth), ("training motion", recording.training)):
+        if path is None:
+            raise RecordingError(f"{source.path}: found no {what}, which the experiments of Ni 2008 need: truth.csv and training.csv")
+    assert recording.truth is not None
+    assert recording.training is not None
+    rig = open_rig(source.path, options)
+    prepared = look_at_rig(rig, options)
+    check_rig(prepared)
+    sets = follow(rig, prepared.silhouettes, ready=source.masks)
+    seen = (Seen(each.time, list(each.masks)) for each in sets)
+    return rig.cameras, _arrays(rig.cameras, rig.rate, seen, read_joints(recording.truth), read_motion(recording.training), OPENED)
+
+
+def drawn(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
+    """A spec's motion by the anatomical body, whose silhouettes are drawn: seconds in place of minutes, and no model is tracked with its
+    own shape."""
+    spec = source.spec
+    assert spec is not None
+    for_motion, for_training = np.random.default_rng(spec.seed).spawn(2)
+    tables = []
+    for chance, frames in ((for_motion, spec.frames), (for_training, spec.training_frames)):
+        times, figure = perform(replace(spec, frames=frames), chance)
+        tables.append(JointTable(times, JOINTS, figure.joints))
+    film = fit_poses(tables[0], "anatomical")
+    again = fit_poses(tables[1], "anatomical", film.sizes)
+    cameras = tuple(_smaller(view.camera(), source.factor) for view in spec.views())
+    pictures = [Picture(film.body, camera, camera.T_camera_world) for camera in cameras]
+    seen = (Seen(float(time), [picture.mask(pose) for picture in pictures]) for time, pose in zip(film.times, film.poses))
+    truth, training = (JointTable(fit.times, fit.body.landmark_names, fit.body.points(fit.poses)) for fit in (film, again))
+    return cameras, _arrays(cameras, spec.rate, seen, truth, training, OPENED if source.factor == 1 else FEW)
+
+
+def _smaller(camera: Camera, factor: float) -> Camera:
+    return camera if factor == 1 else camera.resized((round(camera.size[0] * factor), round(camera.size[1] * factor)))
+
+
+def _arrays(cameras: tuple[Camera, ...], rate: float, seen: Iterator[Seen], truth: JointTable, training: JointTable,
+            measured: int) -> dict[str, Any]:
+    """All that a case keeps, of sets of silhouettes; frames after the truth's last are left out. `measured`: frames for the sizes."""
+    hull, times, bits, given, surface = VisualHull(cameras), [], [], [], list[SurfacePoints]()
+    for each in seen:
+        if each.time > truth.times[-1] + 0.5 / rate:
+            break
+        times.append(each.time)
+        given.append([mask is not None for mask in each.masks])
+        bits.append([np.packbits(np.zeros(camera.size[::-1], bool) if mask is None else mask, axis=1)
+                     for mask, camera in zip(each.masks, cameras, strict=True)])
+        surface.append(hull.points(each.masks))
+    learnt = fit_poses(training, BODY, source="training")
+    known = learnt.poses[np.isfinite(learnt.poses).all(1)]
+    sizes = _measured(cameras, np.array(times), bits, surface, learnt.sizes, known, measured)
+    chosen = np.abs(truth.times[:, None] - np.array(times)).argmin(0)
+    true = JointTable(np.array(times), truth.names, truth.positions[chosen])
+    return {
+        "times": np.array(times), "rate": np.array(rate), "bits": _stacked(bits), "given": np.array(given),
+        "ends": np.cumsum([0, *(len(each.points) for each in surface)]),
+        "points": np.concatenate([each.points for each in surface]), "normals": np.concatenate([each.normals for each in surface]),
+        "weights": np.concatenate([each.weights for each in surface]), "seen_by": np.concatenate([each.cameras for each in surface]),
+        "sizes": sizes.to_array(), "joint_names": np.array(truth.names), "truth": true.positions,
+        "true_poses": fit_poses(true, BODY, sizes, source="truth").poses, "training": fit_poses(training, BODY, sizes).poses,
+    }  # fmt: skip
+
+
+def _stacked(bits: list[list[NDArray[np.uint8]]]) -> NDArray[np.uint8]:
+    """Packed masks (T, C, H, W / 8), of cameras whose pictures differ in size those of the largest."""
+    height, width = (max(row.shape[axis] for row in bits[0]) for axis in (0, 1))
+    out = np.zeros((len(bits), len(bits[0]), height, width), np.uint8)
+    for t, rows in enumerate(bits):
+        for c, row in enumerate(rows):
+            out[t, c, : row.shape[0], : row.shape[1]] = row
+    return out
+
+
+def _measured(cameras: tuple[Camera, ...], times: Array, bits: list[list[NDArray[np.uint8]]], surface: list[SurfacePoints], sizes: Any,
+              library: Array, frames: int) -> Any:
+    """The person's sizes, bones as in the training motion, widths as the first seconds' silhouettes have them."""
+    last = int(np.searchsorted(times, times[0] + OPENING))
+    chosen = np.unique(np.linspace(0, max(last - 1, 0), frames).astype(int))
+    first = [(surface[n], [np.unpackbits(row, axis=1, count=camera.size[0]).astype(bool) for row, camera in zip(bits[n], cameras)])
+             for n in chosen]
+    settings = make_multiview_settings("ni2008")
+    return measure(np.random.default_rng(0), partial(make_body, BODY), sizes, spread_of(sizes, shown=True), cameras, first, settings,
+                   library).sizes

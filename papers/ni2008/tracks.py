@@ -1,0 +1,173 @@
+"""The three methods of Ni 2008 (VII) over a case, frame by frame; every run stays in a file, so that figures share them.
+
+The loop is the paper's: search for the first pose, then `MultiviewTracker.cycle` alone. What `shadowpuppet track` does beyond it, finding
+somebody again who was lost, is left out: whether a method loses the person is what is asked.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from papers.common.experiment import Request
+from papers.common.many import run_all
+from papers.ni2008.inputs import BODY, Case, key_of, opened
+from shadowpuppet.evidence import Evidence
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion import JointTable
+from shadowpuppet.settings import PriorSettings, make_multiview_settings
+from shadowpuppet.tracking import MultiviewTracker
+from shadowpuppet.training import modelled
+from shadowpuppet.vqpca import Fit, fit_prior
+
+REGIONS, DIMENSIONS = 20, 3
+"""M and m of Table II's hybrid."""
+ITERATIONS = 160
+"""Of the image force: its frame takes an eighth to a fifth of the hybrid's in Table II, with a fortieth of the particles, so that each gets
+some eight times the 20 iterations of a hybrid's particle."""
+PLAIN = {"modulated": False, "robust": False, "iterations": ITERATIONS}
+"""Forces as those of ref. [11]: no normals, no bound. Its dynamics, too, pass a force on along the limbs, which here are the sums over what
+hangs on a joint; with these left out each joint feels its own part alone."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A method with its settings."""
+
+    name: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Beside the preset's, `ni2008`."""
+    regions: int = REGIONS
+    """M of the motion prior, where there is one."""
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """For files."""
+        return {"settings": dict(self.settings), "regions": self.regions}
+
+
+HYBRID = Way("hybrid")
+IMAGE_FORCE = Way("image force", {"method": "image_force", "velocity": 0.0, "forces": PLAIN})
+ALONE = Way("image force, each joint alone", {"method": "image_force", "velocity": 0.0, "forces": PLAIN | {"hierarchical": False}})
+
+
+def particle_filter(particles: int = 1000) -> Way:
+    """The plain one: noise in all degrees of freedom, neither prior nor refinement. The paper does not say how much; of 0.02, 0.035, 0.05
+    and 0.1 rad, 0.035 was best on the first 80 frames of the made walking."""
+    noise = {"sigma_rotation": 0.035, "sigma_heading": 0.03, "sigma_translation": 0.01}
+    return Way("particle filter", {"method": "particle_filter", "particles": particles, **noise})
+
+
+def hybrid(regions: int = REGIONS, particles: int = 40) -> Way:
+    """The paper's method with another M or N."""
+    return Way("hybrid", {} if particles == 40 else {"particles": particles}, regions)
+
+
+class Track(NamedTuple):
+    """A run over a case."""
+
+    poses: Array
+    """The estimates, of shape (T, D)."""
+    seconds: Array
+    """Of the processor for each frame, of shape (T,); silhouettes and surface points are not in them."""
+    overlap: Array
+    """Of the drawn body and the silhouettes, of shape (T,)."""
+
+    def joints(self, case: Case) -> JointTable:
+        """Where the body's joints are."""
+        return JointTable(case.times, case.body.landmark_names, case.body.points(self.poses))
+
+    @property
+    def pace(self) -> float:
+        """Median seconds a frame."""
+        return float(np.median(self.seconds[1:]))
+
+
+class Job(NamedTuple):
+    """A run that is to be done."""
+
+    folder: Path
+    """Of the case."""
+    name: str
+    way: Way
+    seed: int
+    file: Path
+
+
+def tracks(request: Request, cases: Iterable[Case], ways: Sequence[Way],
+           seeds: Sequence[int] | None = None) -> dict[tuple[str, str], list[Track]]:
+    """Runs of every case, way and seed, by case and way, in the order of the seeds; those that are not there yet are done now."""
+    wanted = list(request.seeds) if seeds is None else list(seeds)
+    jobs = {(case.name, _key(way)): [_job(request, case, way, seed) for seed in wanted] for case in cases for way in ways}
+    missing = [job for some in jobs.values() for job in some if not job.file.exists()]
+    if missing:
+        run_all("runs", run, missing, request.workers)
+    return {key: [read_track(job.file) for job in some] for key, some in jobs.items()}
+
+
+def of(found: Mapping[tuple[str, str], list[Track]], case: Case, way: Way) -> list[Track]:
+    """Those of a case and way."""
+    return found[case.name, _key(way)]
+
+
+def run(job: Job) -> None:
+    """Track, and write the file."""
+    track = follow(opened(job.folder, job.name), job.way, job.seed)
+    job.file.parent.mkdir(parents=True, exist_ok=True)
+    part = job.file.with_name(f"{job.file.stem}.part.npz")
+    np.savez_compressed(part, **track._asdict())
+    part.replace(job.file)
+
+
+def read_track(file: Path) -> Track:
+    """A run that was written."""
+    with np.load(file, allow_pickle=False) as arrays:
+        return Track(**{name: arrays[name] for name in Track._fields})
+
+
+def follow(case: Case, way: Way, seed: int) -> Track:
+    """The method over all frames of a case."""
+    settings = make_multiview_settings("ni2008", way.settings)
+    prior = learn(case, way.regions, seed).prior if settings.method == "hybrid" else None
+    tracker = MultiviewTracker(case.body, case.cameras, settings, prior, case.training)
+    searching = replace(tracker, settings=make_multiview_settings("ni2008"), prior=None)  # all methods begin alike
+    rng, state, poses, seconds, overlap = np.random.default_rng([seed, 1]), None, [], [], []
+    for frame in range(case.frames):
+        points, masks = case.points(frame), case.masks(frame)
+        start = time.process_time()
+        if state is None:
+            state = searching.start(rng, points, masks)
+        elif len(points.points):
+            state = tracker.cycle(rng, state, Evidence(tracker.stage, points, masks))
+        seconds.append(time.process_time() - start)
+        poses.append(state.pose)
+        overlap.append(state.overlap)
+    return Track(np.array(poses), np.array(seconds), np.array(overlap))
+
+
+def learn(case: Case, regions: int, seed: int) -> Fit:
+    """The motion prior of a case's training poses."""
+    names = modelled(case.body.skeleton)
+    poses = case.training[:, case.body.skeleton.dof_indices(names)]
+    return fit_prior(np.random.default_rng([seed, 0]), [poses], PriorSettings(regions=regions, dimensions=DIMENSIONS), names=names,
+                     rate=case.rate)
+
+
+def most_regions(case: Case) -> int:
+    """How many regions the training poses allow."""
+    return len(np.unique(case.training, axis=0))
+
+
+def _key(way: Way) -> str:
+    return json.dumps(way.plain, sort_keys=True)
+
+
+def _job(request: Request, case: Case, way: Way, seed: int) -> Job:
+    file = request.output / "runs" / case.name / f"{key_of([case.path.name, way.plain, seed, BODY])}.npz"
+    return Job(case.path, case.name, way, seed, file)

@@ -1,0 +1,87 @@
+"""Who does the tasks on other machines: the workers of a Dask cluster, for which the extra `batch` is needed."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from shadowpuppet.batch.crew import BatchListener, Outcome
+from shadowpuppet.batch.plan import Task
+from shadowpuppet.errors import ShadowPuppetError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+PATIENCE = 20
+"""Seconds that a scheduler may take to answer."""
+_kept = threading.local()
+"""What a worker's thread keeps from task to task, and of which batch."""
+
+
+def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome:
+    """One task, on a worker of a cluster; `start`: of the batch, at which recordings may have changed."""
+    from shadowpuppet.batch.task import do
+    from shadowpuppet.repeats import Repeats
+    from shadowpuppet.threads import limit_threads
+
+    limit_threads()
+    if getattr(_kept, "start", None) != start:
+        _kept.start, _kept.repeats = start, Repeats()
+    return do(task, out, _kept.repeats if reuse else None)
+
+
+class Cluster:
+    """The workers of a Dask cluster. They must see the same files under the same names, and have this package."""
+
+    def __init__(self, address: str, out: Path, start: str, reuse: bool, listener: BatchListener) -> None:
+        """`address`: of the scheduler, or of a scheduler file; `out`: the batch's folder."""
+        self._address, self._out, self._start, self._reuse, self._listener = address, out, start, reuse, listener
+        self._tasks: dict[Future, Task] = {}
+        self._tries: dict[str, int] = {}
+
+    def __enter__(self) -> Self:
+        """Reach the scheduler."""
+        try:
+            from distributed import Client, as_completed
+        except ImportError:
+            raise ShadowPuppetError("scheduler: Dask's `distributed` is not installed; pip install 'shadowpuppet[batch]'") from None
+        file: dict[str, Any] = {("scheduler_file" if Path(self._address).is_file() else "address"): self._address}
+        try:
+            self._client: Client = Client(**file, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as error:
+            said = " ".join(str(error).split())
+            raise ShadowPuppetError(f"scheduler: found {self._address!r}, at which no Dask scheduler answers ({said}); expected an address "
+                                    "as tcp://host:8786, or a scheduler file") from None
+        self._ended = as_completed(loop=self._client.loop)
+        threads: Any = self._client.nthreads()  # by worker
+        if any(count > 1 for count in threads.values()):
+            self._listener.note("the cluster's workers have several threads each, of which mostly one runs: start them with --nthreads 1")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let go of what is not done; a run that a worker is at comes to its end, and is found by the next start."""
+        if self._client.status == "running":
+            self._client.cancel(list(self._tasks), force=True)
+        self._client.close()
+
+    def put(self, task: Task) -> None:
+        """One more, for whoever is free."""
+        tried = self._tries[task.id] = self._tries.get(task.id, 0) + 1
+        future = self._client.submit(do_there, task.wire(), str(self._out), self._start, self._reuse, pure=False,
+                                     key=f"shadowpuppet-{self._start}-{task.id}-{tried}")
+        self._tasks[future] = task
+        self._ended.add(future)
+
+    def next(self) -> tuple[Task, Outcome]:
+        """Wait for one."""
+        future = next(self._ended)
+        task = self._tasks.pop(future)
+        if future.status == "finished":
+            return task, future.result()
+        if future.status in ("cancelled", "lost"):
+            raise ShadowPuppetError(f"scheduler: the connection to {self._address} was lost")
+        error = future.exception()
+        said = "its workers were lost, one after another: killed, or out of memory" if type(error).__name__ == "KilledWorker" else \
+            f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
+        return task, {"status": "failed", "message": said, "again": True, "seconds": None}

@@ -1,0 +1,161 @@
+"""What a batch is to run: a task for every recording, choice of settings and seed, known by a hash of all that it depends on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from shadowpuppet.batch.grid import MOST, Case
+from shadowpuppet.errors import SettingsError, ShadowPuppetError
+from shadowpuppet.io._plain import plain
+from shadowpuppet.io.calibration import read_toml
+from shadowpuppet.options import PATHS, make_options, plain_options
+from shadowpuppet.repeats import film_of
+
+PARTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
+"""What of a recording's folder a run depends on; other files may come and go."""
+ENDS = 65536
+"""Bytes at a file's start and end that tell it from others of its size: films are too long to be read for that."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One run; plain values, so that it can be sent to a worker."""
+
+    id: str
+    """Hash of the recording's name and content, the settings and the seed."""
+    recording: str
+    """Its whole path."""
+    name: str
+    """Of the recording: its folder's, with those above it where two are called the same."""
+    case: str
+    seed: int
+    settings: dict[str, Any]
+    """All of them, plain values, with the seed."""
+    varied: dict[str, Any]
+    """Those that differ from task to task, by dotted name."""
+    film: str
+    """Equal for tasks whose silhouettes are."""
+
+    choice: str
+    """Case and values of the grid, in words; empty where nothing varies."""
+    label: str
+    """In words: recording, case, values of the grid, seed."""
+    folder: str
+    """Name of the run's folder: the label, and the id, so that it is one of its own."""
+
+    def wire(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: Sequence[int]) -> list[Task]:
+    """A task for each recording, case and seed, in this order. Raises `SettingsError` where two would be the same run."""
+    if not recordings:
+        raise SettingsError("recordings: found none, expected one or more")
+    if len(recordings) * len(cases) * len(seeds) > MOST:
+        raise SettingsError(f"batch: found {len(recordings)} recordings x {len(cases)} choices of settings x {len(seeds)} seeds, "
+                            f"expected at most {MOST} runs")
+    paths = [Path(recording).resolve() for recording in recordings]
+    for n, path in enumerate(paths):
+        if path in paths[:n]:
+            raise SettingsError(f"recordings: found {recordings[n]} twice, expected each once")
+    names = _names(paths)
+    varied = sorted({name for case in cases for name in case.varied})
+    chosen = [_Chosen(case, varied) for case in cases]
+    _check_different(chosen)
+    prints = [fingerprint(path) for path in paths]
+    return [choice.task(str(path), name, print_, seed) for path, name, print_ in zip(paths, names, prints) for choice in chosen
+            for seed in seeds]  # fmt: skip
+
+
+class _Chosen:
+    """A case's settings, complete."""
+
+    def __init__(self, case: Case, varied: Sequence[str]) -> None:
+        self.case = case
+        self.settings = plain(plain_options(make_options(case.values)), "settings")
+        self.varied = {name: _found(self.settings, name) for name in varied}
+        files = {name: fingerprint(Path(self.settings[name])) for name in PATHS if name in self.settings}
+        self.said = {key: value for key, value in (self.settings | files).items() if key != "seed"}
+
+    def task(self, recording: str, name: str, content: str, seed: int) -> Task:
+        said = json.dumps([name, content, self.said, seed], sort_keys=True)
+        film = json.dumps(film_of(recording, self.settings), sort_keys=True)
+        label, id = ", ".join(filter(None, [name, self.case.label, f"seed {seed}"])), _hash(said)
+        words = re.sub(r"[^A-Za-z0-9.+_-]+", "-", label.replace(", ", "_")).strip("-.")
+        return Task(id, recording, name, self.case.name, seed, self.settings | {"seed": seed}, self.varied, _hash(film), self.case.label,
+                    label, f"{words[:80]}_{id}")
+
+
+def _check_different(chosen: Sequence[_Chosen]) -> None:
+    known: dict[str, Case] = {}
+    for choice in chosen:
+        other = known.setdefault(json.dumps(choice.said, sort_keys=True), choice.case)
+        if other is not choice.case:
+            raise SettingsError(f"grid: found {choice.case.label!r} and {other.label!r}, which are the same settings; expected each once")
+
+
+def fingerprint(path: Path) -> str:
+    """A hash of a file, or of the parts of a folder that a run depends on: names, sizes, and each file's first and last bytes.
+
+    It stays the same where a recording is moved or copied, and is that of nothing where there is none.
+    """
+    digest = hashlib.sha256()
+    for name, file in sorted(set(_files(path))):
+        try:
+            digest.update(f"{name}\0{file.stat().st_size}\0".encode())
+            with file.open("rb") as data:
+                digest.update(data.read(ENDS))
+                data.seek(max(0, file.stat().st_size - ENDS))
+                digest.update(data.read(ENDS))
+        except OSError:
+            digest.update(b"unreadable")
+    return digest.hexdigest()
+
+
+def _files(path: Path) -> Iterator[tuple[str, Path]]:
+    """Files by the names that do not change when all is moved."""
+    if path.is_file():
+        yield "", path
+    elif path.is_dir():
+        parts = [part for pattern in PARTS for part in path.glob(pattern)]
+        for part in [*parts, *_elsewhere(path)] or [path]:  # a folder of pictures is one part
+            inside = part.rglob("*") if part.is_dir() else [part]
+            yield from ((f"{part.name}/{file.relative_to(part)}", file) for file in inside if file.is_file())
+
+
+def _elsewhere(folder: Path) -> Iterator[Path]:
+    """Files and folders that recording.toml names."""
+    try:
+        said = read_toml(folder / "recording.toml", ShadowPuppetError) if (folder / "recording.toml").exists() else {}
+    except ShadowPuppetError:
+        return  # the run says what is wrong with it
+    texts = [value for of in (said, *(t for t in said.values() if isinstance(t, dict))) for value in of.values() if isinstance(value, str)]
+    yield from (path for text in texts if text and "\0" not in text and (path := folder / text).exists() and path != folder)
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Short names of recordings, with folders above them as far as two are called the same."""
+    for depth in range(1, max(len(path.parts) for path in paths) + 1):
+        names = ["-".join(path.parts[-depth:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # a-b/c and a/b-c
+
+
+def _found(settings: Mapping[str, Any], name: str) -> Any:
+    """A setting by its dotted name; None where it is not set."""
+    value: Any = settings
+    for part in name.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    return value
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

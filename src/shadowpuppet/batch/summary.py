@@ -1,0 +1,115 @@
+"""What came of a batch: a row a run, as a table file."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from shadowpuppet.batch.plan import Task
+from shadowpuppet.batch.task import RUNS, read_mark
+from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.io._files import read_text, write_whole
+from shadowpuppet.io._table import csv_line
+
+TABLES = ("csv", "parquet")
+"""Formats of the summary."""
+
+
+@dataclass(frozen=True, eq=False)
+class BatchRun:
+    """One run of a batch."""
+
+    task: Task
+    status: str
+    """done, failed or missing."""
+    folder: Path | None = None
+    """The run folder, which `read_run` reads; None where there is none."""
+    seconds: float | None = None
+    """That it took."""
+    tries: int | None = None
+    """How often it was begun; None where that was in an earlier start."""
+    message: str = ""
+    """Why it failed."""
+    warnings: tuple[str, ...] = ()
+    metrics: dict[str, Any] = field(default_factory=dict)
+    """Its metrics.json."""
+
+    def row(self) -> dict[str, Any]:
+        """By column: recording, case, seed, settings that vary, status, what came of it, and all metrics, dotted."""
+        task = self.task
+        varied = {name: json.dumps(value) if isinstance(value, list) else value for name, value in task.varied.items()}
+        end = {"status": self.status, "tries": self.tries, "seconds": self.seconds, "message": self.message,
+               "folder": f"{RUNS}/{self.folder.name}" if self.folder else "", "warnings": "; ".join(self.warnings)}
+        return {"recording": task.name, "case": task.case, "seed": task.seed, **varied, **end, **dict(_flat(self.metrics))}
+
+
+def found_runs(out: Path) -> dict[str, tuple[Path, dict[str, Any]]]:
+    """Whole runs in a batch's folder by the task they are of: folder, and what it says of itself."""
+    folders = sorted(path for path in (out / RUNS).iterdir() if path.is_dir() and not path.name.startswith("."))
+    marks = [(path, read_mark(path)) for path in folders]
+    return {mark["id"]: (path, mark) for path, mark in marks if mark is not None}
+
+
+def done_run(task: Task, folder: Path, mark: Mapping[str, Any], tries: int | None) -> BatchRun:
+    """A run that is whole, as its folder tells it."""
+    seconds, said = mark.get("seconds"), mark.get("warnings")
+    return BatchRun(task, "done", folder, seconds if isinstance(seconds, (int, float)) else None, tries,
+                    warnings=tuple(map(str, said)) if isinstance(said, list) else (), metrics=_metrics(folder))
+
+
+def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
+    """The rows as .csv or .parquet. Raises `ShadowPuppetError` where that cannot be written."""
+    rows = [run.row() for run in runs]
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    if path.suffix == ".parquet":
+        return _write_parquet(rows, columns, path)
+    lines = [csv_line(columns), *(csv_line(_cell(row.get(name)) for name in columns) for row in rows)]
+    write_whole(path, "".join(lines))
+
+
+def check_table(table: str) -> None:
+    """Raise `ShadowPuppetError` where a summary cannot be written so: before hours of work."""
+    if table not in TABLES:
+        raise ShadowPuppetError(f"table: found {table!r}, expected one of {', '.join(TABLES)}")
+    if table == "parquet" and find_spec("pyarrow") is None:
+        raise ShadowPuppetError("table: parquet needs pyarrow, which is not installed; pip install 'shadowpuppet[formats]', or take csv")
+
+
+def _write_parquet(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path: Path) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    def column(name: str) -> list[Any]:
+        values = [row.get(name) for row in rows]
+        kinds = {type(value) for value in values if value is not None}
+        return values if len(kinds) < 2 else [None if v is None else float(v) for v in values] if kinds <= {int, float} else [
+            None if v is None else _cell(v) for v in values]  # fmt: skip
+
+    out = io.BytesIO()
+    pyarrow.parquet.write_table(pyarrow.table({name: column(name) for name in columns}), out)
+    write_whole(path, out.getvalue())
+
+
+def _cell(value: Any) -> str:
+    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{name}.")
+        elif not isinstance(value, list):
+            yield before + name, value
+
+
+def _metrics(folder: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(read_text(folder / "metrics.json"))
+    except (FormatError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}

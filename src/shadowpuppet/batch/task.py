@@ -1,0 +1,105 @@
+"""One run of a batch, as a worker does it: a folder that is whole or not there."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import shutil
+import time
+import traceback
+import uuid
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.io._files import read_text, write_whole
+from shadowpuppet.io.run import versions
+from shadowpuppet.options import make_options
+from shadowpuppet.pipeline import track_recording
+from shadowpuppet.repeats import Repeats
+from shadowpuppet.running import Listener
+
+MARK, PART, PLAN, RUNS = "task.json", ".part", "batch.toml", "runs"
+"""The file that says which task a run folder is of, written last; the end of the name of one that grows; what makes a folder a batch's;
+where in it the runs are."""
+PERMANENT = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EEXIST, errno.EINVAL, errno.ENAMETOOLONG}
+"""What a system refuses and will refuse again."""
+
+
+def do(task: Mapping[str, Any], out: str | Path, repeats: Repeats | None = None, listener: Listener | None = None) -> dict[str, Any]:
+    """Do one task (`Task.wire`) into its folder in `out`, unless it is done; what came of it, plain values.
+
+    `status` done or failed, `seconds`, `message`: why it failed, in a sentence; `again`: whether another try may do; `trace`: of a bug.
+    Nothing is left of a run that failed. `KeyboardInterrupt` goes on.
+    """
+    began = time.perf_counter()
+    try:
+        _run(task, Path(out), repeats, listener)
+    except Exception as error:
+        if repeats is not None:
+            repeats.forget()
+        told = _told(error)
+        return {"status": "failed", "seconds": round(time.perf_counter() - began, 3), **told}
+    return {"status": "done", "seconds": round(time.perf_counter() - began, 3)}
+
+
+def _run(task: Mapping[str, Any], out: Path, repeats: Repeats | None, listener: Listener | None) -> None:
+    folder = out / RUNS / task["folder"]
+    if not (out / PLAN).exists():
+        raise ShadowPuppetError(f"{out}: found no {PLAN} in it, expected the batch's folder, which all machines that work on it must see")
+    if read_mark(folder) is not None:
+        return
+    part = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}{PART}")
+    began = time.perf_counter()
+    try:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", ShadowPuppetWarning)
+            track_recording(task["recording"], part, make_options(task["settings"]), listener, repeats)
+        mark = {key: task[key] for key in ("id", "recording", "name", "case", "seed")}
+        mark |= {"seconds": round(time.perf_counter() - began, 3), "version": versions().get("shadowpuppet"),
+                 "warnings": list(dict.fromkeys(" ".join(str(w.message).split()) for w in said))}
+        write_whole(part / MARK, json.dumps(mark, indent=1, ensure_ascii=False) + "\n")
+        _put(part, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _put(part: Path, folder: Path) -> None:
+    """Give a whole run its name; where another machine was first, its run stays, which is the same."""
+    with contextlib.suppress(OSError):
+        os.rename(part, folder)
+        return
+    if read_mark(folder) is None:  # somebody took the mark away
+        shutil.rmtree(folder, ignore_errors=True)
+        os.rename(part, folder)
+
+
+def read_mark(folder: Path) -> dict[str, Any] | None:
+    """What a run folder says of its task; None where it is not whole."""
+    try:
+        mark = json.loads(read_text(folder / MARK)) if (folder / MARK).exists() else None
+    except (FormatError, ValueError, RecursionError):
+        return None
+    return mark if isinstance(mark, dict) and isinstance(mark.get("id"), str) else None
+
+
+def _told(error: Exception) -> dict[str, Any]:
+    """Why a task failed, and whether it may not fail again."""
+    system = _system(error)
+    if isinstance(error, ShadowPuppetError):
+        return {"message": str(error), "again": system is not None and system.errno not in PERMANENT}
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    where = f" in {Path(last[0].filename).name}:{last[0].lineno}" if last else ""
+    said = " ".join(str(error).split())[:300]
+    return {"message": f"{type(error).__name__}{where}: {said}", "again": True, "trace": "".join(traceback.format_exception(error))}
+
+
+def _system(error: BaseException | None) -> OSError | None:
+    """The system's own error behind one, where there is one."""
+    while error is not None and not isinstance(error, OSError):
+        error = error.__cause__ or error.__context__
+    return error
