@@ -100,7 +100,7 @@ def verdicts(case: Case, runs: dict[str, Runs], shown: str) -> list[Verdict]:
                 f"{100 * less[d]:.0f} % of the frames", bool(less[d] >= THROUGHOUT), shown),
         Verdict("So does each of the 12 degrees of freedom, on average over the film", "V-B-2",
                 f"{int(average.sum())} of {len(names)} vary less with DRS" + _those(names, average), bool(average.all()), shown),
-        Verdict("... and throughout the film", "V-B-2",
+        Verdict("Each of the 12 varies less throughout the film", "V-B-2",
                 f"{int((less >= THROUGHOUT).sum())} of {len(names)} in {100 * THROUGHOUT:.0f} % of the frames or more; least often "
                 f"{names[worst]}, in {100 * less[worst]:.0f} %", bool((less >= THROUGHOUT).all()), shown),
         Verdict("The mean over the runs is similar with both", "V-B-2, Fig. 9",

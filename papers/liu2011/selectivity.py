@@ -86,7 +86,8 @@ def draw(found: Sweep, shares: tuple[float, ...]) -> object:
         axes.set_xscale("log")
         axes.minorticks_off()
         axes.set_xticks([8000 * share for share in shares], [f"{8000 * share:g}" for share in shares], fontsize=7)
-    finish(panels[0], SHOWN, "sigma_gamma of the torso (pixels); arms: half of it", f"{len(found['DRS'].error)} runs each; Table I: 8000")
+    title = f"{len(found['DRS'].error)} runs each; arms have half the sigma; Table I: 8000"
+    finish(panels[0], SHOWN, "sigma_gamma of the torso (pixels)", title)
     return figure
 
 
