@@ -113,7 +113,7 @@ def test_info_explains_any_calibration(tmp_path, capsys):
         code, out, _ = shown(capsys, "info", path)
         assert code == 0, name
         assert "3 cameras" in out
-        assert re.search(r"^A  \S+ +640 x 480", out, re.M)
+        assert re.search(r"^A  \S+ +640x480", out, re.M)
         assert out.count("·") + len(re.findall(r"[0-9]", out)) > 200  # the top view
         assert "\x1b" not in out
     code, out, _ = shown(capsys, "info", tmp_path / "Calib.qca.txt", "--json")

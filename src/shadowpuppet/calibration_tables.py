@@ -41,11 +41,11 @@ def _above(look: CalibrationLook) -> Iterator[tuple[str, str]]:
 
 
 def _each(look: CalibrationLook) -> RenderableType:
-    table = plain_table("", ("", "camera", "pixels", "wide", "stands at, m", "looks", "rolled", "away", "lens bends"), right=(3, 4, 6, 7))
+    table = plain_table("", ("", "camera", "pixels", "wide", "at, m", "looks", "roll", "away", "bend"), right=(3, 4, 6, 7))
     for n, camera in enumerate(look.cameras):
         place = " ".join(f"{value:.2f}" for value in camera.place) if camera.placed else "not told"
         bend = "not at all" if not camera.bend else f"{camera.bend:.0f} px" if np.isfinite(camera.bend) else "beyond telling"
-        table.add_row(_letter(n), camera.name, f"{camera.size[0]} x {camera.size[1]}", f"{camera.fov[0]:.0f}°", place, _looks(camera),
+        table.add_row(_letter(n), camera.name, f"{camera.size[0]}x{camera.size[1]}", f"{camera.fov[0]:.0f}°", place, _looks(camera),
                       f"{round(camera.roll)}°", "" if camera.away is None else f"{camera.away:.2f} m",
                       f"{bend}{', fisheye' if camera.lens == 'fisheye' else ''}")
     return table

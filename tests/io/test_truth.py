@@ -65,7 +65,7 @@ def test_names_that_are_not_known_are_told_with_what_there_is(tmp_path):
     with pytest.raises(FormatError, match=r"markers\.trc: found no joint of a known name, but LASI, C7; known are ours .* COCO, HALPE_26"):
         read_truth(tmp_path / "markers.trc")
     assert names_in(tmp_path / "markers.trc") == "LASI, C7"
-    with pytest.raises(FormatError, match=r"film\.mp4: found the ending '\.mp4', expected one of \.amc, \.bvh, \.c3d, \.csv, \.trc"):
+    with pytest.raises(FormatError, match=r"found the ending '\.mp4', expected one of \.amc, \.bvh, \.c3d, \.csv, \.npz, \.parquet, \.trc"):
         read_truth(tmp_path / "film.mp4")
 
 
