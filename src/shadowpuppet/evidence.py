@@ -50,16 +50,20 @@ class Evidence:
         return self.surface.points.mean(0) if len(self.surface.points) else np.zeros(3)
 
     @cached_property
-    def seen(self) -> tuple[tuple[Picture, Observation], ...]:
-        """The silhouettes of people, and the pictures to be drawn in their place."""
-        return tuple((picture, Observation.of(mask[::2, ::2])) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
+    def people(self) -> tuple[tuple[Picture, Mask], ...]:
+        """The silhouettes of people, thinned, and the pictures to be drawn in their place."""
+        return tuple((picture, mask[::2, ::2]) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
                      if mask is not None and may_be_person(mask))
+
+    @cached_property
+    def seen(self) -> tuple[tuple[Picture, Observation], ...]:
+        """The same for drawing over them."""
+        return tuple((picture, Observation.of(mask)) for picture, mask in self.people)
 
     @cached_property
     def space(self) -> FreeSpace:
         """What the silhouettes rule out."""
-        return free_space([(picture.camera, mask[::2, ::2]) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
-                           if mask is not None and may_be_person(mask)])
+        return free_space([(picture.camera, mask) for picture, mask in self.people])
 
     @cached_property
     def area(self) -> int:
