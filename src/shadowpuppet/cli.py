@@ -10,7 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands
+from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands, viewer_commands
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.flags import (
     CAMERAS,
@@ -257,6 +257,7 @@ app.command(motion_commands.humaneva)
 app.command(motion_commands.export)
 app.command(motion_commands.convert)
 app.command(batch_commands.batch)
+app.command(viewer_commands.view)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
