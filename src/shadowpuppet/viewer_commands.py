@@ -88,7 +88,7 @@ def _serve(show: Show, listen: str, port: int | None, opening: bool, quiet: bool
 
     def told(address: str) -> None:
         if not quiet:
-            print(f"{show.title} is to be seen at {address}; Ctrl-C ends it", flush=True)
+            print(f"{show.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
         if opening and has_screen():
             with contextlib.suppress(webbrowser.Error):
                 webbrowser.open(address)

@@ -190,7 +190,7 @@ def beside(left: Show, right: Show, apart: float = 1.5) -> Show:
     others = tuple(replace(figure, name=f"{figure.name}, beside", kind="other" if figure.kind == "estimate" else figure.kind, shift=moved)
                    for figure in right.figures)  # fmt: skip
     charts = {chart.name: chart for chart in left.charts}
-    both = [_both(charts.get(chart.name), chart, right.title) for chart in right.charts]
+    both = [_both(charts.get(chart.name), chart) for chart in right.charts]
     kept = [chart for name, chart in charts.items() if name not in {chart.name for chart in right.charts}]
     times = left.times if len(left.times) >= len(right.times) else right.times
     facts = {**left.facts, **{f"{key}, beside": value for key, value in right.facts.items()}}
@@ -199,9 +199,9 @@ def beside(left: Show, right: Show, apart: float = 1.5) -> Show:
                    notes=(*left.notes, *(note for note in right.notes if note not in left.notes)))
 
 
-def _both(one: Chart | None, other: Chart, title: str) -> Chart:
+def _both(one: Chart | None, other: Chart) -> Chart:
     """Curves of two charts at the times of the first."""
-    named = {f"{name}, {title}": values for name, values in other.curves.items()}
+    named = {f"{name}, beside": values for name, values in other.curves.items()}
     if one is None:
         return replace(other, curves=named)
     there = {name: np.interp(one.times, other.times, values, left=np.nan, right=np.nan) for name, values in named.items()}

@@ -33,8 +33,8 @@ DRAWN = 150
 """Particles that are drawn, at most: those that weigh most."""
 SIGMAS = 2.0
 """Standard deviations that half an axis of an ellipsoid is long: within it are 74 % of what is normally spread in space."""
-SOLID, GLASS = 1.0, 0.5
-"""How opaque figures are."""
+GLASS = 0.5
+"""How opaque figures are that are seen through."""
 SHARE = 0.16
 """How large frustums are, of what is shown."""
 
@@ -67,9 +67,8 @@ class Stage:
         self.time = float(show.times[0])
         scene = server.scene
         scene.set_up_direction("+z")
-        self._lights()
         self._floor()
-        self.figures = [_Puppet(server, figure, f"/people/{n} {_clean(figure.name)}") for n, figure in enumerate(show.figures)]
+        self.figures = [_Puppet(server, figure, f"/people/{n} {_clean(figure.name)}", self.wish.glass) for n, figure in enumerate(show.figures)]
         self.eyes = [_Frustum(server, n, eye, Plain(eye.camera, width), self._near()) for n, eye in enumerate(show.eyes)]
         for n, (text, place) in enumerate(show.labels):
             scene.add_label(f"/labels/{n}", text, position=place, font_screen_scale=0.9)
@@ -77,7 +76,6 @@ class Stage:
         self._ellipsoids: Any = None
         self._cloud: Any = None
         self._warm, self._pool = False, ThreadPoolExecutor(usable_cores(), "seen")
-        self.set_glass(self.wish.glass)
         server.initial_camera.position = _three(show.viewpoint)
         server.initial_camera.look_at = _three(show.middle)
         server.initial_camera.up = (0.0, 0.0, 1.0)
@@ -116,7 +114,7 @@ class Stage:
         self.wish.glass = glass
         for figure in self.figures:
             if figure.figure.kind != "truth":
-                figure.set_opacity(GLASS if glass else SOLID)
+                figure.set_opacity(GLASS if glass else None)
 
     def look_through(self, n: int | None) -> None:
         """Put the picture of a camera behind the people, for whoever looks through it; None: no camera's."""
@@ -126,14 +124,6 @@ class Stage:
             eye.reach(away + 0.6 * self.show.size if k == n else self._near())
 
     # Parts
-
-    def _lights(self) -> None:
-        scene = self.server.scene
-        scene.configure_environment_map(hdri=None)
-        scene.configure_default_lights(enabled=False)
-        scene.add_light_hemisphere("/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 158), intensity=1.5)
-        top = self.show.middle + self.show.size * np.array([0.8, 0.9, 2.0])
-        scene.add_light_directional("/lights/sun", color=(255, 250, 240), intensity=1.3, position=_three(top))
 
     def _floor(self) -> None:
         low, high = self.show.box
@@ -207,10 +197,11 @@ class Stage:
 class _Puppet:
     """A figure's nodes: a skinned mesh a colour, so that left and right are told apart."""
 
-    def __init__(self, server: viser.ViserServer, figure: Figure, name: str) -> None:
-        self.figure, self.bones = figure, list[tuple[Any, NDArray[np.int64]]]()
+    def __init__(self, server: viser.ViserServer, figure: Figure, name: str, glass: bool) -> None:
+        """`glass`: from the start, for a mesh that is changed later is made anew by the page, which in a file shows at every loop."""
+        self.figure = figure
         self.frame = server.scene.add_frame(name, show_axes=False, position=figure.shift)
-        mesh, opacity = figure.mesh, 1.0
+        mesh, opacity = figure.mesh, GLASS if glass and figure.kind != "truth" else None
         colours, which = np.unique(mesh.colours, axis=0, return_inverse=True)
         self.parts = []
         for k in range(len(colours)):
@@ -227,7 +218,7 @@ class _Puppet:
             handle = server.scene.add_mesh_skinned(
                 f"{name}/{k}", mesh.points[points].astype(np.float32), faces.astype(np.uint32), skin_weights=weights,
                 bone_wxyzs=np.tile([1.0, 0, 0, 0], (len(joints), 1)), bone_positions=figure.rest[joints].astype(np.float32),
-                color=_colour(figure.kind, colours[k]), opacity=opacity if opacity < 1 else None,
+                color=_colour(figure.kind, colours[k]), opacity=opacity,
                 side="double" if mesh.two_sided else "front", cast_shadow=False, receive_shadow=False)  # fmt: skip
             self.parts.append((handle, joints))
 
@@ -243,9 +234,9 @@ class _Puppet:
                 bone.position = places[j] if known else NOWHERE
                 bone.wxyz = turns[j]
 
-    def set_opacity(self, opacity: float) -> None:
+    def set_opacity(self, opacity: float | None) -> None:
         for handle, _ in self.parts:
-            handle.opacity = None if opacity >= 1 else opacity
+            handle.opacity = opacity
 
 
 class _Frustum:
