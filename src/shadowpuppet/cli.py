@@ -106,7 +106,13 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     with terminal(quiet, folder) as shown:
-        metrics = run_live(folder, options, chosen, shown, open_display(chosen.show, chosen.listen, chosen.port, chosen.record))
+        if chosen.show == "viewer":
+            from shadowpuppet.viewer.live import open_viewer
+
+            display = open_viewer(chosen.listen, chosen.port, chosen.record)
+        else:
+            display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
+        metrics = run_live(folder, options, chosen, shown, display)
     if metrics is None:
         print("nobody was tracked: nothing was written", file=sys.stderr)
     elif not quiet:

@@ -76,10 +76,10 @@ def data_around(chart: Chart, now: float) -> tuple[Array, ...]:
     near = np.flatnonzero(np.abs(chart.times - now) <= AROUND)
     before, after = near[chart.times[near] <= now], near[chart.times[near] > now]
     times = np.concatenate([[now - AROUND], chart.times[before], [now, now], chart.times[after], [now + AROUND]])
-    curves = []
+    curves, none = [], np.full(1, np.nan)
     for values in list(chart.curves.values())[:MOST]:
-        here = values[before[-1]] if len(before) else np.nan
-        curves.append(np.concatenate([[np.nan], values[before], [here, here], values[after], [np.nan]]))
+        here = np.repeat(values[before[-1:]] if len(before) else none, 2)
+        curves.append(np.concatenate([none, values[before], here, values[after], none]))
     line = np.full(len(times), np.nan)
     line[len(before) + 1 : len(before) + 3] = low, high
     return (times, *curves, line)

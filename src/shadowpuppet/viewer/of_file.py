@@ -49,4 +49,4 @@ def show_calibration(path: Path) -> Show:
     labels = () if look.middle is None else (("what all look at", look.middle),)
     facts = {"file": str(path), "kind": look.format, "cameras": ", ".join(eye.camera.name for eye in eyes), "unit": look.unit}
     return Show(title=path.name, times=np.zeros(1), eyes=tuple(eye for eye in eyes if eye.camera.oriented), labels=labels, facts=facts,
-                notes=(*look.notes, *look.doubts))
+                notes=look.notes, lacks=look.doubts)

@@ -42,8 +42,8 @@ def show_prior(path: Path, seed: int = 0) -> Show:
     facts = {"prior": str(path), "body": body.name, "regions": f"{len(shares)}, the mean posture of each, and the share of time in it",
              "rate": f"{rate:g} frames/s"}  # fmt: skip
     return Show(title=path.name, times=times, figures=(walker, *means), labels=tuple(labels), facts=facts,
-                notes=("Who moves is drawn at random from the prior alone, frame by frame, as the tracker proposes poses before it looks: no "
-                       "one's recorded motion.",))  # fmt: skip
+                notes=("Who moves is drawn at random from the prior alone, frame by frame, as the tracker proposes poses before it "
+                       "looks: no one's recorded motion.",))  # fmt: skip
 
 
 def body_of(path: Path, prior: MotionPrior) -> Body:

@@ -25,16 +25,15 @@ def show_recording(path: str | Path, options: Options) -> Show:
     """A recording folder, or a film with a field of view. Raises a `ShadowPuppetError` where something cannot be used."""
     recording = opened(path, options)
     eyes, footage, ready = eyes_of(recording, options)
-    figures, notes = _truth(recording)
+    figures, lacks = _truth(recording)
     made = "ready, from masks/" if ready else "made as `track` makes them"
     facts = {"recording": str(recording.path), "cameras": ", ".join(eye.camera.name for eye in eyes), "silhouettes": made}
     return Show(title=recording.name, times=times_of(footage), figures=figures, eyes=eyes, hull=hull_of(eyes, options), facts=facts,
-                notes=notes)
+                lacks=lacks)
 
 
 def eyes_of(recording: Recording, options: Options, ready: bool | None = None) -> tuple[tuple[Eye, ...], list[Footage], bool]:
-    """The cameras with their films; and whether ready silhouettes are shown, which, if `ready` is left out, are taken where every camera has
-    some."""
+    """The cameras with their films; and whether ready silhouettes are shown: if `ready` is left out, where every camera has some."""
     views = chosen_views(recording, options.camera)
     ready = all(view.masks is not None for view in views) if ready is None else ready
     options = replace(options, masks=ready)

@@ -32,6 +32,8 @@ from shadowpuppet.viewer.show import Chart, Eye, Figure, Show
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "leg": ("hip", "knee", "ankle", "leg")}
 """Words in the names of a limb's degrees of freedom."""
+UNSTATED = ("This run states no standard deviations. With “particles” its filter is run again on the frame that is shown, from the pose "
+            "before it; the ellipsoids then tell how far those particles are spread, which is no measure of how far off the pose may be.")
 
 
 def show_run(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None) -> Show:
@@ -51,24 +53,22 @@ class _Run:
     recording: str | Path | None
 
     def show(self) -> Show:
-        motion, notes = self.run.motion, list[str]()
+        motion, lacks = self.run.motion, list[str]()
         if not len(motion):
             raise ShadowPuppetError(f"{self.run.folder}: found no frame in it, expected one at least")
-        body = self._told(notes, "the body's shape is not shown, its joints are", lambda: self.body)
-        estimate = self._told(notes, "the body's shape is not shown, its joints are", lambda: self.puppet) if body else None
+        body = self._told(lacks, "the body's shape is not shown, its joints are", lambda: self.body)
+        estimate = self._told(lacks, "the body's shape is not shown, its joints are", lambda: self.puppet) if body else None
         estimate = estimate or of_table(self.name, motion.table, **self.known)
-        measured = self._told(notes, "no truth is shown", self.measured)
+        measured = self._told(lacks, "no truth is shown", self.measured)
         figures = [estimate, *([of_table("truth", measured.truth, "truth")] if measured is not None and measured.truth is not None else [])]
-        eyes = self._told(notes, "the films are not shown", lambda: self.eyes)
+        eyes = self._told(lacks, "the films are not shown", lambda: self.eyes)
         films = eyes is not None
         eyes = eyes if eyes is not None else self.cameras
-        cloud = self._told(notes, "particles are not shown", lambda: self.rerun(eyes)) if films and body is not None else None
-        if not np.isfinite(motion.joint_sd).any():
-            notes.append("This run states no standard deviations; ellipsoids show how far the particles of a frame are spread, once these are "
-                         "asked for.")  # fmt: skip
+        cloud = self._told(lacks, "particles are not shown", lambda: self.rerun(eyes)) if films and body is not None else None
         charts = [*(errors_of(measured) if measured is not None else ()), *fit_of(motion), *angles_of(motion)]
         return Show(title=self.name, times=motion.times, figures=tuple(figures), eyes=eyes, charts=tuple(charts), facts=self.facts,
-                    hull=hull_of(eyes, self.options) if films else None, cloud=cloud, notes=tuple(notes))
+                    hull=hull_of(eyes, self.options) if films else None, cloud=cloud, lacks=tuple(lacks),
+                    notes=() if np.isfinite(motion.joint_sd).any() else (UNSTATED,))
 
     @property
     def name(self) -> str:
@@ -135,14 +135,14 @@ class _Run:
         return Rerun(self.body, self.run.motion, self.options, eyes)
 
     @staticmethod
-    def _told(notes: list[str], lacks: str, make):
+    def _told(lacks: list[str], what: str, make):
         """What is made; None, and a note, where that cannot be."""
         try:
             return make()
         except ShadowPuppetError as error:
-            note = f"{lacks}: {error}"
-            if note not in notes:
-                notes.append(note)
+            lack = f"{what}: {error}"
+            if lack not in lacks:
+                lacks.append(lack)
             return None
 
 
@@ -196,7 +196,7 @@ def beside(left: Show, right: Show, apart: float = 1.5) -> Show:
     facts = {**left.facts, **{f"{key}, beside": value for key, value in right.facts.items()}}
     return replace(left, title=f"{left.title} and {right.title}", times=times, figures=(*left.figures, *others),
                    charts=(*both, *kept), facts=facts, labels=(*left.labels, *right.labels),
-                   notes=(*left.notes, *(note for note in right.notes if note not in left.notes)))
+                   notes=tuple(dict.fromkeys((*left.notes, *right.notes))), lacks=tuple(dict.fromkeys((*left.lacks, *right.lacks))))
 
 
 def _both(one: Chart | None, other: Chart) -> Chart:

@@ -26,8 +26,8 @@ def show_of(path: str | Path, options: Options | None = None, truth: Path | None
     """
     path = Path(path)
     if not path.exists():
-        raise FormatError(f"{path}: no such file or folder; a run, a recording, a film with --fov, a calibration, a prior (.npz) or a file of "
-                          f"motion ({choices(ENDINGS)}) can be shown")  # fmt: skip
+        raise FormatError(f"{path}: no such file or folder; a run, a recording, a film with --fov, a calibration, a prior (.npz) or a "
+                          f"file of motion ({choices(ENDINGS)}) can be shown")
     if (path / "run.toml").exists():
         return show_run(path, truth, recording)
     for name, value in (("truth", truth), ("recording", recording)):

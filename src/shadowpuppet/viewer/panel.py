@@ -222,9 +222,9 @@ class Panel:
     def _add_facts(self) -> None:
         gui = self.server.gui
         with gui.add_folder("About", expand_by_default=False):
-            rows = "".join(f"<tr><td style='opacity:.6;padding-right:.8em;vertical-align:top'>{_plain(key)}</td><td style='word-break:break-word'>"
-                           f"{_plain(value)}</td></tr>" for key, value in self.show.facts.items())  # fmt: skip
-            notes = "".join(f"<p>{_plain(note)}</p>" for note in self.show.notes)
+            rows = "".join(f"<tr><td style='opacity:.6;padding-right:.8em;vertical-align:top'>{_plain(key)}</td>"
+                           f"<td style='word-break:break-word'>{_plain(value)}</td></tr>" for key, value in self.show.facts.items())
+            notes = "".join(f"<p>{_plain(note)}</p>" for note in (*self.show.notes, *self.show.lacks))
             gui.add_html(f"<div style='font-size:.8em;margin:.5em 1em'><table>{rows}</table>{notes}</div>")
 
 

@@ -74,8 +74,8 @@ def address_of(server: viser.ViserServer) -> str:
 
 @contextlib.contextmanager
 def guarded(loopback: bool) -> Iterator[Callable[[], bool]]:
-    """Within it, servers that begin ask each request whence it comes: a page of another site, or a name that leads here by another's doing, is
-    refused. Gives a function that says whether one did begin so.
+    """Within it, servers that begin ask each request whence it comes: a page of another site, or a name that leads here by another's doing,
+    is refused. Gives a function that says whether one did begin so.
 
     viser has no setting for that, and a WebSocket is open to pages of all sites: so the function that opens it is wrapped.
     """
@@ -107,9 +107,10 @@ def _asking(answer: Any, loopback: bool) -> Any:
     def asking(connection: Any, request: Any) -> Any:
         if not is_ours(request.headers, loopback):
             return connection.respond(HTTPStatus.FORBIDDEN, "this page is served under the machine's own address, and to itself only\n")
-        response = answer(connection, request) if answer is not None else None
-        for name, value in HEADERS.items() if response is not None else ():
-            response.headers[name] = value
+        response = None if answer is None else answer(connection, request)
+        if response is not None:
+            for name, value in HEADERS.items():
+                response.headers[name] = value
         return response
 
     return asking

@@ -96,7 +96,8 @@ class Figure:
     @cached_property
     def known(self) -> NDArray[np.bool_]:
         """Frames (T,) in which some joint is known."""
-        return np.asarray(np.isfinite(self.places).all(2).any(1))
+        finite: NDArray[np.bool_] = np.asarray(np.isfinite(self.places).all(2))
+        return np.asarray(np.logical_or.reduce(finite, axis=1))
 
     @cached_property
     def quaternions(self) -> NDArray[np.float32]:
@@ -173,6 +174,8 @@ class Show:
     """What is told about it."""
     notes: tuple[str, ...] = ()
     """What whoever looks should know, a sentence each."""
+    lacks: tuple[str, ...] = ()
+    """What could not be shown, and why, a sentence each."""
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

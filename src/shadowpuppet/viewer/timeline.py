@@ -77,7 +77,8 @@ class Timeline:
         """Go some frames on or back, and stay there."""
         with self._lock:
             self.pause()
-            self._frame = (self._frame + frames) % len(self.times) if self.loop else int(np.clip(self._frame + frames, 0, len(self.times) - 1))
+            wanted, last = self._frame + frames, len(self.times) - 1
+            self._frame = wanted % (last + 1) if self.loop else int(np.clip(wanted, 0, last))
 
     def tick(self) -> int:
         """The frame for now: the last one whose time has come."""
