@@ -109,9 +109,7 @@ class _Film:
         self.path, self.convert = path, converter(grey=False)
         self.stack = contextlib.ExitStack()
         self.container, self.stream = self.stack.enter_context(opened(path))
-        told = self.stream.average_rate or self.stream.guessed_rate
-        self.step = 1 / float(told) if told else 1 / (rate or ASSUMED_RATE)
-        self.scale = 1.0 if rate is None else rate * self.step  # from times that are asked for to the film's own
+        self.step = 1 / float(self.stream.average_rate or self.stream.guessed_rate or rate or ASSUMED_RATE)
         self.zero: int | None = None
         self.held: _Shown | None = None
         self.waiting: _Shown | None = None
@@ -119,6 +117,9 @@ class _Film:
         self._advance()
         if self.waiting is None:
             raise VideoError(f"{path}: no frame of it can be decoded ({self.stream.codec_context.name})")
+        if self.zero is None:  # its frames tell no times
+            self.step = 1 / float(self.stream.guessed_rate or rate or ASSUMED_RATE)
+        self.scale = 1.0 if rate is None else rate * self.step  # from times that are asked for to the film's own
 
     def close(self) -> None:
         """Let the file go."""

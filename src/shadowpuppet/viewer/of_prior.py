@@ -21,7 +21,7 @@ SECONDS = 10.0
 """Of the motion that is drawn."""
 APART, BEHIND = 1.1, 1.6
 """Metres between mean postures, and from them to who moves."""
-SETTLED = 200
+SETTLED = 1 << 20
 """Steps of the chain after which it has forgotten where it began."""
 
 
@@ -80,9 +80,8 @@ def standing(body: Body, prior: MotionPrior, values: Array) -> Array:
 
 def resting(prior: MotionPrior) -> Array:
     """The share (M,) of time that the chain spends in each region in the long run."""
-    share = prior.initial
-    for _ in range(SETTLED):
-        share = 0.5 * share + 0.5 * share @ prior.transitions  # half a step, so that chains that alternate settle too
+    lazy = (np.eye(len(prior.initial)) + prior.transitions) / 2  # so that chains that alternate settle too
+    share = prior.initial @ np.linalg.matrix_power(lazy, SETTLED)
     return share / share.sum()
 
 

@@ -59,9 +59,9 @@ class _Run:
         body = self._told(lacks, "the body's shape is not shown, its joints are", lambda: self.body)
         estimate = self._told(lacks, "the body's shape is not shown, its joints are", lambda: self.puppet) if body else None
         estimate = estimate or of_table(self.name, motion.table, **self.known)
-        measured = self._told(lacks, "no truth is shown", self.measured)
+        measured = self.measured() if self.truth else self._told(lacks, "no truth is shown", self.measured)
         figures = [estimate, *([of_table("truth", measured.truth, "truth")] if measured is not None and measured.truth is not None else [])]
-        eyes = self._told(lacks, "the films are not shown", lambda: self.eyes)
+        eyes = self.eyes if self.recording else self._told(lacks, "the films are not shown", lambda: self.eyes)
         films = eyes is not None
         eyes = eyes if eyes is not None else self.cameras
         cloud = self._told(lacks, "particles are not shown", lambda: self.rerun(eyes)) if films and body is not None else None
