@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from shadowpuppet.viewer.panel import Panel
 from shadowpuppet.viewer.pictures import Look
 from shadowpuppet.viewer.server import address_of, close_server, open_server
@@ -37,6 +35,5 @@ def first_wish(show: Show, pictures: bool = True) -> Wish:
     pictures of films (or their silhouettes alone)."""
     kinds = {figure.kind for figure in show.figures}
     look = Look.PICTURE if pictures else Look.SILHOUETTE
-    stated = any(figure.joint_sd is not None and np.isfinite(figure.joint_sd).any() for figure in show.figures)
     return replace(Wish(), glass="truth" in kinds and "estimate" in kinds, hull=show.hull is not None and "estimate" not in kinds,
-                   pictures=look, spread=stated)
+                   pictures=look, spread=show.states_spread)

@@ -32,8 +32,8 @@ from shadowpuppet.viewer.show import Chart, Eye, Figure, Show
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "leg": ("hip", "knee", "ankle", "leg")}
 """Words in the names of a limb's degrees of freedom."""
-UNSTATED = ("This run states no standard deviations. With “particles” its filter is run again on the frame that is shown, from the pose "
-            "before it; the ellipsoids then tell how far those particles are spread, which is no measure of how far off the pose may be.")
+UNSTATED = ("This run states no standard deviations. For “particles” and “uncertainty” its filter is run again on the frame that is shown, "
+            "from the pose before it; the ellipsoids tell how far those particles are spread, which is no measure of how far off the pose is.")
 
 
 def show_run(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None) -> Show:

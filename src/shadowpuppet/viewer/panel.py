@@ -141,8 +141,9 @@ class Panel:
                 if any(eye.seen is not None for eye in self.show.eyes):
                     looks = tuple(look.value for look in Look)
                     self._choice("in them", looks, wish.pictures.value, lambda value: setattr(wish, "pictures", Look(value)))
-                self._choice("look through", (FREE, *dict.fromkeys(eye.camera.name for eye in self.show.eyes)), FREE, self._through)
-            if any(figure.joint_sd is not None and np.isfinite(figure.joint_sd).any() for figure in self.show.figures):
+                names = dict.fromkeys(eye.camera.name for eye in self.show.eyes)
+                self.through = self._choice("look through", (FREE, *names), FREE, self._through)
+            if self.show.states_spread or self.show.cloud is not None:
                 self._box("uncertainty", wish.spread, lambda on: setattr(wish, "spread", on))
             if self.show.cloud is not None:
                 self._box("particles", wish.cloud, lambda on: setattr(wish, "cloud", on))
@@ -152,20 +153,22 @@ class Panel:
 
         def changed(_: Any) -> None:
             act(box.value)
-            self._again()
+            self.again()
 
         box.on_update(changed)
 
-    def _choice(self, name: str, values: tuple[str, ...], value: str, act: Callable[[str], None]) -> None:
+    def _choice(self, name: str, values: tuple[str, ...], value: str, act: Callable[[str], None]) -> Any:
         choice = self.server.gui.add_dropdown(name, values, initial_value=value)
 
         def changed(_: Any) -> None:
             act(choice.value)
-            self._again()
+            self.again()
 
         choice.on_update(changed)
+        return choice
 
-    def _again(self) -> None:
+    def again(self) -> None:
+        """Draw the current frame anew, soon."""
         self._stale = True
         self._changed.set()
 

@@ -177,6 +177,11 @@ class Show:
     lacks: tuple[str, ...] = ()
     """What could not be shown, and why, a sentence each."""
 
+    @property
+    def states_spread(self) -> bool:
+        """Whether some figure's uncertainty is known."""
+        return any(figure.joint_sd is not None and bool(np.isfinite(figure.joint_sd).any()) for figure in self.figures)
+
     @cached_property
     def box(self) -> tuple[Array, Array]:
         """Where the people are: least and greatest x, y, z, metres; else between the cameras; else about the origin."""

@@ -24,7 +24,7 @@ DRAWN = 150
 """Particles that are drawn, at most: those that weigh most."""
 SIGMAS = 2.0
 """Standard deviations that half an axis of an ellipsoid is long: within it are 74 % of what is normally spread in space."""
-SHARE, LEAST_AND_MOST = 0.16, (0.18, 0.5)
+SHARE, LEAST_AND_MOST = 0.22, (0.18, 0.75)
 """How long frustums are, of what is shown, within metres."""
 
 
@@ -40,7 +40,7 @@ class Wish:
     cameras: bool = True
     pictures: Look = Look.SILHOUETTE
     spread: bool = False
-    """The stated uncertainty, as ellipsoids."""
+    """The stated uncertainty, as ellipsoids; where the run states none, how far the particles are spread."""
     cloud: bool = False
     """Particles of the frame."""
     through: int | None = None
@@ -77,15 +77,16 @@ class Stage:
             self.people(time)
         made = list(self._pool.map(lambda eye: eye.seen(time, self.wish.pictures), self.eyes)) if self.wish.cameras else []
         surface = self.show.hull(time) if self.show.hull is not None and self.wish.hull else None
-        cloud = self._particles(time)
+        stated = self._stated(time)
+        cloud = self._particles(time, stated is None)
         self._warm = True
         with self.server.atomic():
             self.people(time)
             for n, eye in enumerate(self.eyes):
                 eye.put(made[n] if made else None, self.wish.cameras)
             self._put_hull(None if surface is None else (surface.points, surface.cameras))
-            self._put_spread(self._spread(time, cloud))
-            self._put_cloud(cloud)
+            self._put_spread((stated or (cloud and cloud.spread)) if self.wish.spread else None)
+            self._put_cloud(cloud if self.wish.cloud else None)
         self.server.flush()
 
     def people(self, time: float) -> None:
@@ -125,19 +126,18 @@ class Stage:
     def _near(self) -> float:
         return float(np.clip(SHARE * self.show.size, *LEAST_AND_MOST))
 
-    def _particles(self, time: float) -> Cloud | None:
-        return self.show.cloud(time) if self.wish.cloud and self.show.cloud is not None else None
+    def _particles(self, time: float, unstated: bool) -> Cloud | None:
+        """Particles, where they are asked for, or how far they are spread and the run states nothing."""
+        wanted = self.wish.cloud or (self.wish.spread and unstated)
+        return self.show.cloud(time) if wanted and self.show.cloud is not None else None
 
-    def _spread(self, time: float, cloud: Cloud | None) -> Spread | None:
-        """What is drawn as ellipsoids: what the run states, else how far the particles are spread."""
-        if not (self.wish.spread or cloud is not None):
-            return None
-        for figure in self.show.figures:
+    def _stated(self, time: float) -> Spread | None:
+        """The uncertainty that the run states."""
+        for figure in self.show.figures if self.wish.spread else ():
             n = figure.at(time) if figure.kind == "estimate" else None
-            stated = figure.spread(n) if n is not None else None
-            if stated is not None:
+            if n is not None and (stated := figure.spread(n)) is not None:
                 return stated
-        return cloud.spread if cloud is not None else None
+        return None
 
     def _put_hull(self, found: tuple[Array, NDArray[np.int64]] | None) -> None:
         if found is None or not len(found[0]):
@@ -165,7 +165,7 @@ class Stage:
         if self._ellipsoids is None or len(self._ellipsoids.batched_positions) != len(places):
             points, faces = ball()
             self._ellipsoids = self.server.scene.add_batched_meshes_simple(
-                "/uncertainty", points, faces, turns, places, batched_scales=axes, batched_colors=(214, 60, 90), opacity=0.45, lod="off",
+                "/uncertainty", points, faces, turns, places, batched_scales=axes, batched_colors=(214, 60, 90), opacity=0.4, lod="off",
                 cast_shadow=False, receive_shadow=False)  # fmt: skip
         else:
             self._ellipsoids.batched_positions, self._ellipsoids.batched_scales = places, axes
