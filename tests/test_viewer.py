@@ -21,7 +21,7 @@ from shadowpuppet.body import Quads
 from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.camera import Camera
 from shadowpuppet.cli import run as command
-from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.bvh_writing import write_bvh
 from shadowpuppet.io.calibration import write_calibration
@@ -278,6 +278,24 @@ def test_silhouettes_are_made_where_none_are_ready(rig, tmp_path):
     assert (mask & exact).sum() / (mask | exact).sum() > 0.85
 
 
+def test_a_film_whose_silhouettes_cannot_be_made_is_shown_without(rig, tmp_path):
+    folder = made.copied(rig, tmp_path / "rig", ["masks", "background"])
+    made.write_film(folder / "video" / "cam2.mp4", [np.zeros((120, 160, 3), np.uint8)] * 2, made_rig.RATE)
+    (folder / "background").mkdir()
+    (folder / "background" / "cam2.png").write_bytes((rig / "calibration.toml").read_bytes())
+    with pytest.raises(ShadowPuppetError, match="cam2"):  # said before anything is shown
+        show_of(folder)
+    (folder / "background" / "cam2.png").unlink()
+    seen = show_of(folder).eyes[1].seen
+    seen.options = replace(seen.options, silhouette=replace(seen.options.silhouette, method="averaging"))
+    with pytest.warns(ShadowPuppetWarning, match="'cam2': no silhouettes"):
+        assert seen.mask(0.0) is None
+    assert seen.mask(0.1) is None  # said once
+    plain = Plain(seen.footage.camera, 160)
+    assert shown(seen, plain, 0.0, Look.PICTURE).shape == (120, 160, 3)
+    assert shown(seen, plain, 0.0, Look.SILHOUETTE) is None
+
+
 def test_one_camera_has_no_hull(rig):
     show = show_of(rig, Options(camera="cam1"))
     assert ([eye.camera.name for eye in show.eyes], show.hull) == (["cam1"], None)
@@ -328,8 +346,9 @@ def test_a_runs_puppet_stands_where_its_joints_are(tmp_path, name, lost):
 def test_a_run_without_sizes_is_shown_by_its_joints_and_says_so(tmp_path):
     show = show_of(make_run(tmp_path / "run", frames=5, person=False))
     assert show.figures[0].known.all()
-    assert len(show.lacks) == 1
+    assert len(show.lacks) == 2
     assert "person.toml" in show.lacks[0]
+    assert "the recording made is not there" in show.lacks[1]
 
 
 def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_path):

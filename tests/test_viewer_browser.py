@@ -237,6 +237,10 @@ def test_a_live_session_is_shown_and_its_buttons_are_wishes(browser, run):
             first = shows(0)
             page.wait(lambda: moved(shows(10), first) > 12, "it moves")
             assert "overlap 0.91" in page.page.inner_text("body")
+            display.show(View(phase="tracking"))  # no picture came for a moment: what was seen last stays
+            page.page.wait_for_timeout(500)
+            assert coloured(page.seen()) > 300
+            assert "overlap 0.91" in page.page.inner_text("body")
             assert display.wish() == ""
             page.page.get_by_role("button", name="Stop", exact=True).click()
             page.wait(lambda: display.wish() == "stop", "a button is a wish")

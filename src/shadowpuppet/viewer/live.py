@@ -21,11 +21,11 @@ from shadowpuppet.viewer.server import address_of, close_server, open_server
 from shadowpuppet.viewer.show import Eye, Figure, Show
 from shadowpuppet.viewer.stage import Stage, Wish
 
-MOST_A_SECOND = 15.0
+MOST_A_SECOND = 10.0
 """Views that are drawn a second; more cost the tracker time."""
 BUTTONS = {"Stop": "stop", "Learn the background anew": "learn", "Measure the person anew": "measure"}
-WIDE = 320
-"""Pixels of the picture's width."""
+WIDE, QUALITY = 320, 80
+"""Pixels of the picture's width, and how well it is kept."""
 
 
 class ViewerDisplay(Display):
@@ -39,10 +39,13 @@ class ViewerDisplay(Display):
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 92, 148))
         gui.set_panel_label("shadowpuppet live")
         self.status = gui.add_markdown("getting ready")
+        self.image = gui.add_image(np.full((9, 16, 3), 40, np.uint8), format="jpeg", jpeg_quality=QUALITY)
         for label, wish in BUTTONS.items():
             gui.add_button(label).on_click(lambda _, wish=wish: self._ask(wish))
         gui.add_markdown(footer)
-        self._wish, self._view, self._over = "", None, False
+        self._wish, self._over = "", False
+        self._view: View | None = None
+        self._phase = ""
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._follow, name="viewer", daemon=True)
         self._stage: _Scene | None = None
@@ -62,8 +65,10 @@ class ViewerDisplay(Display):
 
     def show(self, view: View) -> None:
         """The next view; what was not drawn is left out."""
+        if view.image is None and not view.trouble and view.phase == self._phase:
+            return  # nothing new: what was seen last stays
         with self._changed:
-            self._view = view
+            self._view, self._phase = view, view.phase
             self._changed.notify_all()
 
     def wish(self) -> str:
@@ -89,7 +94,10 @@ class ViewerDisplay(Display):
 
     def _draw(self, view: View) -> None:
         self.status.content = words(view)
-        if view.picture is None:
+        image = drawn(view)
+        if image is not None:
+            self.image.image = _small(image)
+        if view.picture is None or view.image is None:
             return
         if self._stage is None or self._stage.picture is not view.picture:
             self._stage = _Scene(self.server, view.picture)
@@ -108,6 +116,8 @@ class _Scene:
         server.scene.reset()
         show = Show(title="live", times=np.zeros(1), figures=(self.figure,), eyes=(Eye(picture.camera),))
         self.stage = Stage(server, show, Wish(), width=WIDE)
+        for client in server.get_clients().values():  # who looks already
+            client.camera.position, client.camera.look_at = show.viewpoint, show.middle
         self.plain = Plain(picture.camera, WIDE)
 
     def to(self, view: View) -> None:
@@ -141,6 +151,14 @@ def posed(body: Body, tree: BodyTree, mesh: Any, pose: Array, root: Array) -> Fi
     animation = tree.animation(np.zeros(1), np.asarray(pose, float)[None], root)
     places, turns = animation.world()
     return Figure(body.name, animation.times, mesh, animation.rest, places, turns)
+
+
+def _small(image: np.ndarray) -> np.ndarray:
+    """A picture (H, W, 3) blue green red as the page has it: of its width, red green blue."""
+    import cv2
+
+    height, width = image.shape[:2]
+    return np.ascontiguousarray(cv2.resize(image, (WIDE, max(1, round(WIDE * height / width))), interpolation=cv2.INTER_AREA)[..., ::-1])
 
 
 def words(view: View) -> str:

@@ -33,7 +33,7 @@ LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "leg": ("hip", "knee", "ankle", "leg")}
 """Words in the names of a limb's degrees of freedom."""
 UNSTATED = ("This run states no standard deviations. For “particles” and “uncertainty” its filter is run again on the frame that is shown, "
-            "from the pose before it; the ellipsoids tell how far those particles are spread, which is no measure of how far off the pose is.")
+            "from the pose before it; the ellipsoids tell how far those particles are spread, no measure of how far off the pose is.")
 
 
 def show_run(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None) -> Show:
@@ -117,8 +117,9 @@ class _Run:
     @cached_property
     def eyes(self) -> tuple[Eye, ...] | None:
         """The cameras that were tracked, with their films; None where the run names no recording."""
-        path = self.recording or self.run.info.get("recording")
-        if path is None or path == "made":
+        kept = self.run.folder / "recording"  # of a live run that was to keep its pictures
+        path = self.recording or self.run.info.get("recording") or (kept if kept.exists() else None)
+        if path is None:
             return None
         if not Path(path).exists():
             raise ShadowPuppetError(f"the recording {path} is not there")

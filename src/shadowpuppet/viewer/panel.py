@@ -67,7 +67,12 @@ class Panel:
                 return
             self._shown, self._stale = frame, False
             self._tell(frame)
+            if self.stage.reads_first:
+                self.status.content += " · reading the films"
+            slow = self.stage.reads_first
             self.stage.to(float(self.show.times[frame]))
+            if slow:
+                self._tell(frame)
 
     def stop(self) -> None:
         """End `follow`."""
@@ -117,13 +122,9 @@ class Panel:
         if len(self.show.times) < 2:
             return
         gui = self.server.gui
-        for label, key, act in (("Play or pause", "P", self.toggle), ("One frame back", ",", lambda: self._step("<")),
-                                ("One frame on", ".", lambda: self._step(">"))):  # fmt: skip
-            try:
-                command = gui.add_command(label, hotkey=key)  # pyright: ignore[reportArgumentType]
-            except (AttributeError, ValueError, AssertionError):
-                return  # of versions without commands: there are buttons
-            command.on_trigger(lambda _, act=act: act())
+        gui.add_command("Play or pause", hotkey="space").on_trigger(lambda _: self.toggle())
+        gui.add_command("One frame back", hotkey="J").on_trigger(lambda _: self._step("<"))
+        gui.add_command("One frame on", hotkey="L").on_trigger(lambda _: self._step(">"))
 
     # What is shown
 

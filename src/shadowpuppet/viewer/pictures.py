@@ -36,10 +36,10 @@ def shown(seen: Seen, plain: Plain, time: float, look: Look) -> NDArray[np.uint8
     if look is Look.NOTHING:
         return None
     mask = seen.mask(time)
-    if mask is None:
-        return None
-    outline = plain(mask.astype(np.uint8) * 255)
+    outline = None if mask is None else plain(mask.astype(np.uint8) * 255)
     if look is Look.SILHOUETTE:
+        if outline is None:
+            return None
         out = np.empty((*outline.shape, 4), np.uint8)
         out[..., :3], out[..., 3] = PERSON, np.maximum(outline, VEIL)
         return out
@@ -47,6 +47,8 @@ def shown(seen: Seen, plain: Plain, time: float, look: Look) -> NDArray[np.uint8
     if image is None:
         return None
     out = np.ascontiguousarray(plain(image)[..., ::-1])
+    if outline is None:
+        return out
     lines = cv2.findContours((outline > 127).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
     cv2.drawContours(out, lines, -1, OUTLINE, 1, cv2.LINE_AA)
     return out

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
+from shadowpuppet.errors import ShadowPuppetWarning, SilhouetteError, VideoError
 from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Shot, Silhouettes, silhouettes, take_sample
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette import ready_mask
@@ -34,7 +36,7 @@ class FilmSeen:
         assert not isinstance(view.video, (int, str))
         self._film = Seeker(view.video, footage.camera.size, rate)
         self._ready = Seeker(view.masks, footage.camera.size, rate) if view.masks is not None and options.masks else None
-        self._lock = threading.RLock()
+        self._lock, self.trouble = threading.RLock(), ""
         self._pictured: tuple[float, Image | None] = (np.nan, None)
         self._masked: tuple[float, Mask | None] = (np.nan, None)
 
@@ -49,8 +51,17 @@ class FilmSeen:
         """The silhouette (H, W); None where there is no picture."""
         with self._lock:
             if self._masked[0] != time:
-                self._masked = time, self._mask(time)
+                self._masked = time, None if self.trouble else self._tried(time)
             return self._masked[1]
+
+    def _tried(self, time: float) -> Mask | None:
+        """A silhouette; where none can be made that is said, once, and the film is shown without."""
+        try:
+            return self._mask(time)
+        except (SilhouetteError, VideoError) as error:
+            self.trouble = str(error)
+            warnings.warn(f"camera {self.footage.camera.name!r}: no silhouettes are shown: {error}", ShadowPuppetWarning, stacklevel=2)
+            return None
 
     def _mask(self, time: float) -> Mask | None:
         if self._ready is not None:

@@ -89,6 +89,11 @@ class Stage:
             self._put_cloud(cloud if self.wish.cloud else None)
         self.server.flush()
 
+    @property
+    def reads_first(self) -> bool:
+        """Whether backgrounds are learnt before the next time is shown."""
+        return not self._warm and self.wish.cameras and any(eye.eye.seen is not None for eye in self.eyes)
+
     def people(self, time: float) -> None:
         """Set the figures alone."""
         with self.server.atomic():
