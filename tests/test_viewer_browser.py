@@ -144,6 +144,9 @@ def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_pr
         assert "frame 9" in page.page.inner_text("body")
         page.page.get_by_role("button", name="|<", exact=True).click()
         page.wait(lambda: moved(page.seen(), first) < 6, "back where it was")
+        for key, frame in (("l", 1), ("l", 2), ("j", 1)):
+            page.page.keyboard.press(key)
+            page.wait(lambda frame=frame: panel.timeline.frame == frame, f"the key {key}")
         page.page.get_by_label("truth", exact=True).click()
         page.wait(lambda: not panel.stage.wish.figures["truth"], "a click reaches the program")
         page.wait(lambda: greenish(page.seen()) < 10, "the truth is gone")
