@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,7 +26,7 @@ def write_parquet(path: str | Path, columns: Columns) -> None:
     write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
 
 
-def write_lists(path: str | Path, columns: Mapping[str, Sequence[Any]]) -> None:
+def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
     """Write columns of plain values, each of one kind or None; raises as `write_parquet`."""
     arrow, parquet = _arrow(path)
     arrays = {name: arrow.array(column, from_pandas=True) for name, column in columns.items()}
