@@ -65,8 +65,8 @@ def _with(**values: Any) -> dict[str, Any]:
 
 
 PLAIN = {"modulated": False, "robust": False, "iterations": 160}
-"""Forces as those of Ni 2008's ref. [11], the first baseline of Table II, as `papers/ni2008/tracks.py` reads it: without normals and bounds,
-and with more iterations, as its one particle has that of forty's time."""
+"""Forces as those of Ni 2008's ref. [11], the first baseline of Table II, as `papers/ni2008/tracks.py` reads it: without normals and
+bounds, with more iterations for its one particle than forty have each."""
 FOUR, THREE = ("cam1", "cam3", "cam5", "cam7"), ("cam1", "cam3", "cam5")
 ROWS: dict[str, Row] = {
     "default": Row(),
