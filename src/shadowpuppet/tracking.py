@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -211,10 +211,8 @@ class MultiviewTracker:
         s, particles, pose = self.settings, state.particles, state.pose
         weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
         for cycle in range(s.cycles):
-            around, scale = pose, s.cooling**cycle
-            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
-                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale,  # noqa: B023
-                                                                       evidence.differing))
+            propose = partial(self.proposals, last=pose, velocity=state.velocity, unlike=evidence.differing, scale=s.cooling**cycle)
+            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number, propose=propose)
             weights = normalise(particles.log_weights)
             pose = particles.best if s.estimate == "best" else weights @ particles.poses
         return self.judge(pose, pose - state.pose, particles, evidence, weigh)
