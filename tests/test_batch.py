@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 
 import made
-from shadowpuppet import cli
 from shadowpuppet.batch import Batch, BatchListener, make_grid, run_batch
 from shadowpuppet.batch import crew as crews
 from shadowpuppet.batch.plan import make_tasks, named
@@ -384,17 +383,8 @@ def test_parquet_needs_pyarrow(recording, tmp_path):
 
 
 @pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+def columns() -> int:
+    return 100
 
 
 def test_batch_tells_what_came_of_it(shell, recording, tmp_path, monkeypatch):
