@@ -119,7 +119,7 @@ class Picture:
         return self.body.points(poses, inverse(self.camera.T_camera_world) @ self.T_camera_base, names)
 
     def empty(self) -> Bits:
-        """An empty mask's bits."""
+        """An empty mask's bits (ceil(W / 64), H)."""
         width, height = self.camera.size
         return np.zeros((-(-width // 64), height), np.uint64)
 

@@ -88,7 +88,7 @@ class MonocularTracker:
         return after
 
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
-        """Algorithm 2's loop body, `cycles` times: stage by stage resample, diffuse and weigh (Algorithms 3, 4); keep the best."""
+        """Algorithm 2's loop body on a mask (H, W), `cycles` times: stage by stage resample, diffuse, weigh (Algorithms 3, 4)."""
         pose, particles = state.pose, list(state.particles)
         observation = self.observe(mask, pose, also)
         for cycle in range(self.settings.cycles):
@@ -126,7 +126,7 @@ class MonocularTracker:
         return Observation.without_legs(mask, self.picture, pose, also) if self.settings.ignore_legs else Observation.of(mask, also=also)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
-        """The state with its cost, overlap and status."""
+        """The state of a pose (D,), with its cost, overlap and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
         return State(pose, tuple(particles), cost, overlap, _status(overlap))
 
@@ -195,7 +195,7 @@ class MultiviewTracker:
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
               also: Cost | None = None) -> MultiviewState:
-        """A state from one frame: the best of many poses in all directions, refined. `absent` where nobody is there."""
+        """A state from one frame's points and masks (H, W): the best of many poses in all directions, refined; or `absent`."""
         evidence = Evidence(self.stage, points, masks, also)
         if not self.is_present(evidence):
             rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
@@ -257,7 +257,7 @@ class MultiviewTracker:
         return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
-        """The state with its cost, overlap and status."""
+        """The state of a pose (D,), with its cost, overlap and status."""
         overlap = evidence.overlap(pose)
         return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, _status(overlap))
 
