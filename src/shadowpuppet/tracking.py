@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -74,15 +74,17 @@ class MonocularTracker:
     """A resampling scheme of your own, in place of the settings'."""
 
     def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
-        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh. `also`: a cost of
-        your own, poses (N, D) to pixels (N,), which is added to eq. 2. Raises `TrackingError` for a mask that has not the camera's size."""
+        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh (`recover`).
+        `also`: a cost of your own, poses (N, D) to pixels (N,), which is added to eq. 2. Raises `TrackingError` for a mask that has not
+        the camera's size."""
         mask = check_mask(mask, self.picture.camera.size)
         if self.is_absent(mask, state.pose):
             return self.absent(state)
-        if state.status == "absent":
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
             return self.start(rng, mask, also)
         after = self.cycle(rng, state, mask, also)
-        if after.status == "lost":
+        if after.status == "lost" and recover:
             found = self.start(rng, mask, also)
             return found if found.overlap > after.overlap else after
         return after
@@ -181,14 +183,15 @@ class MultiviewTracker:
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:
         """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes back, is searched for
-        afresh. `also`: a cost of your own, poses (N, D) to m^2 (N,), which is added to that of the surface in this frame."""
+        afresh (`recover`). `also`: a cost of your own, poses (N, D) to m^2 (N,), which is added to that of the surface."""
         evidence = Evidence(self.stage, points, masks, also)
         if not self.is_present(evidence):
             return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
-        if state.status == "absent":
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
             return self.search(rng, evidence)
         after = self.cycle(rng, state, evidence)
-        if after.status == "lost" or after.overlap < state.overlap - SUDDEN:
+        if recover and (after.status == "lost" or after.overlap < state.overlap - SUDDEN):
             found = self.search(rng, evidence)
             return found if found.overlap > after.overlap else after
         return after
@@ -207,10 +210,8 @@ class MultiviewTracker:
         s, particles, pose = self.settings, state.particles, state.pose
         weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
         for cycle in range(s.cycles):
-            around, scale = pose, s.cooling**cycle
-            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
-                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale,  # noqa: B023
-                                                                       evidence.differing))
+            propose = partial(self.proposals, last=pose, velocity=state.velocity, unlike=evidence.differing, scale=s.cooling**cycle)
+            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number, propose=propose)
             weights = normalise(particles.log_weights)
             pose = particles.best if s.estimate == "best" else weights @ particles.poses
         return self.judge(pose, pose - state.pose, particles, evidence, weigh)
