@@ -70,11 +70,12 @@ def shown(page: Path) -> set[str]:
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 
 
-def test_every_picture_is_shown_somewhere_and_none_is_missing_or_large():
+def test_every_picture_is_shown_somewhere_and_none_is_large():
+    """What a page shows and is not there fails the manual's build; the README is not in it."""
     named, there = set().union(*map(shown, PAGES)), {path.relative_to(DOCS).as_posix() for path in (DOCS / "assets").iterdir()}
-    assert named - there == set()
     assert there - named == {"assets/extra.css"}
-    sizes = {name: (DOCS / name).stat().st_size for name in named}
+    assert shown(PAGES[0]) <= there
+    sizes = {name: (DOCS / name).stat().st_size for name in there}
     assert [name for name, size in sizes.items() if size > LARGEST.get(Path(name).suffix, LARGEST[""])] == []
 
 
