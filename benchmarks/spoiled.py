@@ -13,37 +13,38 @@ from numpy.typing import NDArray
 from shadowpuppet.video import open_frames, write_frames
 
 Mask = NDArray[np.bool_]
-Spoil = Callable[[np.random.Generator, Mask], Mask]
+Spoil = Callable[[np.random.Generator, Mask, float], Mask]
+"""Of a mask (H, W) and the root of the person's area in pixels, the median of the film."""
 
-THICK = 1 / 120
-"""How much of the picture's height outlines are moved by: 2 pixels of 240."""
+THICK = 0.02
+"""By how much of that outlines are moved: a fifth of a forearm's thickness on either side."""
 HOLES, HOLE = 6, 0.04
 """So many discs a frame, with radii of this share of the person's height."""
 FLICKER = 0.1
 """Share of the frames, of each camera by itself, in which half the person is missing."""
 
 
-def grown(_: np.random.Generator, mask: Mask) -> Mask:
+def grown(_: np.random.Generator, mask: Mask, size: float) -> Mask:
     """Wider on all sides."""
-    return cv2.dilate(mask.astype(np.uint8), _disc(THICK * len(mask))) > 0
+    return cv2.dilate(mask.astype(np.uint8), _disc(THICK * size)) > 0
 
 
-def eroded(_: np.random.Generator, mask: Mask) -> Mask:
+def eroded(_: np.random.Generator, mask: Mask, size: float) -> Mask:
     """Thinner on all sides."""
-    return cv2.erode(mask.astype(np.uint8), _disc(THICK * len(mask))) > 0
+    return cv2.erode(mask.astype(np.uint8), _disc(THICK * size)) > 0
 
 
-def holes(rng: np.random.Generator, mask: Mask) -> Mask:
+def holes(rng: np.random.Generator, mask: Mask, _: float) -> Mask:
     """Discs that are missing, others in every frame."""
     return mask & ~_discs(rng, mask, mask)
 
 
-def specks(rng: np.random.Generator, mask: Mask) -> Mask:
+def specks(rng: np.random.Generator, mask: Mask, _: float) -> Mask:
     """Discs beside the person, others in every frame."""
     return mask | _discs(rng, mask, np.ones_like(mask))
 
 
-def flicker(rng: np.random.Generator, mask: Mask) -> Mask:
+def flicker(rng: np.random.Generator, mask: Mask, _: float) -> Mask:
     """Now and then the upper or the lower half is missing."""
     rows = np.flatnonzero(mask.any(1))
     if rng.random() >= FLICKER or not len(rows):
@@ -67,10 +68,11 @@ def spoiled(recording: Path, name: str, folder: Path) -> Path:
             (out / path.name).symlink_to(path.resolve())
     for path in sorted((recording / "masks").iterdir()):
         frames = open_frames(path)
+        size = float(np.sqrt(np.median([area for frame in open_frames(path) if (area := np.count_nonzero(frame.image[..., 0]))] or [0])))
         rng = np.random.default_rng(list(hashlib.sha256(f"{recording.name} {name} {path.stem}".encode()).digest()))
         with write_frames(out / "masks" / path.name, frames.rate, lossless=True) as film:
             for frame in frames:
-                mask = SPOILS[name](rng, frame.image[..., 0] > 127)
+                mask = SPOILS[name](rng, frame.image[..., 0] > 127, size)
                 film.write(np.uint8(255) * mask)
     (out / "made").touch()
     return out
