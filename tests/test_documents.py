@@ -85,6 +85,13 @@ def test_every_picture_says_what_it_shows():
     assert bare == []
 
 
+def test_the_build_fails_where_a_link_leads_nowhere():
+    """`mkdocs build --strict --quiet` builds anything: what is not said is not counted."""
+    (line,) = [line.split("#")[0] for line in (ROOT / "run").read_text("utf-8").splitlines() if "mkdocs\" build" in line]
+    assert "--strict" in line
+    assert "-q" not in line
+
+
 def test_every_page_can_be_reached():
     assert {page.name for page in DOCS.glob("*.md")} == set(re.findall(r": (\w+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.M))
 
