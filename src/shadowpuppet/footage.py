@@ -268,6 +268,11 @@ def silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouett
     return replace(seen, segmenter=segmenter)
 
 
+def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
+    """Masks (H, W) of the film's frames, one after another, as `track_recording` has them. Raises as `silhouettes`."""
+    return map(silhouettes(footage, take_sample(footage, options.masks), options), footage.shots(ready=options.masks))
+
+
 def clear_silhouettes(footage: Footage, sample: Sample, seen: Silhouettes, options: Options) -> Silhouettes:
     """Silhouettes that a person can be measured in: those that are tracked in, `seen`, where these are clean; otherwise clean ones.
 
