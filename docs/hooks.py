@@ -90,7 +90,7 @@ def presets() -> str:
 def example(name: str) -> str:
     """An example's code, without what it says of itself."""
     code = (Path(__file__).parents[1] / "examples" / name).read_text("utf-8")
-    return f"```python\n{code.split(QUOTES)[2].strip()}\n```"
+    return f"```python\n{code.split(QUOTES, 2)[2].strip()}\n```"
 
 
 MAKERS = {"settings": settings_table, "spec": spec_table, "help": help_text, "presets": presets, "example": example}

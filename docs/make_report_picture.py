@@ -13,14 +13,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image  # which Matplotlib brings
 
 from shadowpuppet.evaluation import measure_run
 from shadowpuppet.report.page import write_report
-from shadowpuppet.video import read_image, write_image
+from shadowpuppet.video import read_image
 
 TARGET = Path(__file__).parent / "assets" / "report.png"
-WIDTH, HEIGHT, SCALE, GREYS = 1120, 1240, 0.52, 8
-"""Pixels of the page's two parts, by what they are made smaller, and the step of the grey levels."""
+WIDTH, HEIGHT, SCALE, COLOURS, LARGEST = 1120, 1240, 0.52, 200, 150_000
+"""Pixels of the page's two parts, by what they are made smaller, how many colours the picture has, and its bytes at most."""
 
 
 def photographed(page: Path, picture: Path, height: int) -> np.ndarray:
@@ -45,7 +46,12 @@ def main() -> None:
         image = photographed(folder / "page.html", folder / "page.png", 2 * HEIGHT)
     both = np.concatenate([image[:HEIGHT], image[HEIGHT : 2 * HEIGHT]], axis=1)
     small = cv2.resize(both, None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_AREA)
-    write_image(TARGET, np.minimum((small.astype(int) + GREYS // 2) // GREYS * GREYS, 255).astype(np.uint8))
+    few = Image.fromarray(small[..., ::-1].copy()).quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+    few.save(TARGET, optimize=True)
+    size = TARGET.stat().st_size
+    print(f"{TARGET}: {size} bytes")
+    if size > LARGEST:
+        sys.exit(f"{TARGET}: found {size} bytes, expected at most {LARGEST}")
 
 
 if __name__ == "__main__":

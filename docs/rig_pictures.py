@@ -78,7 +78,7 @@ def lines(out: np.ndarray, camera: Camera, starts: Array, ends: Array, colour: t
     a, b = (np.rint(camera.project(points)).astype(int).tolist() for points in (starts, ends))
     for start, end in zip(a, b):
         if tips:
-            cv2.arrowedLine(out, start, end, colour, 2, cv2.LINE_AA, tipLength=0.3)
+            cv2.arrowedLine(out, start, end, colour, 1, cv2.LINE_AA, tipLength=0.25)
         else:
             cv2.line(out, start, end, colour, 1, cv2.LINE_AA)
             cv2.circle(out, start, 2, colour, -1, cv2.LINE_AA)
@@ -137,7 +137,8 @@ def forces(found: Scene) -> np.ndarray:
     pose[skeleton.dof_indices((f"{side}_shoulder_y", f"{side}_elbow_flexion"))] += 0.08, 0.3
     pulled = [refiner.forces(pose[None], cloud, ForceSettings(iterations=n))[0] for n in (20, 100)]
     solved = refiner.gauss_newton(pose[None], ((cloud, 10, 0.05),), pose[None], np.full(len(pose), 1e-5))[0]
-    arm, tiles = [s for s, part in enumerate(found.body.limbs.parts) if part.startswith(side) and "arm" in part], []  # pyright: ignore
+    parts, tiles = [f"{side}_{part}" for part in ("upper_arm", "forearm", "hand")], []
+    arm = [s for s, part in enumerate(found.body.limbs.parts) if part in parts]  # pyright: ignore
     about = found.body.points(settled[None], names=[f"{side}_shoulder", f"{side}_elbow", f"{side}_hand"])[0]
     for shown in (pose, *pulled, solved):
         camera, tile = enlarged(found.cameras[1])

@@ -9,8 +9,6 @@ import sys
 import numpy as np
 
 import shadowpuppet as sp
-from shadowpuppet.footage import open_footage, silhouettes, take_sample
-from shadowpuppet.resampling import with_best
 from shadowpuppet.synthetic import Spec, synthesize
 
 
@@ -22,19 +20,16 @@ def tournament(rng, log_weights, number):
 
 recording = sys.argv[1] if len(sys.argv) > 1 else synthesize(Spec(), "sample", np.random.default_rng(1))
 options = sp.make_options({"preset": "liu2011"})
-footage = open_footage(recording, options)
-seen = silhouettes(footage, take_sample(footage), options)
-masks = [seen(shot) for shot in footage.shots(ready=False)]
+footage = sp.open_footage(recording, options)
+masks = list(sp.read_masks(footage, options))
 fit = sp.find_person(np.random.default_rng(0), footage.camera, masks[:10:3], height=1.75, body="cardbox")
+picture = fit.guess.picture(footage.camera, "cardbox")
 
-for name in ("as in the paper", "tournament"):
-    tracker = sp.MonocularTracker(fit.guess.picture(footage.camera, "cardbox"), options.tracker)
-    if name == "tournament":
-        for stage in tracker.stages:
-            stage.resample = with_best(tournament)
-    rng = np.random.default_rng(0)
-    state, costs = tracker.start(rng, masks[0]), []
-    for mask in masks:
-        state = tracker.step(rng, state, mask)
-        costs.append(state.cost)
-    print(f"{name:16}  mean cost {np.mean(costs):5.0f} pixels, overlap at the end {state.overlap:.2f}")
+costs = {}
+for name, scheme in (("as in the paper", None), ("tournament", tournament)):
+    tracker, rng = sp.MonocularTracker(picture, options.tracker, scheme=scheme), np.random.default_rng(0)
+    states = [tracker.start(rng, masks[0])]
+    for mask in masks[1:]:
+        states.append(tracker.step(rng, states[-1], mask))
+    costs[name] = np.nanmean([state.cost for state in states])
+    print(f"{name:16}  mean cost {costs[name]:5.0f} pixels, overlap at the end {states[-1].overlap:.2f}")

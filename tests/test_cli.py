@@ -38,21 +38,6 @@ def run(recording, tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    """Runs a command in a folder of its own; gives exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
-
-
 def process(*tokens: object, **more) -> subprocess.Popen:
     command = [sys.executable, "-m", "shadowpuppet", *map(str, tokens)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)

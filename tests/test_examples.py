@@ -20,9 +20,19 @@ MADE = {"01": ["sample-run/joints.csv", "sample-run/overlay.mp4"], "02": ["one_p
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory) -> Path:
-    view, scene = Viewpoint(size=(160, 120)), Scene(empty_seconds=1)
-    spec = Spec(motion=(Gesture(motion="wave_hands", seconds=3),), cameras=(view,), scene=scene, rate=6)
-    return synthesize(spec, tmp_path_factory.mktemp("examples") / "recording", np.random.default_rng(1))
+    return small(tmp_path_factory.mktemp("examples"), Gesture(motion="wave_hands", seconds=3))
+
+
+@pytest.fixture(scope="module")
+def reaching(tmp_path_factory) -> Path:
+    """Arms before the body."""
+    return small(tmp_path_factory.mktemp("examples"), Gesture(motion="forearms_up", seconds=4), Gesture(motion="reach", seconds=5))
+
+
+def small(folder: Path, *motion: Gesture) -> Path:
+    """One small camera."""
+    spec = Spec(motion=motion, cameras=(Viewpoint(size=(160, 120)),), scene=Scene(empty_seconds=1), rate=6)
+    return synthesize(spec, folder / "recording", np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")
@@ -33,21 +43,46 @@ def ring(tmp_path_factory) -> Path:
     return synthesize(spec, tmp_path_factory.mktemp("examples") / "ring", np.random.default_rng(1))
 
 
-def given(example: Path, recording: Path, ring: Path) -> list[str]:
+def given(example: Path, recording: Path, ring: Path, reaching: Path) -> list[str]:
     """What an example is started with: what it would else make is large, and what it makes itself is not."""
     if "synthesize" not in example.read_text("utf-8"):
         return []
-    return [str(ring if "several" in example.stem else recording)]
+    return [str({"05": ring, "09": reaching}.get(example.name[:2], recording))]
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_examples_run_and_say_something(example, recording, ring, tmp_path, monkeypatch, capsys):
+def test_examples_run_and_say_something(example, recording, ring, reaching, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(example), *given(example, recording, ring)])
-    runpy.run_path(str(example), run_name="__main__")
+    monkeypatch.setattr(sys, "argv", [str(example), *given(example, recording, ring, reaching)])
+    left = runpy.run_path(str(example), run_name="__main__")
     assert capsys.readouterr().out.strip()
+    SHOWN.get(example.name[:2], lambda left: None)(left)
     for name in MADE.get(example.name[:2], []):
         assert (tmp_path / name).stat().st_size > 0
+
+
+def tournament_selects(left):
+    """Costs of a random body would be some thousands of pixels, of 19,200."""
+    assert 0 < left["costs"]["tournament"] < 2 * left["costs"]["as in the paper"] < 2000
+
+
+def more_cards_fit_closer(left):
+    assert left["costs"]["starbox"] < left["costs"]["cardbox"]
+    assert len(left["tracker"].picture.body.parts) == 15 + 2 * 7
+
+
+def the_glove_tells_where_the_hand_is(left):
+    assert left["errors"]["with the glove"] < 0.8 * left["errors"]["silhouettes"]
+
+
+SHOWN = {"03": tournament_selects, "08": more_cards_fit_closer, "09": the_glove_tells_where_the_hand_is}
+"""What must be true of what examples found, by their numbers: of the names that they leave."""
+
+
+@pytest.mark.parametrize("number", SHOWN)
+def test_what_is_added_takes_under_forty_lines(number):
+    code = next(path for path in EXAMPLES if path.name.startswith(number)).read_text("utf-8").split('"""', 2)[2]
+    assert sum(1 for line in code.splitlines() if line.strip()) < 40
 
 
 def test_examples_are_numbered_and_each_says_what_it_shows():

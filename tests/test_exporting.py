@@ -11,7 +11,6 @@ import pytest
 import acclaim
 import biovision
 import runs
-from shadowpuppet import cli
 from shadowpuppet.animation import Y_UP
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.exporting import CONVERSIONS, EXPORTS, export_run
@@ -36,17 +35,8 @@ def whole(tmp_path_factory):
 
 
 @pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+def columns() -> int:
+    return 100
 
 
 def refused(shell, *tokens: object) -> str:

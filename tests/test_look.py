@@ -298,6 +298,15 @@ def test_the_right_posture_is_not_doubted(posture):
     assert wrong_posture(*_drawn(posture, posture)) is None
 
 
+def test_an_arm_that_lacks_one_side_in_a_small_picture_is_no_wrong_posture():
+    camera, mask, *rest = _drawn("front_t_pose", "front_t_pose", distance=4.0)
+    rows = np.flatnonzero(mask[:, 120])  # of an arm
+    thin = mask.copy()
+    thin[rows[0] - 2 : rows[0] + len(rows) // 2 + 1, :140] = False
+    assert 0 < np.count_nonzero(thin[:, 120]) < len(rows)
+    assert wrong_posture(camera, thin, *rest) is None
+
+
 def test_arms_that_are_not_seen_and_trunks_that_are_too_deep_show_a_wrong_posture():
     assert "0 % of the level forearms are in the silhouette" in str(wrong_posture(*_drawn("front_t_pose", "side_arms_hanging")))
     camera, mask, name, fit, pose = _drawn("side_arms_hanging", "side_arms_hanging")

@@ -9,7 +9,7 @@ import pytest
 
 import made
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
-from shadowpuppet.footage import RUN, RUNS, Shot, open_footage, silhouettes, take_sample
+from shadowpuppet.footage import RUN, RUNS, Shot, open_footage, read_masks, silhouettes, take_sample
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
@@ -172,6 +172,20 @@ def test_masks_that_end_early_are_said(recording, tmp_path):
         track_recording(spoilt, tmp_path / "run", Options(masks=True))
 
 
+def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
+    said = []
+
+    class Told(Listener):
+        def begin(self, what: str, total: int | None = None) -> None:
+            said.append((what, total))
+
+    third = track_recording(recording, tmp_path / "run", make_options(QUICK | {"every": 3, "overlay": True}), Told())
+    times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
+    assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
+    assert said[-1] == ("tracking", len(third.motion))
+    assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
+
+
 def test_ready_masks_are_used_only_when_asked_for(recording, tmp_path):
     spoilt = made.copied(recording, tmp_path / "spoilt")
     masks = made.images(recording / "masks" / "cam.mkv")
@@ -182,6 +196,15 @@ def test_ready_masks_are_used_only_when_asked_for(recording, tmp_path):
     assert seen(shots[5]).mean() > 0.05
     ready = silhouettes(*_sampled(spoilt, Options(masks=True)))
     assert not ready(shots[5]).any()
+
+
+@pytest.mark.parametrize("options", [Options(), Options(masks=True)])
+def test_the_masks_that_are_read_are_those_that_are_tracked(recording, options):
+    footage, sample, _ = _sampled(recording, options)
+    seen, read = silhouettes(footage, sample, options), list(read_masks(footage, options))
+    assert len(read) == footage.count
+    for mask, shot in zip(read, footage.shots(ready=options.masks)):
+        np.testing.assert_array_equal(mask, seen(shot))
 
 
 def _sampled(recording, options):

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.ndimage import distance_transform_edt
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background
 from shadowpuppet.silhouette._kernels import classify, contrast, far_from_samples
 from shadowpuppet.silhouette.background import Spread, film_noise, learn_statistics, smoothed, to_planes
-from shadowpuppet.silhouette.outlines import SHARP, Outline, at_half_contrast, outline_width
+from shadowpuppet.silhouette.outlines import SHARP, THIN, Outline, at_half_contrast, outline_width
 from shadowpuppet.silhouette.rules import PlainRule
 from silhouette_scenes import CLEANED, SIZE, dressed, empty_shots, figure, grey, scene, shot
 
@@ -210,7 +211,13 @@ def test_the_outline_lies_at_half_contrast_however_far_the_first_mask_reaches(bl
     assert abs(offset) < 0.15
 
 
-def test_blurred_films_have_wide_outlines():
+@pytest.fixture
+def thick(monkeypatch):
+    """Whoever is blurred has no thin limbs."""
+    monkeypatch.setattr("shadowpuppet.silhouette.outlines.THIN", 1.0)
+
+
+def test_blurred_films_have_wide_outlines(thick):
     widths = []
     for blur in (0, 1.5, 3):
         _, seen = blurred_disc(25, blur, 150)
@@ -220,7 +227,20 @@ def test_blurred_films_have_wide_outlines():
     assert outline_width([]) == SHARP
 
 
-def test_a_blurred_film_is_known_by_a_person_whom_the_border_cuts():
+def test_stripes_of_clothes_are_not_taken_for_blur_wider_than_half_an_arm(rng):
+    """Dull sleeves and a bright, striped trunk in a small picture: the contrast climbs inward for eight pixels."""
+    mask = np.zeros((60, 80), np.uint8)
+    mask[20:60, 30:50] = mask[22:26, 8:72] = 1
+    depth = distance_transform_edt(mask)
+    contrast = np.float32(mask * (20 + 12 * np.minimum(depth, 8)))
+    width = outline_width([(mask, contrast)])
+    assert SHARP <= width <= np.ceil(THIN * np.sqrt(mask.sum()))
+    arm = at_half_contrast(mask, contrast, Outline(width, 6))[22:26, 10:28]
+    assert arm.all()
+    assert not at_half_contrast(mask, contrast, Outline(6, 6))[22:26, 10:28].all()  # what it would be without
+
+
+def test_a_blurred_film_is_known_by_a_person_whom_the_border_cuts(thick):
     _, seen = blurred_disc(35, 2.5, 150)
     half = np.ascontiguousarray(seen[:50])
     whole = outline_width([((seen > 8).astype(np.uint8), seen)])

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
     from shadowpuppet.exporting import convert_motion, export_run
+    from shadowpuppet.footage import open_footage, read_masks
     from shadowpuppet.initialization import find_person, fit_references
     from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.io.calibration import read_calibration, write_calibration
@@ -67,7 +68,7 @@ _HOMES = {
     "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking", "MultiviewSettings": "settings",
     "make_multiview_settings": "settings", "export_run": "exporting", "convert_motion": "exporting",
     "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation", "read_truth": "io.truth",
-    "write_report": "report.page",
+    "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",
 }  # fmt: skip
 """Where each public name lives."""
 
@@ -81,6 +82,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
     "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings", "export_run",
     "convert_motion", "Comparison", "Evaluation", "measure_run", "read_truth", "write_report",
+    "open_footage", "read_masks",
 ]  # fmt: skip
 
 

@@ -12,16 +12,21 @@ from shadowpuppet.sizes import CardboxSizes, Sizes
 from shadowpuppet.whole_body import anatomical, cylinders
 from shadowpuppet.whole_sizes import BoneSizes, sizes_kind
 
-ALL: dict[str, Callable[[Any], Body]] = {**BODIES, "anatomical": anatomical, "cylinders": cylinders}
+Make = Callable[[Any], Body]
+"""Sizes to a body."""
+ALL: dict[str, Make] = {**BODIES, "anatomical": anatomical, "cylinders": cylinders}
 """How each body is made from its sizes."""
 
 
-def make_body(name: str, sizes: Sizes) -> Body:
-    """A body by name. Raises `ShadowPuppetError` with the names there are, or for sizes of another kind of body."""
-    kind = sizes_kind(name)
+def make_body(body: str | Make, sizes: Sizes) -> Body:
+    """A body by name, or by a function of your own that makes one of sizes. Raises `ShadowPuppetError` with the names there are, or for
+    sizes of another kind of body."""
+    if not isinstance(body, str):
+        return body(sizes)
+    kind = sizes_kind(body)
     if not isinstance(sizes, kind):
-        raise ShadowPuppetError(f"body {name!r}: found {type(sizes).__name__}, expected {kind.__name__}")
-    return ALL[name](sizes)
+        raise ShadowPuppetError(f"body {body!r}: found {type(sizes).__name__}, expected {kind.__name__}")
+    return ALL[body](sizes)
 
 
 def average_sizes(name: str, height: float) -> Sizes:

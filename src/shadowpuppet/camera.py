@@ -30,7 +30,7 @@ class Camera:
     matrix: Array
     """Intrinsics, of shape (3, 3), pixels."""
     distortion: Array = field(default_factory=lambda: np.zeros(4))
-    """k1 k2 p1 p2 [k3 [k4 k5 k6]] of OpenCV's model; k1..k4 of its fisheye model."""
+    """k1 k2 p1 p2 [k3 [k4 k5 k6]] of OpenCV's model, of shape (4,), (5,) or (8,); k1..k4 of its fisheye model."""
     T_camera_world: Array = field(default_factory=lambda: np.eye(4))
     """World to camera, of shape (4, 4), metres: X_camera = R X_world + t."""
     fisheye: bool = False

@@ -13,7 +13,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.free_space import FreeSpace, free_space
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, silhouette_costs
+from shadowpuppet.likelihood import Cost, Observation, silhouette_costs
 from shadowpuppet.masks import Mask, may_be_person
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.visual_hull import SurfacePoints
@@ -31,9 +31,9 @@ class Stage:
 class Evidence:
     """One frame: surface points, and the masks (H, W) that they were made from, None for a camera without any."""
 
-    def __init__(self, stage: Stage, surface: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Nothing is computed until it is asked for."""
-        self.stage, self.surface, self.masks = stage, surface, masks
+    def __init__(self, stage: Stage, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
+        """Nothing is computed until it is asked for. `also`: a cost of your own (m^2), which is added to that of the surface."""
+        self.stage, self.surface, self.masks, self.also = stage, surface, masks, also
 
     def cloud(self, share: int = 1) -> Cloud:
         """Every `share`-th of the surface points."""

@@ -18,6 +18,7 @@ from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
+from shadowpuppet.silhouette.outlines import disc
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.tracking import MonocularTracker
 from shadowpuppet.whole_sizes import WHOLE
@@ -27,7 +28,9 @@ WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0
 DOUBTFUL = {"front_t_pose": 0.78, "side_arms_hanging": 0.68, "front_arms_t_pose": 0.78}
 """... or may not. Right ones have 0.85 to 0.94, from the side 0.72 to 0.89."""
 SEEN = 0.6
-"""Share of a level forearm that lies in the silhouette, under which the arms were not level: sizes can hide a wrong posture."""
+"""Share of a level forearm that lies in the silhouette, under which the arms were not level: sizes can hide a wrong posture..."""
+BESIDE = 0.03
+"""... or so far beside it, over the root of its area: in small pictures an arm may lack one side."""
 DEEP = 1.2
 """Depth of the fitted trunk over its width from which on it was not seen from the side; right ones have 0.75 to 0.82."""
 BROAD = 0.33
@@ -160,7 +163,11 @@ def wrong_posture(camera: Camera, mask: Mask, name: str, fit: Fit, pose: Array) 
 
 
 def _forearms_seen(camera: Camera, mask: Mask, guess: Guess, pose: Array) -> float:
-    """Share of the lines from the elbows to the wrists that lies in a mask (H, W), of what is in the picture; 1 where nothing is."""
+    """Share of the lines from the elbows to the wrists that lies in a mask (H, W), or `BESIDE` it, of what is in the picture; 1 where
+    nothing is."""
+    import cv2
+
+    mask = cv2.dilate(mask.astype(np.uint8), disc(max(1, round(BESIDE * mask.sum() ** 0.5)))) > 0
     picture = guess.picture(camera)
     pixels = dict(zip(picture.body.landmark_names, camera.project(picture.points_world(pose[None])[0])))
     along = np.linspace(0, 1, 20)[:, None]

@@ -27,7 +27,7 @@ GROUPS = {
     **dict.fromkeys(("preset", "seed", "overlay"), RUN),
     **dict.fromkeys(("height", "distance", "body", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
-    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size"), PICTURES),
+    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size", "every"), PICTURES),
 }
 SPEC_GROUPS = {
     **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
@@ -106,15 +106,15 @@ if TYPE_CHECKING:
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
-    LookFlags = flags_of(Options, without=("overlay",))
+    LookFlags = flags_of(Options, without=("every", "overlay"))
     """Those that matter where nothing is tracked."""
     ViewFlags = flags_of(Options, without=("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay"))
     """Those that matter where a recording is looked at."""
     BatchFlags = flags_of(Options, without=("seed",))
     """Those that many runs with seeds of their own may share."""
-    DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
+    DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay"))
     """Those that matter where the recording is known."""
-    SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training", "multiview"))
+    SessionFlags = flags_of(Options, without=("camera", "masks", "every", "overlay", "prior", "training", "multiview"))
     """Those that matter where a camera is tracked as it happens."""
     LiveFlags = flags_of(LiveSettings)
     """What can be set about that beside."""

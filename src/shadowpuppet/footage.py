@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,6 +70,10 @@ class Footage:
                 return
             if time > -ROUNDING:
                 yield Shot(max(time, 0.0), frame.image, None if mask is None else mask.image)
+
+    def tracked(self, ready: bool, every: int) -> Iterator[Shot]:
+        """Of so many of the film's `shots` one, the first on."""
+        return islice(self.shots(ready), 0, None, every)
 
     @property
     def count(self) -> int | None:
@@ -262,6 +266,11 @@ def silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouett
     seen = Silhouettes(source, None, footage.region, None if footage.region is None else first)
     segmenter = learn_background(scene, options.silhouette, film=[seen.visible(image) for image in images])
     return replace(seen, segmenter=segmenter)
+
+
+def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
+    """Masks (H, W) of the film's frames, one after another, as `track_recording` has them. Raises as `silhouettes`."""
+    return map(silhouettes(footage, take_sample(footage, options.masks), options), footage.shots(ready=options.masks))
 
 
 def clear_silhouettes(footage: Footage, sample: Sample, seen: Silhouettes, options: Options) -> Silhouettes:

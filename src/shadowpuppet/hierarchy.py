@@ -10,7 +10,7 @@ from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.members import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.resampling import Scheme, make_scheme, normalise
+from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.settings import MonocularSettings, pixel_scale
 
 WANDER, AROUND = 0.3, 0.2
@@ -22,8 +22,8 @@ TEMPERATURE = 50.0
 class FilterStage:
     """One stage: its particles are the values (N, d) of its DOF; all other DOF are as estimated."""
 
-    def __init__(self, picture: Picture, settings: MonocularSettings, name: str) -> None:
-        """`name`: parts joined by +. Raises `SettingsError` for a part that there is not."""
+    def __init__(self, picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None) -> None:
+        """`name`: parts joined by +; `scheme`: in place of the settings' resampling. Raises `SettingsError` for an unknown part."""
         self.picture, self.settings = picture, settings
         self.parts = tuple(dict.fromkeys(part.strip() for part in name.split("+")))
         skeleton = picture.body.skeleton
@@ -40,7 +40,7 @@ class FilterStage:
 
         of = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}
         self.number = sum(part.particles for part in of.values())
-        self.resample: Scheme = make_scheme(settings.resampling, of[self.parts[0]].survival)
+        self.resample = make_scheme(settings.resampling, of[self.parts[0]].survival) if scheme is None else with_best(scheme)
         self.turns = np.array([skeleton.dofs[d].kind != "translation" for d in self.dofs])
         self.sigma = np.array([of[owner[d]].sigma_rotation if turn else of[owner[d]].sigma_translation
                                for d, turn in zip(self.dofs.tolist(), self.turns, strict=True)])
@@ -83,7 +83,8 @@ class FilterStage:
     def weigh(self, observation: Observation, around: Array, last: Array) -> Weigh:
         """Costs (N,) and log weights (eq. 6) of values (N, d), all other DOF as in `around` (D,).
 
-        Beside eq. 2 a pose pays, in the default preset, for being unusual and for being far from the last frame's, `last` (D,).
+        Beside eq. 2 a pose pays, in the default preset, for being unusual and for being far from the last frame's, `last` (D,); and what
+        the observation has beside its silhouette.
         """
         settings, silhouette = self.settings, self.partial.costs(observation, around)
         before = self._places(last[None]) if settings.motion_weight else None
@@ -96,6 +97,8 @@ class FilterStage:
             if before is not None:
                 moved = ((self._places(poses) - before) ** 2).sum(2)
                 costs = costs + settings.motion_weight * self.scale * (moved / (1 + moved / settings.motion_reach**2)).sum(1)
+            if observation.also is not None:
+                costs = costs + observation.also(poses)
             return costs, -(costs**2) / (2 * self.sigma_cost**2)
 
         return weigh

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.anthropometry import SizePrior
-from shadowpuppet.bodies import make_body
+from shadowpuppet.bodies import Make, make_body
 from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
+from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import Mask
@@ -39,8 +40,8 @@ class Guess:
     elevation: float
     """Of the torso's lower edge, or of a whole body's pelvis, over the camera, metres."""
 
-    def picture(self, camera: Camera, body: str = "rounded") -> Picture:
-        """How the camera sees this person."""
+    def picture(self, camera: Camera, body: str | Make = "rounded") -> Picture:
+        """How the camera sees this person: a body by name, or made by a function of the sizes."""
         return Picture(make_body(body, self.sizes), camera, place(camera, self.distance, self.elevation))
 
 
@@ -64,15 +65,18 @@ class Unknowns(NamedTuple):
 class Bodies:
     """Many people at once: joints and shapes of a body are linear in the sizes, so that none need be built for each hypothesis."""
 
-    def __init__(self, name: str) -> None:
-        """`name`: one of `BODIES`."""
+    def __init__(self, body: str | Make) -> None:
+        """`body`: one of `BODIES`, or a function of the 18 sizes. Raises `ShadowPuppetError` for one that is not linear in them."""
         some, step = np.full(len(NAMES), 0.1), 0.01
-        self.make = BODIES[name]
+        self.make = BODIES[body] if isinstance(body, str) else body
         self.body = self.make(CardboxSizes.from_array(some))
         self.slopes: list[Array] = []
         moved = [self._measures(some + step * unit) for unit in np.eye(len(some))]
         for i, array in enumerate(self._measures(some)):
             self.slopes.append(np.array([measures[i] - array for measures in moved]) / step)
+            if not np.allclose(np.tensordot(some, self.slopes[i], 1), array, rtol=0, atol=1e-6):
+                raise ShadowPuppetError(f"body {self.body.name!r}: its offsets and shapes must be sums of multiples of the sizes, without "
+                                        "constants, powers or bounds: all people's are worked out at once")
 
     def _measures(self, sizes: Array) -> tuple[Array, ...]:
         body = self.make(CardboxSizes.from_array(sizes))
@@ -92,7 +96,7 @@ class Hypotheses:
     """Sizes, place and poses of one person in several pictures as one vector, some of which are drawn at a time."""
 
     def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: Guess, prior: SizePrior,
-                 settings: InitializationSettings, body: str) -> None:
+                 settings: InitializationSettings, body: str | Make) -> None:
         """Masks (H, W) of K pictures, and the guess and poses (K, D) to begin with."""
         self.camera, self.masks, self.guess, self.prior = camera, masks, guess, prior
         scale = pixel_scale(camera.size)

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
-from shadowpuppet.bodies import make_body
+from shadowpuppet.bodies import Make, make_body
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.first_pose import beside, search
@@ -51,7 +51,7 @@ class Fit:
 
 
 def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping[str, Mask], *, height: float | None = None,
-                   distance: float | None = None, body: str = "rounded", settings: InitializationSettings | None = None) -> Fit:
+                   distance: float | None = None, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> Fit:
     """Algorithm 1: sizes from masks (H, W) of a person in the known postures `POSTURES`.
 
     Height (m, shoes on) or distance (m) fixes the scale; the average height is taken without either. The person may stand anywhere
@@ -87,16 +87,17 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
 
 
 def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], *, height: float | None = None,
-                distance: float | None = None, sizes: Sizes | None = None, body: str = "rounded",
+                distance: float | None = None, sizes: Sizes | None = None, body: str | Make = "rounded",
                 settings: InitializationSettings | None = None) -> Fit:
     """Place and sizes without references, from masks (H, W) of the first seconds in any posture.
 
     The sizes are the average person's of the height (m, shoes on), or those given; places are tried with coarse poses in the first
-    masks; then sizes, place and poses are fitted together, but for sizes that were given. Raises `TrackingError` where there is
-    nobody in the masks, one is not of the camera's size, or height or distance cannot be.
+    masks; then sizes, place and poses are fitted together, but for sizes that were given. `body`: a name, or a function that makes a
+    body of `CardboxSizes`. Raises `TrackingError` where there is nobody in the masks, one is not of the camera's size, or height or
+    distance cannot be.
     """
     settings = settings or InitializationSettings()
-    if body in WHOLE:
+    if isinstance(body, str) and body in WHOLE:
         return _find_whole(rng, camera, masks, height, distance, sizes, body, settings)
     assert sizes is None or isinstance(sizes, CardboxSizes)
     _check_scale(height, distance)
@@ -134,7 +135,7 @@ def as_whole(camera: Camera, masks: Sequence[Mask], fit: Fit, body: str, sizes: 
 
 
 def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,
-           free_distance: bool = False, body: str = "rounded", settings: InitializationSettings | None = None) -> Fit:
+           free_distance: bool = False, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> Fit:
     """Sizes, place and poses fitted to masks (H, W), in turn, with poses (K, D) to begin with.
 
     What straight arms do not tell apart (shoulder, upper arm, forearm), bent ones do.

@@ -11,30 +11,35 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.geometry import Array
 from shadowpuppet.rasterize import Bits, Picture, count, pack
 
+Cost = Callable[[Array], Array]
+"""Poses (N, D) to costs (N,), the lower the better."""
+
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """A silhouette, and where it says nothing."""
+    """A silhouette, where it says nothing, and what else is known of the moment."""
 
     silhouette: Bits
     ignore: Bits
     """Pixels that do not count, whatever is drawn there. They are set in the silhouette too, so that they never differ."""
+    also: Cost | None = None
+    """A cost of your own, in pixels, which is added to eq. 2 wherever poses are weighed."""
 
     @classmethod
-    def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None) -> Observation:
+    def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:
         """From a mask (H, W), and a mask of the pixels that do not count."""
         silhouette = pack(mask)
         skipped = np.zeros_like(silhouette) if ignore is None else pack(ignore)
-        return cls(silhouette | skipped, skipped)
+        return cls(silhouette | skipped, skipped, also)
 
     @classmethod
-    def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array) -> Observation:
+    def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array, also: Cost | None = None) -> Observation:
         """From a mask (H, W), less what it has where the legs of `pose` (D,) may be: the model ends at the waist.
 
         Empty pixels there still count, so that the waist does not grow over them.
         """
         silhouette = pack(mask)
-        return cls(silhouette, silhouette & picture.leg_bits(pose))
+        return cls(silhouette, silhouette & picture.leg_bits(pose), also)
 
     @property
     def area(self) -> int:
@@ -66,7 +71,7 @@ class PartialCost:
         moves = np.isin(body.shapes.joints, self.joints).any(1)
         self.moving, self.still = np.flatnonzero(moves & drawn), np.flatnonzero(~moves & drawn)
 
-    def costs(self, observation: Observation, around: Array) -> Callable[[Array], Array]:
+    def costs(self, observation: Observation, around: Array) -> Cost:
         """Eq. 2 as a function of whole poses (N, D), all like `around` (D,) but for the DOF that vary: pixels (N,)."""
         fixed = self.picture.draw(around, self.still) | observation.ignore
         base = count(fixed ^ observation.silhouette)

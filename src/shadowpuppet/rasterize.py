@@ -114,12 +114,12 @@ class Picture:
         """Landmarks (N, L, 3), metres, in the camera's frame, of poses (N, D); all, or those named."""
         return self.body.points(poses, self.T_camera_base, names)
 
-    def points_world(self, poses: ArrayLike) -> Array:
-        """Landmarks (N, L, 3), metres, in the world, of poses (N, D), in the order of the body's `landmark_names`."""
-        return self.body.points(poses, inverse(self.camera.T_camera_world) @ self.T_camera_base)
+    def points_world(self, poses: ArrayLike, names: Iterable[str] | None = None) -> Array:
+        """Landmarks (N, L, 3), metres, in the world, of poses (N, D); all, in the order of the body's `landmark_names`, or those named."""
+        return self.body.points(poses, inverse(self.camera.T_camera_world) @ self.T_camera_base, names)
 
     def empty(self) -> Bits:
-        """An empty mask's bits."""
+        """An empty mask's bits (ceil(W / 64), H)."""
         width, height = self.camera.size
         return np.zeros((-(-width // 64), height), np.uint64)
 

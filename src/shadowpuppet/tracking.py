@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet import first_pose, postures
 from shadowpuppet.body import Body
@@ -16,7 +15,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.geometry import Array
 from shadowpuppet.hierarchy import FilterStage
-from shadowpuppet.likelihood import Observation
+from shadowpuppet.likelihood import Cost, Observation
 from shadowpuppet.masks import Mask, check_mask
 from shadowpuppet.members import dofs_of, limbs_of
 from shadowpuppet.motion_prior import MotionPrior
@@ -24,7 +23,7 @@ from shadowpuppet.particle_filter import Particles, Refine, Weigh, diffuse, eval
 from shadowpuppet.proposals import Proposals
 from shadowpuppet.rasterize import Picture, count
 from shadowpuppet.refinement import Pass, Refiner
-from shadowpuppet.resampling import Scheme, make_scheme, normalise
+from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.settings import MonocularSettings, MultiviewSettings
 from shadowpuppet.usual import Usual
 from shadowpuppet.visual_hull import SurfacePoints
@@ -38,10 +37,8 @@ MANY, FEWER, ENOUGH = 40, 16, 6
 """Particles with few cameras, with many, and how many are that."""
 SUDDEN = 0.2
 """An overlap that is less than the last one by this is as good as lost: limbs that are drawn to somebody who is elsewhere may overlap."""
-SETTLED = 10
-"""Cycles on the first frame, after the search."""
 SETTLE = 10
-"""Frames' worth of cycles on the first mask, after the search."""
+"""Frames' worth of cycles on the first frame, after the search."""
 
 
 def _status(overlap: float) -> str:
@@ -73,27 +70,29 @@ class MonocularTracker:
 
     picture: Picture
     settings: MonocularSettings = field(default_factory=MonocularSettings)
+    scheme: Scheme | None = None
+    """A resampling scheme of your own, in place of the settings'."""
 
-    def step(self, rng: np.random.Generator, state: State, mask: NDArray[np.bool_]) -> State:
-        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh.
-
-        Raises `TrackingError` for a mask that has not the camera's size.
-        """
+    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
+        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh (`recover`).
+        `also`: a cost of your own, poses (N, D) to pixels (N,), which is added to eq. 2. Raises `TrackingError` for a mask that has not
+        the camera's size."""
         mask = check_mask(mask, self.picture.camera.size)
         if self.is_absent(mask, state.pose):
             return self.absent(state)
-        if state.status == "absent":
-            return self.start(rng, mask)
-        after = self.cycle(rng, state, mask)
-        if after.status == "lost":
-            found = self.start(rng, mask)
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
+            return self.start(rng, mask, also)
+        after = self.cycle(rng, state, mask, also)
+        if after.status == "lost" and recover:
+            found = self.start(rng, mask, also)
             return found if found.overlap > after.overlap else after
         return after
 
-    def cycle(self, rng: np.random.Generator, state: State, mask: NDArray[np.bool_]) -> State:
-        """Algorithm 2's loop body, `cycles` times: stage by stage resample, diffuse and weigh (Algorithms 3, 4); keep the best."""
+    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
+        """Algorithm 2's loop body on a mask (H, W), `cycles` times: stage by stage resample, diffuse, weigh (Algorithms 3, 4)."""
         pose, particles = state.pose, list(state.particles)
-        observation = self.observe(mask, pose)
+        observation = self.observe(mask, pose, also)
         for cycle in range(self.settings.cycles):
             around = pose  # what a stage does not move, as it was before: the arms do not see each other's news
             for i, stage in enumerate(self.stages):
@@ -104,14 +103,12 @@ class MonocularTracker:
                 around = pose if stage.moves_torso else around
         return self.judge(pose, particles, observation)
 
-    def start(self, rng: np.random.Generator, mask: NDArray[np.bool_]) -> State:
-        """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then some cycles on this mask.
-
-        Where nobody is there the state is `absent`. Raises `TrackingError` for a mask that has not the camera's size.
-        """
+    def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
+        """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` where nobody is
+        there. `also`, and what is raised: as `step`."""
         mask = check_mask(mask, self.picture.camera.size)
         found = first_pose.search(self.picture, mask)
-        observation, particles = self.observe(mask, found.pose), []
+        observation, particles = self.observe(mask, found.pose, also), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
             for limb, tried in found.limbs.items():
@@ -123,19 +120,19 @@ class MonocularTracker:
         if self.is_absent(mask, found.pose):
             return self.absent(state)
         for _ in range(SETTLE):
-            state = self.cycle(rng, state, mask)
+            state = self.cycle(rng, state, mask, also)
         return state
 
-    def observe(self, mask: NDArray[np.bool_], pose: Array) -> Observation:
+    def observe(self, mask: Mask, pose: Array, also: Cost | None = None) -> Observation:
         """A mask (H, W), less the legs as they stand under `pose` (D,)."""
-        return Observation.without_legs(mask, self.picture, pose) if self.settings.ignore_legs else Observation.of(mask)
+        return Observation.without_legs(mask, self.picture, pose, also) if self.settings.ignore_legs else Observation.of(mask, also=also)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
-        """The state with its cost, overlap and status."""
+        """The state of a pose (D,), with its cost, overlap and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
         return State(pose, tuple(particles), cost, overlap, _status(overlap))
 
-    def is_absent(self, mask: NDArray[np.bool_], pose: Array) -> bool:
+    def is_absent(self, mask: Mask, pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
         return int(np.count_nonzero(mask)) < max(ABSENT * count(self.picture.draw(pose)), 1)
 
@@ -149,7 +146,7 @@ class MonocularTracker:
         """The filter's stages, in order; legs that no stage names, of a body that has some, follow."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
-        return tuple(FilterStage(self.picture, self.settings, name) for name in (*named, *legs))
+        return tuple(FilterStage(self.picture, self.settings, name, self.scheme) for name in (*named, *legs))
 
 
 class MultiviewState(NamedTuple):
@@ -180,24 +177,29 @@ class MultiviewTracker:
     """Of poses at the film's rate; None: Gaussian proposals only."""
     library: Array | None = None
     """Poses (L, D) that the person may begin in, such as those of the training motion; None: a few usual ones."""
+    scheme: Scheme | None = None
+    """A resampling scheme of your own, in place of the settings'."""
 
-    def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
-        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes
-        back, is searched for afresh."""
-        evidence = Evidence(self.stage, points, masks)
+    def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
+             also: Cost | None = None) -> MultiviewState:
+        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes back, is searched for
+        afresh (`recover`). `also`: a cost of your own, poses (N, D) to m^2 (N,), which is added to that of the surface."""
+        evidence = Evidence(self.stage, points, masks, also)
         if not self.is_present(evidence):
             return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
-        if state.status == "absent":
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
             return self.search(rng, evidence)
         after = self.cycle(rng, state, evidence)
-        if after.status == "lost" or after.overlap < state.overlap - SUDDEN:
+        if recover and (after.status == "lost" or after.overlap < state.overlap - SUDDEN):
             found = self.search(rng, evidence)
             return found if found.overlap > after.overlap else after
         return after
 
-    def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
-        """A state from one frame: the best of many poses in all directions, refined. `absent` where nobody is there."""
-        evidence = Evidence(self.stage, points, masks)
+    def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
+              also: Cost | None = None) -> MultiviewState:
+        """A state from one frame's points and masks (H, W): the best of many poses in all directions, refined; or `absent`."""
+        evidence = Evidence(self.stage, points, masks, also)
         if not self.is_present(evidence):
             rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
             return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
@@ -208,10 +210,8 @@ class MultiviewTracker:
         s, particles, pose = self.settings, state.particles, state.pose
         weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
         for cycle in range(s.cycles):
-            around, scale = pose, s.cooling**cycle
-            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
-                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale,  # noqa: B023
-                                                                       evidence.differing))
+            propose = partial(self.proposals, last=pose, velocity=state.velocity, unlike=evidence.differing, scale=s.cooling**cycle)
+            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number, propose=propose)
             weights = normalise(particles.log_weights)
             pose = particles.best if s.estimate == "best" else weights @ particles.poses
         return self.judge(pose, pose - state.pose, particles, evidence, weigh)
@@ -221,7 +221,7 @@ class MultiviewTracker:
         weigh = self.weigh(evidence)
         found = postures.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
         state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
-        for _ in range(SETTLED):
+        for _ in range(SETTLE):
             state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)
         return state._replace(velocity=np.zeros_like(state.pose))
 
@@ -235,6 +235,8 @@ class MultiviewTracker:
                 costs = costs + s.silhouettes * evidence.differing(poses)
             if s.posture:
                 costs = costs + s.posture * self.usual.strain(poses)
+            if evidence.also is not None:
+                costs = costs + evidence.also(poses)
             return costs, -costs / s.sigma_cost**2
 
         return weigh
@@ -256,7 +258,7 @@ class MultiviewTracker:
         return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
-        """The state with its cost, overlap and status."""
+        """The state of a pose (D,), with its cost, overlap and status."""
         overlap = evidence.overlap(pose)
         return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, _status(overlap))
 
@@ -295,4 +297,4 @@ class MultiviewTracker:
     @cached_property
     def resample(self) -> Scheme:
         """How particles are selected."""
-        return make_scheme(self.settings.resampling, 0.0)
+        return make_scheme(self.settings.resampling, 0.0) if self.scheme is None else with_best(self.scheme)

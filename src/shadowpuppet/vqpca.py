@@ -71,9 +71,9 @@ def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candida
                    settings: PriorSettings | None = None, *, folds: int = 5, margin: float = 0.05) -> Choice:
     """The least number of regions that reconstructs unseen motion as well as any, but for a share `margin`.
 
-    Each clip is cut into `folds` pieces; each piece in turn is left out and reconstructed from what was learnt without. (The paper takes
-    the number by eye, from the training error, which always falls.) Candidates for which there are too few poses are left out.
-    Raises as `fit_prior` does, where there is none left.
+    Each clip, poses (T, D), is cut into `folds` pieces; each piece in turn is left out and reconstructed from what was learnt without.
+    (The paper takes the number by eye, from the training error, which always falls.) Candidates for which there are too few poses are
+    left out. Raises as `fit_prior` does, where there is none left.
     """
     settings, arrays = settings or PriorSettings(), check_clips(clips)
     if folds < 2:

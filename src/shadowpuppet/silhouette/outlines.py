@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -29,6 +30,9 @@ SHARP = 2
 """Width (pixels) of an outline that only the codec's halved colour resolution blurs; the least that is assumed."""
 WIDEST = 8
 """The most that is assumed."""
+THIN = 0.04
+"""The most over the root of the person's area, half a forearm: what is blurred wider has no limb inside. In small pictures the folds and
+stripes of clothes are as narrow as outlines, and are taken for them."""
 RISEN = 0.88
 """Share of the contrast deep inside at which an outline's blur ends."""
 
@@ -81,7 +85,9 @@ def outline_width(people: Iterable[tuple[Mask, Contrast]]) -> int:
     import cv2
 
     layers: list[list[NDArray[np.floating]]] = [[] for _ in range(WIDEST + 1)]
+    areas = list[int]()
     for mask, contrast in people:
+        areas.append(np.count_nonzero(mask))
         highest = cv2.dilate(contrast * mask, np.ones((2 * WIDEST + 1, 2 * WIDEST + 1), np.uint8))
         # Outside the picture the person goes on, so the picture's border is no outline.
         depth = cv2.distanceTransform(np.pad(mask, WIDEST + 1, mode="edge"), cv2.DIST_L2, 3)
@@ -92,7 +98,8 @@ def outline_width(people: Iterable[tuple[Mask, Contrast]]) -> int:
     if min(map(len, joined)) < 30:
         return SHARP
     heights = np.array([np.median(layer) for layer in joined])
-    return int(np.clip(np.argmax(heights >= RISEN * heights[-1]), SHARP, WIDEST))
+    widest = min(max(SHARP, math.ceil(THIN * np.median(areas) ** 0.5)), WIDEST)
+    return int(np.clip(np.argmax(heights >= RISEN * heights[-1]), SHARP, widest))
 
 
 def disc(radius: int) -> Mask:

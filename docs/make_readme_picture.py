@@ -1,0 +1,188 @@
+"""Make docs/assets/puppet.webp, the moving picture of the README: python docs/make_readme_picture.py [FOLDER]. Takes a minute.
+
+Somebody jogs on the spot before four made cameras: their films, the silhouettes with the skeleton that was found, and the puppet with the
+surface points of the silhouettes' hull, from a camera that goes around it once. With a FOLDER the recording and its run are kept there, and
+taken from there the next time.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from shadowpuppet.bodies import make_body
+from shadowpuppet.body import Body
+from shadowpuppet.camera import Camera
+from shadowpuppet.geometry import Array
+from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.person import read_person
+from shadowpuppet.io.run import read_run
+from shadowpuppet.motion import BONES
+from shadowpuppet.options import make_options
+from shadowpuppet.overlay import draw_model, draw_skeleton, write_text
+from shadowpuppet.pipeline import track_recording
+from shadowpuppet.rasterize import Picture
+from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.video import open_frames
+from shadowpuppet.visual_hull import VisualHull
+
+TARGET, LARGEST = Path(__file__).parent / "assets" / "puppet.webp", 1_000_000
+"""The picture, and its bytes at most."""
+RATE, EVERY, LOOP = 24, 2, (60, 90)
+"""Frames a second of the films, every how many-th is shown, and how many frames the loop may have."""
+TILE, PANEL, GAP, FINER = (132, 180), (300, 364), 4, 2
+"""Pixels of a camera's part and of the puppet's, and between the parts; by how much all is drawn larger at first."""
+MARGIN, QUALITY = 0.08, 60
+"""What is shown around the person, as a share of the part; how good the coded picture is, of 100."""
+GROUND, GRID, DOT, SHADOW = (34, 29, 26), (66, 58, 52), (170, 160, 150), (236, 236, 236)
+"""Blue, green, red of the ground, the floor's lines, surface points and silhouettes. A dark card reads on light pages and on dark ones."""
+CERTAIN = 0.4
+"""Surface points of less weight, as a share of the greatest, are not drawn: few cameras look there."""
+ROUND = Viewpoint(size=(PANEL[0] * FINER, PANEL[1] * FINER), fov_deg=20, distance=5.2, height=1.5, pitch_deg=7)
+"""The camera that goes around the puppet, from where it begins."""
+
+
+class Seen(NamedTuple):
+    """The frames of the loop."""
+
+    cameras: list[Camera]
+    images: list[list[np.ndarray]]
+    """By camera, then by frame."""
+    masks: list[list[np.ndarray]]
+    body: Body
+    poses: Array
+
+
+def made(folder: Path) -> tuple[Path, Path]:
+    """The recording and its run."""
+    spec = Spec(name="jog", body=Mannequin(stature=1.74), motion=(Gesture(motion="jog", seconds=5, path="spot"),), rate=RATE,
+                ring=Ring(count=4, radius=4.6, start_deg=35, jitter=0.4, fov_deg=34, seed=3, size=(480, 360)),
+                scene=Scene(clothing=8, room=3, empty_seconds=1.5, noise=1.0))  # fmt: skip
+    recording, run = folder / "recording", folder / "run"
+    if not recording.exists():
+        synthesize(spec, recording, np.random.default_rng(1))
+    if not run.exists():
+        track_recording(recording, run, make_options({"seed": 1}))
+    return recording, run
+
+
+def looked_at(recording: Path, run: Path) -> Seen:
+    """The frames between the two poses that are most alike."""
+    cameras, motion = list(read_calibration(recording / "calibration.toml")), read_run(run).motion
+    first, length = loop_of(motion.poses)
+    chosen = range(first, first + length, EVERY)
+    images, masks = ([[frame.image for n, frame in enumerate(open_frames(recording / kind / f"{camera.name}{ending}")) if n in chosen]
+                      for camera in cameras] for kind, ending in (("video", ".mp4"), ("masks", ".mkv")))  # fmt: skip
+    body = make_body(motion.body_name, read_person(run / "person.toml", motion.body_name).sizes)
+    return Seen(cameras, images, [[ready_mask(mask) for mask in each] for each in masks], body, motion.poses[list(chosen)])
+
+
+def loop_of(poses: Array) -> tuple[int, int]:
+    """Where a loop begins and how many frames it has: it ends as it begins, in pose and motion."""
+    apart = {(a, n): sum(np.abs(poses[a + k] - poses[a + n + k]).max() for k in (0, 1))
+             for n in range(*LOOP, EVERY) for a in range(RATE, len(poses) - n - 1)}  # fmt: skip
+    return min(apart, key=lambda key: apart[key])
+
+
+def window(masks: list[np.ndarray]) -> Array:
+    """What turns a camera's pixels into those of its part (2, 3): all of the person in all frames, in the middle."""
+    rows, columns = (np.flatnonzero(np.any(masks, axis=0).any(axis)) for axis in (1, 0))
+    wide, high = FINER * TILE[0], FINER * TILE[1]
+    scale = min(wide / np.ptp(columns), high / np.ptp(rows)) / (1 + 2 * MARGIN)
+    middle = np.array([columns[0] + columns[-1], rows[0] + rows[-1]]) / 2
+    return np.column_stack([scale * np.eye(2), np.array([wide, high]) / 2 - scale * middle])
+
+
+def tiles(seen: Seen, n: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What each camera saw in a frame; and the silhouettes, the skeleton in them."""
+    films, shadows, size = [], [], (FINER * TILE[0], FINER * TILE[1])
+    for camera, images, masks in zip(seen.cameras, seen.images, seen.masks):
+        part = window(masks)
+        films.append(cv2.warpAffine(images[n], part, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
+        mask = cv2.warpAffine(masks[n].astype(np.float32), part, size, flags=cv2.INTER_CUBIC)[..., None].clip(0, 1)
+        shadows.append(np.uint8(np.array(GROUND) * (1 - mask) + np.array(SHADOW) * mask))
+        near = replace(camera, size=size, matrix=np.vstack([part, [0, 0, 1]]) @ camera.matrix)
+        draw_skeleton(shadows[-1], Picture(seen.body, near, near.T_camera_world), seen.poses[n])
+    return films, shadows
+
+
+def puppet(seen: Seen, hull: VisualHull, n: int) -> np.ndarray:
+    """The puppet on the floor, with the hull's points, from somewhere around it."""
+    azimuth = (360 * n / len(seen.poses) + 205) % 360 - 180
+    camera, pose = replace(ROUND, azimuth_deg=azimuth).camera(), seen.poses[n]
+    out = np.full((*camera.size[::-1], 3), GROUND, np.uint8)
+    ends = np.linspace(-1, 1, 5)
+    for a, b in [*(((x, -1, 0), (x, 1, 0)) for x in ends), *(((-1, y, 0), (1, y, 0)) for y in ends)]:
+        line(out, camera, a, b, GRID, 2)
+    names, joints = seen.body.landmark_names, seen.body.points(pose[None])[0]
+    dark = np.zeros(out.shape[:2], np.uint8)
+    for a, b in BONES:  # a light high above
+        if a in names and b in names:
+            line(dark, camera, *(joints[names.index(end)] * (1, 1, 0) for end in (a, b)), 255, 14 * FINER)
+    out = np.uint8(out * (1 - 0.55 * cv2.GaussianBlur(dark, (0, 0), 5 * FINER)[..., None] / 255))
+    surface = hull.points([masks[n] for masks in seen.masks])
+    points, near = surface.points, ((camera.centre - surface.points) * surface.normals).sum(1) > 0
+    certain = surface.weights > CERTAIN * surface.weights.max()
+    dots(out, camera, points[certain & ~near])
+    drawn = out.copy()
+    draw_model(drawn, Picture(seen.body, camera, camera.T_camera_world), pose)
+    dots(drawn, camera, points[certain & near])
+    return drawn
+
+
+def line(out: np.ndarray, camera: Camera, a, b, colour, thickness: int) -> None:
+    """Draw a line in space."""
+    start, end = np.rint(camera.project(np.array([a, b], float)) * 16).astype(int).tolist()
+    cv2.line(out, start, end, colour, thickness, cv2.LINE_AA, 4)
+
+
+def dots(out: np.ndarray, camera: Camera, points: Array) -> None:
+    """Draw points in space."""
+    for pixel in np.rint(camera.project(points) * 16).astype(int).tolist():
+        cv2.circle(out, pixel, FINER * 9, DOT, -1, cv2.LINE_AA, 4)
+
+
+def frame(seen: Seen, hull: VisualHull, n: int) -> np.ndarray:
+    """One picture of the film: films, silhouettes, puppet."""
+    films, shadows = tiles(seen, n)
+    parts = [*(beside([stacked(each[:2]), stacked(each[2:])]) for each in (films, shadows)), puppet(seen, hull, n)]
+    for part, what in zip(parts, ("films", "silhouettes", "puppet")):
+        write_text(part, what, part.shape[0] - 24 * FINER, (255, 255, 255), size=300 * FINER)
+    whole = beside(parts)
+    return cv2.resize(whole, (whole.shape[1] // FINER, whole.shape[0] // FINER), interpolation=cv2.INTER_AREA)
+
+
+def beside(images: list[np.ndarray]) -> np.ndarray:
+    """Pictures of one height side by side, a gap between them."""
+    gap = np.full((images[0].shape[0], GAP * FINER, 3), GROUND, np.uint8)
+    return np.concatenate([piece for image in images for piece in (gap, image)][1:], axis=1)
+
+
+def stacked(images: list[np.ndarray]) -> np.ndarray:
+    """Pictures of one width, one below the other, a gap between them."""
+    return beside([image.transpose(1, 0, 2) for image in images]).transpose(1, 0, 2).copy()
+
+
+def main() -> None:
+    """Write the picture."""
+    with tempfile.TemporaryDirectory() as scratch:
+        seen = looked_at(*made(Path(sys.argv[1] if len(sys.argv) > 1 else scratch)))
+    hull, film = VisualHull(seen.cameras), cv2.Animation()
+    film.frames = [frame(seen, hull, n) for n in range(len(seen.poses))]
+    film.durations = [1000 * EVERY // RATE] * len(film.frames)
+    cv2.imwriteanimation(str(TARGET), film, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
+    size, shape = TARGET.stat().st_size, film.frames[0].shape
+    print(f"{TARGET}: {size} bytes, {len(film.frames)} frames of {shape[1]} x {shape[0]}")
+    if size > LARGEST:
+        sys.exit(f"{TARGET}: found {size} bytes, expected at most {LARGEST}")
+
+
+if __name__ == "__main__":
+    main()
