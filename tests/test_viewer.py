@@ -365,6 +365,33 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
         assert show_of(run, recording=Path(recording)).eyes[0].seen is not None
 
 
+def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
+    from shadowpuppet.footage import opened
+    from shadowpuppet.inverse_kinematics import fit_poses
+    from shadowpuppet.io.truth import read_truth
+    from shadowpuppet.motion import MotionBuilder, MotionFrame
+    from shadowpuppet.synthetic import synthesize
+    from shadowpuppet.viewer.of_recording import eyes_of
+    from shadowpuppet.viewer.particles import Rerun
+
+    options = Options()
+    eyes = eyes_of(opened(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
+    found = fit_poses(read_truth(tmp_path / "ring" / "truth.csv"))
+    names = [name for name in found.body.landmark_names if not name.endswith("_fist")]
+    builder = MotionBuilder(found.body.name, found.body.skeleton.dof_names, names)
+    for time, pose, places in zip(found.times, found.poses, found.body.points(found.poses, names=names)):
+        builder.append(MotionFrame(time, "tracked" if time > 0.3 else "lost", pose, places))
+    motion = builder.build()
+    rerun = Rerun(found.body, motion, options, eyes)
+    n = 12
+    cloud = rerun(float(motion.times[n]))
+    assert cloud is not None
+    middle = cloud.lines[np.argmax(cloud.weights)].reshape(-1, 3)
+    off = np.linalg.norm(middle[:, None] - motion.joints[n][None], axis=2).min(1)
+    assert np.median(off) < 0.1
+    assert rerun(float(motion.times[0])) is None  # lost: there is no pose to begin from
+
+
 def test_two_runs_side_by_side_or_over_each_other(tmp_path):
     runs = [show_of(make_run(tmp_path / name, frames=frames, seed=seed)) for name, frames, seed in (("a", 10, 1), ("b", 14, 2))]
     both = beside(*runs, 1.5)
@@ -466,6 +493,56 @@ def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
 
 
 # The page
+
+
+def test_what_is_wished_for_is_drawn(tracked, rig):
+    pytest.importorskip("viser")
+    from shadowpuppet.viewer.nodes import ball
+    from shadowpuppet.viewer.server import close_server, open_server
+    from shadowpuppet.viewer.stage import POINTS, Stage, Wish
+
+    points, faces = ball()
+    corners = points[faces]
+    assert np.linalg.norm(points, axis=1) == pytest.approx(1, abs=1e-6)
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("fx,fx->f", outward, corners.mean(1)) > 0).all()
+    server = open_server(port=0)
+    try:
+        show = show_of(rig)
+        stage = Stage(server, show, Wish(hull=True, pictures=Look.PICTURE))
+        for n in (3, 9):
+            stage.to(float(show.times[n]))
+            drawn = stage._hull.points.astype(float) + show.middle
+            surface = show.hull(float(show.times[n])).points
+            assert len(drawn) == POINTS
+            assert np.linalg.norm(drawn[:100, None] - surface[None], axis=2).min(1).max() < 0.003
+            assert stage.eyes[0].handle.image.shape == (120, 160, 3)
+        near = stage.eyes[1].handle.scale
+        stage.look_through(1)
+        beyond = np.linalg.norm(stage.eyes[1].eye.camera.centre - show.middle)
+        assert stage.eyes[1].handle.scale / stage.eyes[1].volume > beyond
+        stage.look_through(None)
+        assert stage.eyes[1].handle.scale == pytest.approx(near)
+        stage.wish.hull = stage.wish.cameras = False
+        stage.to(0.5)
+        assert (stage._hull.visible, stage.eyes[0].handle.visible) == (False, False)
+        stage.close()
+        server.scene.reset()
+        show = show_of(tracked)
+        stage = Stage(server, show, Wish(cloud=True, spread=True))
+        stage.to(float(show.times[14]))
+        cloud = show.cloud(float(show.times[14]))
+        assert stage._ellipsoids.batched_positions == pytest.approx(cloud.spread.points, abs=1e-5)
+        assert len(stage._cloud.points) <= 150 * cloud.lines.shape[1]
+        assert stage.figures[1].frame.visible
+        stage.wish.figures["truth"] = stage.wish.cloud = stage.wish.spread = False
+        stage.to(float(show.times[14]))
+        assert (stage.figures[1].frame.visible, stage._cloud.visible, stage._ellipsoids.visible) == (False, False, False)
+        stage.to(1e6)  # nobody is there any more
+        assert not stage.figures[0].frame.visible
+        stage.close()
+    finally:
+        close_server(server)
 
 
 def test_a_file_says_what_may_be_fetched_and_its_title():
