@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -144,7 +145,7 @@ STUDIES = (
     Study("rings_cycles", "One cycle or several (annealing), as many particles in all", True, settings({
         str(k): several(particles=24 // k, cycles=k) for k in (1, 2, 3, 4)}), "cycles a frame"),
     Study("rings_refinement", "How poses are refined, and what is counted", True, settings({
-        "default: Gauss-Newton, surface and silhouettes": several(), "surface alone": several(silhouettes=0.0),
+        "default: Gauss-Newton, surface and XOR": several(), "surface alone": several(silhouettes=0.0),
         "simulated forces": several(refinement="forces"), "not at all, 16": several(method="particle_filter"),
         "not at all, 500": several(method="particle_filter", particles=500), "no recovery": several(recover=False)})),
     Study("rings_size", "Size of the pictures", True, settings({str(n): {**several(), "max_size": n} for n in (640, 120, 160, 240, 320)}),
@@ -251,13 +252,13 @@ def draw(results: Mapping[str, Mapping[str, Result]], rings: bool, file: Path) -
             axes.errorbar(x, y, sd, fmt="o-", ms=4, lw=1, capsize=2)
             axes.plot(float(first), means[0], "k*", ms=11)
             if x.max() / x.min() > 8:
-                axes.set_xscale("log")
+                _logarithmic(axes, x)
             axes.set(xlabel=study.axis, ylabel="joint error, mm")
         else:
             axes.barh(list(found)[::-1], means[::-1], xerr=spread[::-1], color=["C0"] * (len(means) - 1) + ["k"], height=0.6, capsize=2)
             axes.set(xlabel="joint error, mm")
             axes.tick_params(axis="y", labelsize=8)
-        axes.set_title(study.title, fontsize=9)
+        axes.set_title(fill(study.title, 46), fontsize=9)
         axes.grid(alpha=0.3)
         axes.set_ylim(bottom=0) if study.axis else axes.set_xlim(left=0)
     axes = panels.flat[len(studies)]
@@ -265,14 +266,22 @@ def draw(results: Mapping[str, Mapping[str, Result]], rings: bool, file: Path) -
         if study.name.removeprefix("rings_") in ("particles", "cycles", "stages", "cameras", "refinement", "size"):
             some = sorted(results[study.name].values(), key=lambda one: one.ms)
             axes.plot([one.ms for one in some], [one.errors.mean() for one in some], "o", ms=4, label=study.name.removeprefix("rings_"))
-    axes.set(xscale="log", xlabel="milliseconds a frame, silhouettes not counted", ylabel="joint error, mm", ylim=(0, None))
-    axes.set_title("Error against time, all rows", fontsize=9)
-    axes.grid(alpha=0.3, which="both")
+    _logarithmic(axes, [1, 2, 5, 10, 20, 50, 100])
+    times = [one.ms for study in studies for one in results[study.name].values()]
+    axes.set(xlabel="ms a frame of tracking", ylabel="joint error, mm", xlim=(0.8 * min(times), 1.25 * max(times)), ylim=(0, None))
+    axes.set_title("Error against time, all rows of some studies", fontsize=9)
+    axes.grid(alpha=0.3)
     axes.legend(fontsize=7)
     for axes in panels.flat[len(studies) + 1 :]:
         axes.axis("off")
     figure.savefig(file, dpi=80)
     plt.close(figure)
+
+
+def _logarithmic(axes: Any, ticks: Sequence[float]) -> None:
+    axes.set_xscale("log")
+    axes.minorticks_off()
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
 
 
 def _spread(one: Result) -> float:
