@@ -20,6 +20,7 @@ from shadowpuppet.flags import (
     Flags,
     LiveFlags,
     LookFlags,
+    OutletFlags,
     SessionFlags,
     SpecFlags,
     given,
@@ -49,6 +50,7 @@ All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
 ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
 ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
+ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
 To = Annotated[Path | None, Parameter(group=CAMERAS, help="Write the calibration there: NAME.toml for Pose2Sim, Anipose and this program, "
@@ -89,24 +91,28 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
 
 @app.command
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
-         quiet: Quiet = False, flags: ForSession = None, settings: ForLive = None) -> None:
+         quiet: Quiet = False, flags: ForSession = None, settings: ForLive = None, outlets: ForOutlets = None) -> None:
     """Track a person before a camera as it happens, shown in a window or on a page for a browser; Ctrl-C ends it.
 
     Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
-    No picture is kept unless --record is given.
+    No picture is kept unless --record is given. Joints go to no other program unless --osc, --websocket or --lsl is.
     """
     from time import strftime
 
     from shadowpuppet.display.choice import open_display
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.settings import LiveSettings
+    from shadowpuppet.outlets.choice import open_outlets
+    from shadowpuppet.outlets.settings import OutletSettings
     from shadowpuppet.settings import validate
     from shadowpuppet.terminal import terminal
 
     options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     with terminal(quiet, folder) as shown:
-        metrics = run_live(folder, options, chosen, shown, open_display(chosen.show, chosen.listen, chosen.port, chosen.record))
+        told = open_outlets(validate(OutletSettings, given(outlets), "flags"))
+        display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
+        metrics = run_live(folder, options, chosen, shown, display, outlets=told)
     if metrics is None:
         print("nobody was tracked: nothing was written", file=sys.stderr)
     elif not quiet:
@@ -256,6 +262,7 @@ app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
 app.command(motion_commands.export)
 app.command(motion_commands.convert)
+app.command(motion_commands.play)
 app.command(batch_commands.batch)
 
 

@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from shadowpuppet.flags import PriorFlags, given, output
+from shadowpuppet.flags import OutletFlags, PriorFlags, given, output
 
+ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
 ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 
 
@@ -129,3 +130,33 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
         shown.begin("converting")
         told = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
     show(pairs([("made", str(target)), ("of", told)]))
+
+
+def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, speed: float = 1.0,
+         loop: Annotated[bool, Parameter(negative=(), show_default=False)] = False,
+         quiet: Annotated[bool, Parameter(negative=(), show_default=False)] = False, outlets: ForOutlets = None) -> None:  # fmt: skip
+    """Give a run's motion to other programs at its own pace, as `live` does while it tracks: to try what receives it. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    speed
+        How many times as fast.
+    loop
+        Begin again at the end, until Ctrl-C.
+    quiet
+        Show nothing but warnings and errors.
+    """
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.outlets.choice import open_outlets
+    from shadowpuppet.outlets.settings import OutletSettings
+    from shadowpuppet.playing import play_run
+    from shadowpuppet.settings import validate
+    from shadowpuppet.terminal import terminal
+
+    if not 0 < speed <= 100:
+        raise SettingsError(f"flags: speed: found {speed}, expected more than 0, up to 100")
+    chosen = validate(OutletSettings, given(outlets), "flags")
+    if chosen == OutletSettings():
+        raise SettingsError("flags: found nobody to give the motion to, expected one of --osc, --websocket and --lsl")
+    with terminal(quiet) as shown:
+        play_run(run, open_outlets(chosen), shown, speed=speed, loop=loop)
