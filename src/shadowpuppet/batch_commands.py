@@ -7,10 +7,9 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
+from shadowpuppet.errors import SOME_FAILED
 from shadowpuppet.flags import OTHER, RUN, BatchFlags, given, output
 
-FAILED = 3
-"""Exit code: some of the runs failed, the others are done."""
 WORK = Group("Work", sort_key=0.5)
 ForBatch = Annotated[BatchFlags | None, Parameter(name="*")]
 
@@ -56,4 +55,4 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
         plot_batch(found.runs, folder / "summary.png")
     if not quiet:
         show(*batch_table(found, table))
-    return FAILED if found.failed else 0
+    return SOME_FAILED if found.failed else 0

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
 from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands
-from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
 from shadowpuppet.flags import (
     CAMERAS,
     OTHER,
@@ -28,9 +29,6 @@ from shadowpuppet.flags import (
     output,
     spec_of,
 )
-
-MISTAKE, INTERRUPTED = 2, 130
-"""Exit codes: what the user gave cannot be used; Ctrl-C."""
 
 
 def _version() -> str:
@@ -226,6 +224,25 @@ def settings(*, preset: str = "default") -> None:
 
 
 @app.command
+def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:
+    """Print a script that lets a shell complete commands, flags and files by the Tab key.
+
+    In ~/.bashrc: eval "$(shadowpuppet completion bash)"; in ~/.zshrc the same with zsh, after compinit; in config.fish:
+    shadowpuppet completion fish | source.
+
+    Parameters
+    ----------
+    shell
+        Which shell: bash, zsh, fish or powershell.
+    """
+    script = app.generate_completion(prog_name="shadowpuppet", shell=shell)
+    made = re.search(r"^(_\w+)\(\)", script, re.MULTILINE)
+    if shell == "zsh" and made is not None:  # by itself it is a file for zsh's own folders, and evaluated it would do nothing
+        script += f"\ncompdef {made[1]} shadowpuppet"
+    print(script)
+
+
+@app.command
 def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool = False, quiet: Quiet = False) -> None:
     """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
@@ -286,13 +303,11 @@ def _show_live(folder: Path, metrics: Mapping[str, Any]) -> None:
     show(measures_table(metrics), pairs([*live_rows(metrics["live"]), ("made", "\n".join(str(folder / name) for name in names))]))
 
 
-def main(tokens: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit: 0, or 2 for a user's mistake, or 130 after Ctrl-C; 3 where some of many runs failed."""
-    sys.exit(run(tokens))
-
-
 def run(tokens: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
+    """Run the command line; returns the exit code: 0, or 2 for a user's mistake; 1 and 3 are a command's own.
+
+    Ctrl-C is told here, and leaves with 130.
+    """
     try:
         code = app(list(tokens) if tokens is not None else None, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
