@@ -35,6 +35,14 @@ def test_control_c_while_the_program_is_loaded_is_no_traceback(name):
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_a_library_that_cannot_be_loaded_is_said_in_a_line():
+    code = "import sys; sys.modules['pydantic'] = None; from shadowpuppet.entry import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: a library cannot be loaded (import of pydantic halted")
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_the_entry_point_and_the_module_begin_there():
     from importlib.metadata import entry_points
 
@@ -116,7 +124,7 @@ def test_help_fits_80_columns(name, capsys, monkeypatch):
 
 
 def test_there_are_no_colours_in_a_pipe_even_where_the_terminal_has_them():
-    environment = {key: value for key, value in os.environ.items() if key != "NO_COLOR"} | {"TERM": "xterm-256color", "COLORTERM": "truecolor"}
+    environment = {key: value for key, value in os.environ.items() if key != "NO_COLOR"} | {"TERM": "xterm-256color"}
     for tokens in (["track", "--help"], ["track", "here", "--overlya"], ["synthesize", "--list"]):
         done = subprocess.run([sys.executable, "-m", "shadowpuppet", *tokens], capture_output=True, text=True, check=False, env=environment)
         assert done.stdout + done.stderr

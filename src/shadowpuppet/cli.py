@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands
+from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, machine_commands, motion_commands
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
 from shadowpuppet.flags import (
     CAMERAS,
@@ -281,6 +281,7 @@ app.command(motion_commands.export)
 app.command(motion_commands.convert)
 app.command(motion_commands.play)
 app.command(batch_commands.batch)
+app.command(machine_commands.doctor)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
