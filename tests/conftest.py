@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+
+from shadowpuppet import cli
 
 
 @pytest.fixture
@@ -21,3 +25,37 @@ def shared() -> Path:
     if not (path / "recordings").is_dir():
         pytest.skip("the shared recordings are not here")
     return path
+
+
+class Said(NamedTuple):
+    """What a command said."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def columns() -> int:
+    """How wide the terminal of `shell` is."""
+    return 80
+
+
+@pytest.fixture
+def home(tmp_path) -> Path:
+    """The folder that `shell` is in."""
+    return tmp_path
+
+
+@pytest.fixture
+def shell(capsys, monkeypatch, home, columns) -> Callable[..., Said]:
+    """Runs a command as it is typed; gives exit code, standard output and standard error."""
+    monkeypatch.chdir(home)
+    monkeypatch.setenv("COLUMNS", str(columns))
+
+    def call(*tokens: object) -> Said:
+        capsys.readouterr()
+        code = cli.run([str(token) for token in tokens])
+        return Said(code, *capsys.readouterr())
+
+    return call

@@ -18,14 +18,13 @@ from pathlib import Path
 import pytest
 
 import made
-from shadowpuppet import cli
 from shadowpuppet.batch import Batch, BatchListener, make_grid, run_batch
 from shadowpuppet.batch import crew as crews
-from shadowpuppet.batch.plan import make_tasks
+from shadowpuppet.batch.plan import make_tasks, named
 from shadowpuppet.batch.run import _claimed
 from shadowpuppet.batch.task import _put, do
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.run import RunWriter, read_run
+from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
 
@@ -123,6 +122,40 @@ def test_what_was_asked_for_is_kept_for_people(two, recording):
     assert plan["recordings"][0] == str(recording)
     assert plan["seeds"] == [0, 1, 2]
     assert [choice["settings"] for choice in plan["choices"]] == [{"tracker.resampling": name} for name in ("deterministic", "stratified")]
+
+
+# Something else that makes the runs
+
+
+def measured(recording, folder, options, listener=None, repeats=None) -> None:
+    """In place of `track_recording`: seed and recording, no film."""
+    if options.seed == 2:
+        raise ShadowPuppetError("no twos")
+    folder.mkdir()
+    write_metrics(folder, {"seed": options.seed, "of": Path(recording).name, "process": os.getpid()})
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_another_function_may_make_the_runs(recording, tmp_path, workers):
+    batch = run_batch([recording], tmp_path / "out", QUICK, range(4), workers=workers, track=measured)
+    assert [run.message for run in batch.runs] == ["", "", "no twos", ""]
+    assert [run.metrics.get("seed") for run in batch.runs] == [0, 1, None, 3]
+    assert batch.runs[0].metrics["of"] == "tiny"
+    assert (batch.runs[0].metrics["process"] == os.getpid()) == (workers == 0)
+    ours = run_batch([recording], tmp_path / "out", QUICK, [0], workers=0)  # another run than that of the other function
+    assert "errors" in ours.runs[0].metrics
+
+
+@pytest.mark.parametrize("track", [lambda *_: None, functools.partial(measured), Notes().note])
+def test_a_function_that_workers_cannot_find_is_refused(recording, tmp_path, track):
+    with pytest.raises(ShadowPuppetError, match="expected a function of a module that workers can import"):
+        run_batch([recording], tmp_path / "out", QUICK, [0], workers=0, track=track)
+
+
+def test_a_function_that_a_worker_does_not_have_is_told():
+    for name in ("no.such:thing", "shadowpuppet.pipeline:no_such"):
+        with pytest.raises(ShadowPuppetError, match=r"cannot be imported .* expected a function of a module that every worker has"):
+            named(name)
 
 
 # Again
@@ -350,17 +383,8 @@ def test_parquet_needs_pyarrow(recording, tmp_path):
 
 
 @pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+def columns() -> int:
+    return 100
 
 
 def test_batch_tells_what_came_of_it(shell, recording, tmp_path, monkeypatch):

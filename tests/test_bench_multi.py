@@ -11,15 +11,15 @@ import made
 from shadowpuppet.bench import multi, naive_multi, ring_film
 from shadowpuppet.bench.ring import Around, RingFollower
 from shadowpuppet.bench.timing import Times, in_turns
+from shadowpuppet.forces import push
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.plots import plot_curves
-from shadowpuppet.refinement import _forces
 from shadowpuppet.settings import ForceSettings, make_multiview_settings
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video import open_frames
 
-compiled = pytest.mark.skipif(not hasattr(_forces, "signatures"), reason="kernels are not compiled")
+compiled = pytest.mark.skipif(not hasattr(push, "signatures"), reason="kernels are not compiled")
 
 
 @pytest.fixture(scope="module")

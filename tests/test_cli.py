@@ -38,21 +38,6 @@ def run(recording, tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    """Runs a command in a folder of its own; gives exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
-
-
 def process(*tokens: object, **more) -> subprocess.Popen:
     command = [sys.executable, "-m", "shadowpuppet", *map(str, tokens)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
@@ -141,6 +126,12 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
         assert word in out
     assert "run-tiny/joints.csv" in out
     assert (tmp_path / "run-tiny" / "joints.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["track", "live", "demo", "fit-person", "synthesize", "bench", "evaluate", "fit-prior", "humaneva",
+                                  "export", "convert", "batch", "play"])
+def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
+    assert "--quiet" in shell(name, "--help")[1]
 
 
 def test_quiet_is_quiet(shell, recording):

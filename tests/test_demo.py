@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import replace
-from typing import NamedTuple
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,24 +26,10 @@ QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.r
          "--initialization.hypotheses", "60"]  # fmt: skip
 
 
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
 @pytest.fixture
-def shell(capsys, monkeypatch, shown):
-    """Runs a command beside the demo's folder."""
-    monkeypatch.chdir(shown.parent)
-    monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*tokens: object) -> Said:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        return Said(code, *capsys.readouterr())
-
-    return call
+def home(shown) -> Path:
+    """Beside the demo's folder."""
+    return shown.parent
 
 
 @pytest.fixture(scope="module")

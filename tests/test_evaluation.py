@@ -11,7 +11,6 @@ import pytest
 
 import biovision
 from measured import NAMES, moved, person, write_run
-from shadowpuppet import cli
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.evaluation import Comparison, evaluate_run, measure_run
 from shadowpuppet.geometry import rotation_from_vector
@@ -38,18 +37,9 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    """Runs `evaluate` in a folder of its own; gives exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run(["evaluate", *map(str, tokens)])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+def shell(shell):
+    """Runs `shadowpuppet evaluate`."""
+    return lambda *tokens: shell("evaluate", *tokens)
 
 
 def refused(shell, *tokens: object) -> str:

@@ -11,7 +11,6 @@ import pytest
 import acclaim
 import biovision
 import runs
-from shadowpuppet import cli
 from shadowpuppet.animation import Y_UP
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.exporting import CONVERSIONS, EXPORTS, export_run
@@ -36,17 +35,8 @@ def whole(tmp_path_factory):
 
 
 @pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def call(*tokens: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([str(token) for token in tokens])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+def columns() -> int:
+    return 100
 
 
 def refused(shell, *tokens: object) -> str:
@@ -211,5 +201,5 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
 
 
 def test_help_names_the_formats(shell):
-    assert "bvh, c3d, csv, glb, mot, npz, parquet, trc" in " ".join(shell("export", "--help")[1].split())
+    assert "bvh, c3d, csv, glb, mot, npz, parquet, trc" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
     assert "--source-unit" in shell("convert", "--help")[1]

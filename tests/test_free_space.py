@@ -10,8 +10,9 @@ import actor
 import made_rig
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.free_space import OTHERS, TAU, Spheres, free_space, push_inside, spheres_in
+from shadowpuppet.part_sums import SUMS
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.refinement import SUMS, Pass, Refiner
+from shadowpuppet.refinement import Pass, Refiner
 
 BENT = (-0.09, 0.05, 0.0, 0.0)
 
@@ -27,7 +28,12 @@ def seen(of, pose, cameras):
 def cost(of, pose, views, weight=1.0, sums=None) -> float:
     T = of.skeleton.forward(pose[None])[0]
     into = np.zeros((len(T), SUMS)) if sums is None else sums
-    return push_inside(T, spheres_in(of.limbs), free_space(views), weight, np.zeros(3), into, sums is not None)
+    return pushed(T, spheres_in(of.limbs), free_space(views), weight, into, sums is not None)
+
+
+def pushed(T, spheres, space, weight, sums, adding) -> float:
+    said = np.empty((len(space.windows), len(spheres.radii), 4))
+    return push_inside(T, spheres, space, said, weight, np.zeros(3), sums, adding)
 
 
 def plain_cost(of, pose, views) -> float:
@@ -70,7 +76,7 @@ def test_the_sums_are_the_cost_s_derivative(rng):
     other = of.skeleton.clamp((pose + rng.normal(0, 0.3, len(pose)))[None])[0]
     T, spheres, space = of.skeleton.forward(other[None])[0], spheres_in(of.limbs), free_space(views)
     sums = np.zeros((len(T), SUMS))
-    push_inside(T, spheres, space, 1.0, np.zeros(3), sums, True)
+    pushed(T, spheres, space, 1.0, sums, True)
     numeric = np.zeros((len(T), 6))
     for joint in range(len(T)):
         for d in range(6):
@@ -80,7 +86,7 @@ def test_the_sums_are_the_cost_s_derivative(rng):
                 twist[d] = sign * 1e-3
                 moved[joint] += np.cross(twist[:3], T[joint], axisb=0, axisc=0)
                 moved[joint, :, 3] += twist[3:]
-                numeric[joint, d] += sign * push_inside(moved, spheres, space, 1.0, np.zeros(3), sums.copy(), False) / 2e-3
+                numeric[joint, d] += sign * pushed(moved, spheres, space, 1.0, sums.copy(), False) / 2e-3
     told = -2 * sums[:, 21:27]
     assert np.linalg.norm(told) > 1e-4
     assert np.linalg.norm(numeric - told) < 0.15 * np.linalg.norm(told)

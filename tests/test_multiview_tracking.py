@@ -230,6 +230,17 @@ def test_who_comes_back_elsewhere_or_jumps_is_found():
         assert errors(of, states[-3:], there).max() < 0.05
 
 
+def test_as_in_the_paper_nobody_is_searched_for_again(monkeypatch):
+    _, seen = actor.filmed()
+    _, later = actor.filmed(begin=2.5, frames=3)
+    of = tracker(recover=False)
+    state, rng = track(of, seen[:3])[-1], np.random.default_rng(0)
+    monkeypatch.setattr(type(of), "search", lambda *_: pytest.fail("searched for"))
+    statuses = [(state := of.step(rng, state, *frame)).status for frame in (*later, nobody(), *later)]
+    assert "tracked" not in statuses
+    assert statuses[3] == "absent"
+
+
 def test_something_that_is_no_person_is_lost():
     """Points of a wall, which fit no body."""
     points, masks = actor.filmed()[1][0]

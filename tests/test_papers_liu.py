@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -102,26 +103,34 @@ def test_the_truth_is_far_from_itself_by_nothing(request_):
 
 
 def test_runs_are_kept_and_made_again_where_anything_changes(request_):
-    case, kept = material.cases(request_)[0], request_.output / "runs"
-    first, before = repeats.repeat(request_, case, case.tracker), set(kept.iterdir())
+    case = material.cases(request_)[0]
+    first, before = repeats.repeat(request_, case, case.tracker), kept(request_)
     again = repeats.repeat(request_, case, case.tracker)
-    assert set(kept.iterdir()) == before
+    assert kept(request_) == before
     assert np.array_equal(first.poses, again.poses)
-    other = repeats.repeat(request_, case, replace(case.tracker, limits=False), runs=1)
+    other = repeats.repeat(request_, case, replace(case.tracker, explore=7), runs=1)
     assert other.poses.shape[0] == 1
     assert not np.array_equal(other.poses[0], first.poses[0])
-    new = (set(kept.iterdir()) - before).pop()
-    new.write_bytes(b"PK spoilt")
-    assert np.array_equal(repeats.repeat(request_, case, replace(case.tracker, limits=False), runs=1).poses, other.poses)
+    (new,) = kept(request_) - before
+    (new / repeats.ESTIMATES).write_bytes(b"PK spoilt")
+    with pytest.raises(ShadowPuppetError, match=r"estimates\.npz: cannot be read; remove its folder"):
+        repeats.repeat(request_, case, replace(case.tracker, explore=7), runs=1)
+    shutil.rmtree(new)
+    assert np.array_equal(repeats.repeat(request_, case, replace(case.tracker, explore=7), runs=1).poses, other.poses)
+
+
+def kept(asked: Request) -> set[Path]:
+    """The runs that are there."""
+    return set((asked.output / "runs").glob("*/runs/[!.]*"))
 
 
 def test_runs_do_not_depend_on_workers(request_, tmp_path):
     case = material.cases(request_)[0]
-    short = replace(case, masks=case.masks[:6], times=case.times[:6])
-    alone, two = (repeats.repeat(replace(request_, runs=6, workers=workers, output=tmp_path / str(workers)), short, case.tracker)
+    alone, two = (repeats.repeat(replace(request_, workers=workers, output=tmp_path / str(workers)), case, case.tracker, every=5)
                   for workers in (1, 2))  # fmt: skip
     assert np.array_equal(alone.poses, two.poses)
-    assert len(np.unique(alone.costs.sum(1))) == 6
+    assert len(alone.times) == alone.poses.shape[1] == -(-len(case.times) // 5)
+    assert len(np.unique(alone.costs.sum(1))) == 4
 
 
 def test_who_is_lost_is_not_searched_for(request_, monkeypatch):
@@ -129,10 +138,9 @@ def test_who_is_lost_is_not_searched_for(request_, monkeypatch):
     case, started = material.cases(request_)[0], []
     start = repeats.MonocularTracker.start
     monkeypatch.setattr(repeats.MonocularTracker, "start", lambda self, rng, mask: (started.append(1), start(self, rng, mask))[1])
-    masks = case.masks.copy()
+    masks = case.masks[:8].copy()
     masks[3:] = np.roll(masks[3:], 60, axis=2)  # far from where the person was
-    path = repeats._write_masks(request_.output / "runs", replace(case, masks=masks[:8]))
-    found = repeats.follow(repeats.Job(path, case.camera, case.guess, case.tracker, (0,), 1))
+    found = repeats.estimates(replace(case, masks=masks), case.tracker, seed=0)
     assert len(started) == 1
     assert found["overlaps"].min() < repeats.LOST
 
@@ -356,7 +364,8 @@ def test_methods_change_only_what_they_name():
     assert (shared.torso.sigma_cost, shared.arm.sigma_cost, shared.resampling) == (4000, 2000, "stratified")
 
 
-def test_a_folder_that_runs_cannot_be_kept_in_is_told(tmp_path):
+def test_a_folder_that_runs_cannot_be_kept_in_is_told(request_, tmp_path):
+    case = material.cases(request_)[0]
     (tmp_path / "runs").write_text("")
     with pytest.raises(ShadowPuppetError, match=r"cannot be written"):
-        repeats._write(tmp_path / "runs" / "a.npz", {"poses": np.zeros(1)})
+        repeats.repeat(replace(request_, output=tmp_path), case, case.tracker, runs=1)

@@ -172,6 +172,20 @@ def test_masks_that_end_early_are_said(recording, tmp_path):
         track_recording(spoilt, tmp_path / "run", Options(masks=True))
 
 
+def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
+    said = []
+
+    class Told(Listener):
+        def begin(self, what: str, total: int | None = None) -> None:
+            said.append((what, total))
+
+    third = track_recording(recording, tmp_path / "run", make_options(QUICK | {"every": 3, "overlay": True}), Told())
+    times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
+    assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
+    assert said[-1] == ("tracking", len(third.motion))
+    assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
+
+
 def test_ready_masks_are_used_only_when_asked_for(recording, tmp_path):
     spoilt = made.copied(recording, tmp_path / "spoilt")
     masks = made.images(recording / "masks" / "cam.mkv")

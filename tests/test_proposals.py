@@ -31,9 +31,9 @@ def prior_of(names, *, at=0.2, wide: float = 1e-3) -> MotionPrior:
     return MotionPrior(line, np.ones((1, 1)), np.ones(1), tuple(names))
 
 
-def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0) -> np.ndarray:
+def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, unlike=lambda poses: np.zeros(len(poses))) -> np.ndarray:
     velocity = np.zeros(D) if velocity is None else velocity
-    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, scale)
+    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, unlike, scale)
 
 
 def many(number: int = 4000) -> np.ndarray:
@@ -81,6 +81,17 @@ def test_a_share_tries_an_arm_in_a_usual_posture():
     off = arms[:, None] - usual
     assert np.median(np.sqrt((off**2).mean(2)).min(1)) < 1.5 * EXPLORED
     assert not (np.abs(drawn(replace(still, method="particle_filter"), many(400)) - POSE) > 1e-3).any()
+
+
+def test_of_the_arms_that_are_tried_the_one_most_like_what_is_seen_is_taken():
+    still = replace(HYBRID, explore=1.0, sigma_rotation=1e-6, sigma_translation=1e-6, sigma_heading=1e-6)
+    elbow = SKELETON.dof_indices(["left_elbow_flexion"])[0]
+
+    def off(**seen) -> float:
+        bent = drawn(still, many(200), **seen)[1:, elbow]
+        return float(np.median(np.abs(bent[np.abs(bent - POSE[elbow]) > 1e-3] - 2.0)))  # in the others it is the right arm
+
+    assert off(unlike=lambda poses: np.abs(poses[:, elbow] - 2.0)) < 0.5 * off()
 
 
 @pytest.mark.parametrize("settings", [PLAIN, HYBRID], ids=["particle_filter", "hybrid"])

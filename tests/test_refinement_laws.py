@@ -20,6 +20,7 @@ from shadowpuppet.bodies import make_body as make_named
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_about
+from shadowpuppet.part_sums import EQUATIONS, gather_down, sweep
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.screws import place_one
 from shadowpuppet.settings import ForceSettings, SurfaceSettings
@@ -49,11 +50,12 @@ def test_normal_equations_are_those_of_the_plain_version(seen):
     D = len(pose)
     H, g = np.zeros((D, D)), np.zeros(D)
     numbers = np.float32(SURFACE.epsilon), np.float32(SURFACE.tau)
-    place_one(pose, of._chain, of._room[1], of._room[2], of._room[3])
+    room = of._room()
+    place_one(pose, of._chain, room[1], room[2], room[3])
     points = made.rows, made.spheres, made.origin
-    refinement._sweep(refinement.EQUATIONS, of._room[1], of._limbs, *points, numbers, of._which(made), of._room)
-    refinement._gather_down(of._chain, of._room[6])
-    refinement._normal_equations(of._chain, of._room[2], made.origin, of._room[6], made.total, H, g)
+    sweep(EQUATIONS, room[1], of._limbs, *points, numbers, of._which(made), room)
+    gather_down(of._chain, room[6])
+    refinement._normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
     plain = naive.normal_equations(body, pose, *cloud, SURFACE)
     np.testing.assert_allclose(H, plain[0], atol=2e-4 * np.abs(plain[0]).max())
     np.testing.assert_allclose(g, plain[1], atol=2e-4 * np.abs(plain[1]).max())

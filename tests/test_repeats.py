@@ -30,7 +30,8 @@ def track(recording, tmp_path):
     return tracked
 
 
-@pytest.mark.parametrize("values", [{}, {"masks": True}, {"region": (30, 0, 140, 120)}], ids=["film", "masks", "region"])
+@pytest.mark.parametrize("values", [{}, {"masks": True}, {"region": (30, 0, 140, 120)}, {"every": 4}],
+                         ids=["film", "masks", "region", "every"])
 def test_runs_are_the_same_with_what_was_kept(track, values):
     repeats = Repeats()
     for seed, kept in ((1, False), (2, True), (1, True)):

@@ -12,7 +12,7 @@ import pytest
 import actor
 import made
 import made_rig
-from shadowpuppet import cli, rig_fitting
+from shadowpuppet import rig_fitting
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
@@ -68,27 +68,16 @@ def errors(run: Run) -> np.ndarray:
     return np.linalg.norm(run.motion.table.select(actor.LIMBS).positions - true, axis=2).mean(1)
 
 
-@pytest.fixture
-def shell(capsys, tmp_path, monkeypatch):
-    """Runs a command in a folder of its own; gives exit code and standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*tokens: object) -> tuple[int, str]:
-        code = cli.run([str(token) for token in tokens])
-        return code, capsys.readouterr().err
-
-    return call
-
-
 def tracked(shell, recording, *tokens) -> Run:
-    code, err = shell("track", recording, "-o", "run", "--quiet", "--masks", "--multiview.particles", 6, "--training.regions", 6, *tokens)
+    few = ("--multiview.particles", 6, "--training.regions", 6)
+    code, _, err = shell("track", recording, "-o", "run", "--quiet", "--masks", *few, *tokens)
     assert code == 0, err
     assert all(line.startswith("warning: camera") for line in err.splitlines()), err
     return read_run(Path("run"))
 
 
 def refused(shell, recording, *tokens) -> str:
-    code, err = shell("track", recording, "-o", "run", "--quiet", "--masks", *tokens)
+    code, _, err = shell("track", recording, "-o", "run", "--quiet", "--masks", *tokens)
     said = [line for line in err.splitlines() if not line.startswith("warning: camera")]
     assert (code, len(said)) == (2, 1), err
     assert said[0].startswith("error: ")

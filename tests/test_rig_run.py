@@ -20,6 +20,7 @@ from shadowpuppet.pipeline import look_at
 from shadowpuppet.rig_overlay import TALLEST, WIDEST, grid_of
 from shadowpuppet.rig_run import Puppet, track_rig
 from shadowpuppet.running import RIG_STAGES, Listener
+from shadowpuppet.video import open_frames
 from shadowpuppet.visual_hull import VisualHull
 
 
@@ -130,6 +131,14 @@ def test_the_same_seed_is_the_same_run(recording, tmp_path):
     joints = [(folder / "joints.csv").read_bytes() for folder in folders]
     assert joints[0] == joints[1]
     assert joints[0] != joints[2]
+
+
+def test_of_so_many_sets_one_is_tracked(recording, tmp_path):
+    whole, third = (track(recording, tmp_path / str(every), make_options({"masks": True, "every": every, "overlay": True}))
+                    for every in (1, 3))  # fmt: skip
+    assert third.motion.times == pytest.approx(whole.motion.times[::3])
+    film = open_frames(third.folder / "overlay.mp4")
+    assert film.rate == pytest.approx(open_frames(whole.folder / "overlay.mp4").rate / 3)
 
 
 def test_a_subset_of_the_cameras_can_be_tracked(recording, tmp_path):

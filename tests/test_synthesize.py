@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import acclaim
-from shadowpuppet import cli
 from shadowpuppet.errors import RecordingError, SettingsError
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import read_recording
@@ -47,18 +46,9 @@ SMALL = Spec(motion=(Gesture(motion="stand", seconds=2),), cameras=(Viewpoint(si
 
 
 @pytest.fixture
-def shell(capsys, monkeypatch, tmp_path):
-    """Runs `shadowpuppet synthesize` in a folder of its own; gives exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*tokens: object, command: str = "synthesize") -> tuple[int, str, str]:
-        capsys.readouterr()
-        code = cli.run([command, *(str(token) for token in tokens)])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+def shell(shell):
+    """Runs `shadowpuppet synthesize`, or another command that is named."""
+    return lambda *tokens, command="synthesize": shell(command, *tokens)
 
 
 def frames(path):

@@ -312,6 +312,17 @@ def test_who_was_lost_is_found_again():
     assert {state.status for state in states[4:]} == {"tracked"}
 
 
+@pytest.mark.parametrize("between", [[block(0.05)], []], ids=["lost", "moved"])
+def test_as_in_the_paper_nobody_is_searched_for_again(between, monkeypatch):
+    masks, back = wave(3)[1], wave(4, y=-0.4)[1]
+    of = tracker(recover=False)
+    state, rng = track(of, masks)[-1], np.random.default_rng(0)
+    monkeypatch.setattr(type(of), "start", lambda *_: pytest.fail("searched for"))
+    for mask in [*between, np.zeros_like(masks[0]), *back]:
+        state = of.step(rng, state, mask)
+    assert state.status == "lost"
+
+
 def test_half_a_person_is_doubted():
     masks = wave(3)[1]
     cut = masks[-1] & (np.arange(120)[:, None] > np.flatnonzero(masks[-1].any(1))[0] + 22)  # from the shoulders down

@@ -25,7 +25,7 @@ def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], worke
     results must be picklable and small; what is large is read from files that the job names. Raises what a task raises, and
     `ShadowPuppetError` where a process is killed.
     """
-    with _shown() as progress:
+    with shown_progress() as progress:
         bar = progress.add_task(what, total=len(jobs))
         if workers <= 1 or len(jobs) <= 1:
             return [_counted(progress, bar, task(job)) for job in jobs]
@@ -57,7 +57,8 @@ def _alone() -> None:
     threadpool_limits(1)
 
 
-def _shown() -> Progress:
+def shown_progress() -> Progress:
+    """A bar of what is done, where there is a terminal."""
     console = Console(stderr=True)
     return Progress(TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeRemainingColumn(), console=console,
                     transient=True, disable=not console.is_terminal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -17,14 +18,15 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import Guess
+from shadowpuppet.io._plain import plain
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import Prepared, check, prepare
 from shadowpuppet.making import make_recording
 from shadowpuppet.metrics import match
 from shadowpuppet.motion import JointTable
-from shadowpuppet.options import Options, make_options
+from shadowpuppet.options import Options, make_options, plain_options
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.settings import MonocularSettings
+from shadowpuppet.settings import MonocularSettings, make_settings
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.motions import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from
@@ -57,6 +59,7 @@ class Part(NamedTuple):
 class Case:
     """A recording with its silhouettes and the person in it, measured."""
 
+    folder: Path
     prepared: Prepared
     options: Options
     times: Array
@@ -116,7 +119,14 @@ def cases(request: Request, made: str = "three_motions", **changes) -> list[Case
 
 def case(request: Request, folder: Path, changes: tuple[tuple[str, str], ...] = ()) -> Case:
     """A recording, looked at once however often it is asked for. Raises a `ShadowPuppetError` where it cannot be used."""
-    return _case(folder, request.more.get("silhouettes", "practical"), request.short, request.seed, changes)
+    values = SILHOUETTES[request.more.get("silhouettes", "practical")] | {"preset": "liu2011", "tracker": dict(changes)}
+    return seen(folder, make_options(values | ({"initialization": QUICK} if request.short else {})))
+
+
+def seen(folder: Path, options: Options) -> Case:
+    """A recording's silhouettes and person, which depend neither on the seed nor on what filter is to be tried."""
+    measuring = replace(options, seed=0, every=1, tracker=make_settings("liu2011", {"body": options.tracker.body}))
+    return replace(_seen(folder, json.dumps(plain(plain_options(measuring), "options"), sort_keys=True)), options=options)
 
 
 def made_recording(request: Request, name: str) -> Path:
@@ -146,17 +156,17 @@ def _is_made(spec: Spec, folder: Path) -> bool:
 
 
 @lru_cache(maxsize=6)
-def _case(folder: Path, silhouettes: str, short: bool, seed: int, changes: tuple[tuple[str, str], ...]) -> Case:
-    values = SILHOUETTES[silhouettes] | {"preset": "liu2011", "seed": seed, "tracker": dict(changes)}
-    options = make_options(values | ({"initialization": QUICK} if short else {}))
+def _seen(folder: Path, told: str) -> Case:
+    """`told`: options as JSON."""
+    options = make_options(json.loads(told))
     with one_blas_thread():
-        prepared = prepare(str(folder), options, np.random.default_rng(seed))
+        prepared = prepare(str(folder), options, np.random.default_rng(options.seed))
         check(prepared)
-        seen = [(shot.time, prepared.silhouettes(shot)) for shot in prepared.footage.shots(options.masks)]
-    times, masks, truth = np.array([time for time, _ in seen]), np.array([mask for _, mask in seen]), prepared.footage.recording.truth
+        shots = [(shot.time, prepared.silhouettes(shot)) for shot in prepared.footage.shots(options.masks)]
+    times, masks, truth = np.array([time for time, _ in shots]), np.array([mask for _, mask in shots]), prepared.footage.recording.truth
     if not masks[0].any():
         raise ShadowPuppetError(f"{folder}: found nobody in the first frame, expected the person there: the paper's filter begins with it")
-    return Case(prepared, options, times, masks, read_joints(truth) if truth is not None else None, _parts(folder, times))
+    return Case(folder, prepared, options, times, masks, read_joints(truth) if truth is not None else None, _parts(folder, times))
 
 
 def _parts(folder: Path, times: Array) -> tuple[Part, ...]:

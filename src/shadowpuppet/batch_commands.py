@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from shadowpuppet.errors import SOME_FAILED
-from shadowpuppet.flags import OTHER, RUN, BatchFlags, given, output
+from shadowpuppet.flags import OTHER, RUN, BatchFlags, Quiet, given, output
 
 WORK = Group("Work", sort_key=0.5)
 ForBatch = Annotated[BatchFlags | None, Parameter(name="*")]
@@ -34,7 +34,7 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
           scheduler: Annotated[str | None, flag(WORK, "Address or file of a Dask scheduler, whose workers do the work.")] = None,
           afresh: Annotated[bool, switch(WORK, "Make silhouettes anew for every run, to measure speed.")] = False,
           table: Annotated[Literal["csv", "parquet"], flag(OTHER, "Format of the summary.")] = "csv",
-          quiet: Annotated[bool, switch(OTHER, "Show nothing but warnings and errors.")] = False,
+          quiet: Quiet = False,
           flags: ForBatch = None) -> int:  # fmt: skip
     """Track many recordings, with many seeds and settings: a run folder each in OUT/runs, and a table of all in OUT/summary.csv.
 

@@ -17,11 +17,13 @@ from shadowpuppet.flags import (
     CAMERAS,
     OTHER,
     RUN,
+    AsJson,
     DemoFlags,
     Flags,
     LiveFlags,
     LookFlags,
     OutletFlags,
+    Quiet,
     SessionFlags,
     SpecFlags,
     given,
@@ -41,8 +43,6 @@ app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppre
           help="Markerless motion capture from silhouettes.")
 Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it, or an earlier "
                                                             "run's run.toml. Flags go before it.")]
-Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]
-AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
 Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
 All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
@@ -161,7 +161,7 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
 
 @app.command(name="fit-person")
 def measure_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
-                   config: Config = None, flags: ForLook = None) -> None:
+                   config: Config = None, quiet: Quiet = False, flags: ForLook = None) -> None:
     """Measure a person once, from reference pictures or the film, or from several cameras' first seconds; `track --person` uses the sizes
     again."""
     from shadowpuppet.fitting import Found
@@ -169,10 +169,12 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
     from shadowpuppet.tables import curves_table, fit_table, measured_table, sizes_table
     from shadowpuppet.terminal import show, terminal
 
-    with terminal() as shown:
+    with terminal(quiet) as shown:
         shown.begin("looking")
         found, look = fit_person(recording, file, options_from(flags, config))
         shown.doubt(look)
+    if quiet:
+        return
     if isinstance(found, Found):
         show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
     elif found.person is not None:
@@ -243,7 +245,8 @@ def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:
 
 
 @app.command
-def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool = False, quiet: Quiet = False) -> None:
+def bench(*, json: Path | None = None, picture: Path | None = None,
+          quick: Annotated[bool, Parameter(negative=(), show_default=False)] = False, quiet: Quiet = False) -> None:
     """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
     Parameters

@@ -29,7 +29,7 @@ GROUPS = {
     **dict.fromkeys(("height", "distance", "body", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
-    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size"), PICTURES),
+    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size", "every"), PICTURES),
 }
 SPEC_GROUPS = {
     **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
@@ -37,6 +37,8 @@ SPEC_GROUPS = {
     **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
     **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
 }
+Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]
+AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
 HIDDEN = Parameter(show=False)
 """Flags of the tables: many, and shown by `shadowpuppet settings`."""
 
@@ -108,13 +110,13 @@ if TYPE_CHECKING:
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
-    LookFlags = flags_of(Options, without=("overlay",))
+    LookFlags = flags_of(Options, without=("every", "overlay"))
     """Those that matter where nothing is tracked."""
     BatchFlags = flags_of(Options, without=("seed",))
     """Those that many runs with seeds of their own may share."""
-    DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "overlay"))
+    DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay"))
     """Those that matter where the recording is known."""
-    SessionFlags = flags_of(Options, without=("camera", "masks", "overlay", "prior", "training", "multiview"))
+    SessionFlags = flags_of(Options, without=("camera", "masks", "every", "overlay", "prior", "training", "multiview"))
     """Those that matter where a camera is tracked as it happens."""
     LiveFlags = flags_of(LiveSettings)
     """What can be set about that beside."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,6 +70,10 @@ class Footage:
                 return
             if time > -ROUNDING:
                 yield Shot(max(time, 0.0), frame.image, None if mask is None else mask.image)
+
+    def tracked(self, ready: bool, every: int) -> Iterator[Shot]:
+        """Of so many of the film's `shots` one, the first on."""
+        return islice(self.shots(ready), 0, None, every)
 
     @property
     def count(self) -> int | None:

@@ -27,8 +27,6 @@ TAU = 0.1
 """How far (m) a sphere may reach out until it costs no longer the square."""
 OTHERS = 3
 """So many others that see somebody at a place outvote a camera that does not: its silhouette may have lost a limb."""
-MOST = 200
-"""Spheres of a body, at most."""
 MARGIN = 24
 """Pixels around the person to which the way back is looked up; farther out it is that to the nearest of these, and theirs."""
 
@@ -57,8 +55,6 @@ class FreeSpace(NamedTuple):
     """Of the cameras, of shape (C, 3, 3)."""
     bends: Array
     """Distortion, padded (8), whether it is a fisheye's, whether there is any, and how far it holds, of shape (C, 11)."""
-    room: Array
-    """What each camera says of each sphere, of shape (C, `MOST`, 4)."""
 
 
 def spheres_in(limbs: Limbs) -> Spheres:
@@ -69,7 +65,7 @@ def spheres_in(limbs: Limbs) -> Spheres:
             joints.append(limbs.joints[s])
             places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
             radii.append(SLIM * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
-    return Spheres(*(np.array(each)[:MOST] for each in (joints, places, radii)))
+    return Spheres(np.array(joints), np.array(places), np.array(radii))
 
 
 def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
@@ -88,7 +84,6 @@ def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
         np.array([camera.T_camera_world[:3] for camera, _ in views], float).reshape(-1, 3, 4),
         np.array([camera.matrix for camera, _ in views], float).reshape(-1, 3, 3),
         np.array(bends, float).reshape(-1, 11),
-        np.empty((len(views), MOST, 4)),
     )
 
 
@@ -122,6 +117,14 @@ def _look_up(fields, window, x, y):  # pragma: no cover
 
 
 @part
+def _placed(T, place):  # pragma: no cover
+    """A point of a joint's frame, in the world."""
+    return (T[0, 0] * place[0] + T[0, 1] * place[1] + T[0, 2] * place[2] + T[0, 3],
+            T[1, 0] * place[0] + T[1, 1] * place[1] + T[1, 2] * place[2] + T[1, 3],
+            T[2, 0] * place[0] + T[2, 1] * place[1] + T[2, 2] * place[2] + T[2, 3])  # fmt: skip
+
+
+@part
 def _ask(T, spheres, space, c, said):  # pragma: no cover
     """What camera c says of the spheres, into said (K, 4): how far (m) a sphere reaches out of the silhouette, and how that grows along the
     camera's axes. Nothing, less than any radius, of spheres that are not in its picture."""
@@ -130,9 +133,7 @@ def _ask(T, spheres, space, c, said):  # pragma: no cover
     for k in range(spheres.radii.size):
         joint, place, own = T[spheres.joints[k]], spheres.places[k], said[k]
         own[0] = -np.inf
-        p0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3]
-        p1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3]
-        p2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3]
+        p0, p1, p2 = _placed(joint, place)
         z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
         if z < NEAR:
             continue
@@ -148,44 +149,43 @@ def _ask(T, spheres, space, c, said):  # pragma: no cover
 
 
 @kernel
-def push_inside(T, spheres, space, weight, origin, sums, adding):  # pragma: no cover
+def push_inside(T, spheres, space, said, weight, origin, sums, adding):  # pragma: no cover
     """What it costs that spheres under transforms T (J, 3, 4) reach out of silhouettes: `weight` times the squared distances (m^2), beyond
-    `TAU` the distances; where `adding`, what that says of the parts' motion is added to sums (J, >= 27) (see `refinement`)."""
+    `TAU` the distances; where `adding`, what that says of the parts' motion is added to sums (J, >= 27) (see `part_sums`). `said`: room
+    (C, K, 4) for what each camera says of each sphere."""
     cameras, number = space.windows.shape[0], spheres.radii.size
     if cameras == 0:
         return 0.0
     total, share = 0.0, weight / (number * cameras)
     for c in range(cameras):
-        _ask(T, spheres, space, c, space.room[c])
+        _ask(T, spheres, space, c, said[c])
     for k in range(number):
         inside = outside = 0
         for c in range(cameras):
-            middle = space.room[c, k, 0] - spheres.radii[k]
+            middle = said[c, k, 0] - spheres.radii[k]
             outside += middle > 0
             inside += -np.inf < middle <= 0
         outvoted = outside == 1 and inside >= OTHERS
         for c in range(cameras):
-            said, V = space.room[c, k], space.views[c]
-            r = said[0]
+            own, V = said[c, k], space.views[c]
+            r = own[0]
             if r <= 0 or (outvoted and r > spheres.radii[k]):
                 continue
             fade = min(1.0, TAU / r)
             total += share * (r * r if fade == 1 else TAU * (2 * r - TAU))
             if adding:
                 joint, place = T[spheres.joints[k]], spheres.places[k]
-                x0 = joint[0, 0] * place[0] + joint[0, 1] * place[1] + joint[0, 2] * place[2] + joint[0, 3] - origin[0]
-                x1 = joint[1, 0] * place[0] + joint[1, 1] * place[1] + joint[1, 2] * place[2] + joint[1, 3] - origin[1]
-                x2 = joint[2, 0] * place[0] + joint[2, 1] * place[1] + joint[2, 2] * place[2] + joint[2, 3] - origin[2]
-                n0 = -(V[0, 0] * said[1] + V[1, 0] * said[2] + V[2, 0] * said[3])
-                n1 = -(V[0, 1] * said[1] + V[1, 1] * said[2] + V[2, 1] * said[3])
-                n2 = -(V[0, 2] * said[1] + V[1, 2] * said[2] + V[2, 2] * said[3])
-                _add(n0, n1, n2, x0, x1, x2, share * fade, r, sums[spheres.joints[k]])
+                p0, p1, p2 = _placed(joint, place)
+                n0 = -(V[0, 0] * own[1] + V[1, 0] * own[2] + V[2, 0] * own[3])
+                n1 = -(V[0, 1] * own[1] + V[1, 1] * own[2] + V[2, 1] * own[3])
+                n2 = -(V[0, 2] * own[1] + V[1, 2] * own[2] + V[2, 2] * own[3])
+                _add(n0, n1, n2, p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, r, sums[spheres.joints[k]])
     return total
 
 
 @part
 def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
-    """Add to a joint's sums that a point x has to go a distance along n, as `refinement` does for surface points."""
+    """Add to a joint's sums that a point x has to go a distance along n, as `part_sums` does for surface points."""
     row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
     at = 0
     for i in range(6):

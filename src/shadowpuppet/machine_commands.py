@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from shadowpuppet.errors import BROKEN
+from shadowpuppet.flags import AsJson
 
 
-def doctor(*, as_json: Annotated[bool, Parameter(name="--json", negative=(), show_default=False, help="Print JSON.")] = False) -> int:
+def doctor(*, as_json: AsJson = False) -> int:
     """Say what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, window, cameras.
 
     Exit code 1: something that tracking needs does not work.

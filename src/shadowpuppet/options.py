@@ -90,6 +90,8 @@ class Options:
     """Region of interest x0,y0,x1,y1, pixels of the film: what is outside counts as background."""
     max_size: Annotated[int, Field(ge=64, le=8192)] = 640
     """Pixels that the longer side of a frame may have; larger frames are scaled down."""
+    every: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Of so many pictures of a film one is tracked: less work for films of many frames/s."""
     overlay: bool = False
     """Write overlay.mp4 too: model, matching result and raw picture, one below the other."""
     tracker: MonocularSettings = MonocularSettings()

@@ -38,6 +38,7 @@ from shadowpuppet.running import (
     generators,
     json_text,
     timings,
+    tracked,
     warn_of_losses,
 )
 from shadowpuppet.threads import one_blas_thread
@@ -138,11 +139,11 @@ def _follow(run: RunWriter, prepared: Prepared, options: Options, listener: List
     picture = check(prepared).fit.guess.picture(prepared.footage.camera, options.tracker.body)
     columns = [picture.body.landmark_names.index(name) for name in joints]
     tracker, state, watch, frames = MonocularTracker(picture, options.tracker), None, Watch(), 0
-    listener.begin("tracking", prepared.look.frames)
+    listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
     try:
-        with _overlay(run.folder, prepared, picture, options.overlay) as overlay:
-            for shot in watch.each("decode", prepared.footage.shots(options.masks)):
+        with _overlay(run.folder, prepared, picture, options) as overlay:
+            for shot in watch.each("decode", prepared.footage.tracked(options.masks, options.every)):
                 with watch.time("segment"):
                     mask = prepared.silhouettes(shot)
                 with watch.time("track"):
@@ -173,12 +174,12 @@ def motion_frame(seconds: float, state: State | None, picture: Picture, columns:
 
 
 @contextlib.contextmanager
-def _overlay(folder: Path, prepared: Prepared, picture: Picture, wanted: bool) -> Iterator[OverlayWriter | None]:
-    if not wanted:
+def _overlay(folder: Path, prepared: Prepared, picture: Picture, options: Options) -> Iterator[OverlayWriter | None]:
+    if not options.overlay:
         yield None
         return
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
-    with OverlayWriter(folder / "overlay.mp4", rate, picture) as film:
+    with OverlayWriter(folder / "overlay.mp4", rate / options.every, picture) as film:
         yield film
 
 

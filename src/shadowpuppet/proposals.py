@@ -43,17 +43,17 @@ class Proposals:
                                         f"{', '.join(skeleton.dof_names)}: it is of another body")
             self.modelled = skeleton.dof_indices(prior.names)
 
-    def __call__(self, rng: np.random.Generator, poses: Array, last: Array, velocity: Array, scale: float = 1.0,
-                 unlike: Callable[[Array], Array] | None = None) -> Array:
+    def __call__(self, rng: np.random.Generator, poses: Array, last: Array, velocity: Array, unlike: Callable[[Array], Array],
+                 scale: float = 1.0) -> Array:
         """Poses (N, D) to new ones: a share by plain dynamics, the others by the prior, where there is one.
 
         The first of the plain ones is `last` (D,) itself, moved on by its `velocity` (D,), of which only place and heading count. `unlike`:
-        how much poses (M, D) differ from the silhouettes (M,), by which arms that are tried are chosen; left out, any arm will do.
+        how much poses (M, D) differ from the silhouettes (M,), by which arms that are tried are chosen.
         """
         plain = round(self.settings.defensive * len(poses)) if self.prior is not None else len(poses)
         out = poses.copy()
         out[:, self.root] += self.settings.velocity * velocity[self.root]
-        out[:plain] = self._diffused(rng, out[:plain], scale, unlike)
+        out[:plain] = self._diffused(rng, out[:plain], unlike, scale)
         if plain:
             out[0] = last
             out[0, self.root] += self.settings.velocity * velocity[self.root]
@@ -63,7 +63,7 @@ class Proposals:
             out[plain:, walk] += scale * self.sigma[walk] * rng.standard_normal((len(poses) - plain, len(walk)))
         return self.skeleton.clamp(out)
 
-    def _diffused(self, rng: np.random.Generator, poses: Array, scale: float, unlike: Callable[[Array], Array] | None) -> Array:
+    def _diffused(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array], scale: float) -> Array:
         """Gaussian noise on all DOF (Table II's particle filter), or, where poses are refined afterwards, on some joints, near and far;
         some poses get another arm."""
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
@@ -77,16 +77,13 @@ class Proposals:
             out[-explored:] = self._other_arms(rng, out[-explored:], unlike)
         return out
 
-    def _other_arms(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array] | None) -> Array:
+    def _other_arms(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array]) -> Array:
         """Poses (N, D) with another arm each: of some near its own and near usual ones, the most like what is seen."""
-        tried = 1 if unlike is None else TRIED
-        out = np.repeat(poses, tried, axis=0)
+        out = np.repeat(poses, TRIED, axis=0)
         for n, pose in enumerate(poses):
             dofs, arms = self.arms[rng.integers(2)]
-            usual = arms[rng.integers(len(arms), size=tried)]
-            about = np.where(rng.random((tried, 1)) < 0.5, pose[dofs], usual) if tried > 1 else usual
-            out[n * tried : (n + 1) * tried, dofs] = about + EXPLORED * rng.standard_normal((tried, len(dofs)))
-        if unlike is None:
-            return out
+            usual = arms[rng.integers(len(arms), size=TRIED)]
+            about = np.where(rng.random((TRIED, 1)) < 0.5, pose[dofs], usual)
+            out[n * TRIED : (n + 1) * TRIED, dofs] = about + EXPLORED * rng.standard_normal((TRIED, len(dofs)))
         out = self.skeleton.clamp(out)
-        return out[np.arange(len(poses)) * tried + unlike(out).reshape(-1, tried).argmin(1)]
+        return out[np.arange(len(poses)) * TRIED + unlike(out).reshape(-1, TRIED).argmin(1)]

@@ -17,7 +17,7 @@ from shadowpuppet.footage import Footage, Mask, Shot, Silhouettes
 from shadowpuppet.look import Prepared, survey, with_person
 from shadowpuppet.options import Options, plain_options
 
-SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "max_size", "silhouette")
+SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "max_size", "every", "silhouette")
 """Options that survey and silhouettes depend on."""
 LIMIT = 256_000_000
 """Bytes of silhouettes that are kept, a bit a pixel: half an hour of 25 frames/s at 320 x 240, a quarter of that at 640 x 480."""
@@ -124,7 +124,7 @@ class _Kept(Footage):
 
     reel: Reel = field(default_factory=Reel)
 
-    def shots(self, ready: bool, strict: bool = True) -> Iterator[Shot]:
+    def tracked(self, ready: bool, every: int) -> Iterator[Shot]:
         return (Shot(time, bits, None) for time, bits in zip(self.reel.times, self.reel.bits))
 
 

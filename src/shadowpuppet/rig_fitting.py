@@ -32,7 +32,7 @@ def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options
         raise SettingsError(f"body: found {options.body!r}, an upper body, for several cameras; expected one of {choices(WHOLE)}, "
                             "or one camera (--camera)")
     hull = VisualHull(rig.cameras, settings.hull)
-    known = familiar(rng, options, training, settings.body, rig.rate)
+    known = familiar(rng, options, training, settings.body, rig.rate / options.every)
     first = [(hull.points(masks), masks) for masks in opening.masks]
     height = options.height or rig.recording.subject.height
     if options.person is not None:

@@ -26,7 +26,7 @@ from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import FrameSet, Rig, follow, open_rig
 from shadowpuppet.rig_look import Opening, PreparedRig, RigLook, check_rig, look_at_rig
 from shadowpuppet.rig_overlay import RigOverlayWriter
-from shadowpuppet.running import RIG_STAGES, Listener, Summary, Watch, evaluated, generators, json_text, timings, warn_of_losses
+from shadowpuppet.running import RIG_STAGES, Listener, Summary, Watch, evaluated, generators, json_text, timings, tracked, warn_of_losses
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
 
 
@@ -130,11 +130,11 @@ def _summary(folder: Path, rig: Rig, look: RigLook) -> Summary:
 def _follow(run: RunWriter, prepared: PreparedRig, puppet: Puppet, options: Options, listener: Listener, rng: np.random.Generator) -> None:
     """Set by set: silhouettes, surface points, pose, files."""
     rig, state, watch, frames = prepared.rig, None, Watch.of(RIG_STAGES), 0
-    listener.begin("tracking", prepared.look.frames)
+    listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
     try:
-        with (_overlay(run.folder, rig, puppet.body, options.overlay) as overlay,
-              contextlib.closing(follow(rig, prepared.silhouettes, ready=options.masks)) as sets,
+        with (_overlay(run.folder, rig, puppet.body, options) as overlay,
+              contextlib.closing(follow(rig, prepared.silhouettes, ready=options.masks, every=options.every)) as sets,
               contextlib.closing(_ahead(sets, puppet.hull)) as hulls):  # fmt: skip
             for seen, points, carving in watch.each("wait", hulls):
                 watch.add("decode", seen.decoding)
@@ -188,10 +188,10 @@ def rig_frame(seen: FrameSet, state: RigState | None, body: Body) -> MotionFrame
 
 
 @contextlib.contextmanager
-def _overlay(folder: Path, rig: Rig, body: Body, wanted: bool) -> Iterator[RigOverlayWriter | None]:
-    if not wanted:
+def _overlay(folder: Path, rig: Rig, body: Body, options: Options) -> Iterator[RigOverlayWriter | None]:
+    if not options.overlay:
         yield None
         return
     pictures = [Picture(body, camera, camera.T_camera_world) for camera in rig.cameras]
-    with RigOverlayWriter(folder / "overlay.mp4", rig.rate, pictures) as film:
+    with RigOverlayWriter(folder / "overlay.mp4", rig.rate / options.every, pictures) as film:
         yield film

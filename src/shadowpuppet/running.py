@@ -104,6 +104,11 @@ def generators(options: Options) -> list[np.random.Generator]:
     return np.random.default_rng(options.seed).spawn(2)
 
 
+def tracked(frames: int | None, every: int) -> int | None:
+    """How many of a film's frames are tracked; None where their number is not known."""
+    return None if frames is None else -(-frames // every)
+
+
 def timings(watch: Watch, frames: int, wall: float) -> dict[str, Any]:
     """Seconds in all, frames/s, and milliseconds a frame by stage, for metrics.json."""
     milliseconds = {stage: round(1000 * seconds / max(frames, 1), 3) for stage, seconds in watch.seconds.items()}

@@ -17,6 +17,8 @@ from shadowpuppet.skeleton import AXES, Skeleton
 
 TRANSLATION, ROTATION, VECTOR = 0, 1, 2
 KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
+STEP = 0.5
+"""No DOF moves farther than this (rad or m) in one iteration of a refinement."""
 SMALL = 1e-4
 """Rotation vectors shorter than this (rad) are turned by their series."""
 

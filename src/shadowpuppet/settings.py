@@ -102,6 +102,8 @@ class MonocularSettings:
     """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.strain`)."""
     limits: bool = True
     """Whether joint limits are kept."""
+    recover: bool = True
+    """Search afresh for who was lost, or comes back. The papers' filters go on from where they are."""
     ignore_legs: bool = True
     """Leave out of the cost what is seen below the waist, where the model has no legs; of no use for a whole body."""
 
@@ -327,6 +329,8 @@ class MultiviewSettings:
     """See `cycles`."""
     estimate: Literal["best", "mean"] = "best"
     """The particle of greatest weight, or the weighted mean."""
+    recover: bool = True
+    """Search afresh for who was lost, jumps, or comes back. The paper's filter goes on from where it is."""
     surface: SurfaceSettings = SurfaceSettings()
     """How poses are weighed by surface points."""
     gauss_newton: GaussNewtonSettings = GaussNewtonSettings()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -75,17 +75,19 @@ class MonocularTracker:
     settings: MonocularSettings = field(default_factory=MonocularSettings)
 
     def step(self, rng: np.random.Generator, state: State, mask: NDArray[np.bool_]) -> State:
-        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh.
+        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh
+        (`recover`).
 
         Raises `TrackingError` for a mask that has not the camera's size.
         """
         mask = check_mask(mask, self.picture.camera.size)
         if self.is_absent(mask, state.pose):
             return self.absent(state)
-        if state.status == "absent":
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
             return self.start(rng, mask)
         after = self.cycle(rng, state, mask)
-        if after.status == "lost":
+        if after.status == "lost" and recover:
             found = self.start(rng, mask)
             return found if found.overlap > after.overlap else after
         return after
@@ -183,14 +185,15 @@ class MultiviewTracker:
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
         """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes
-        back, is searched for afresh."""
+        back, is searched for afresh (`recover`)."""
         evidence = Evidence(self.stage, points, masks)
         if not self.is_present(evidence):
             return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
-        if state.status == "absent":
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
             return self.search(rng, evidence)
         after = self.cycle(rng, state, evidence)
-        if after.status == "lost" or after.overlap < state.overlap - SUDDEN:
+        if recover and (after.status == "lost" or after.overlap < state.overlap - SUDDEN):
             found = self.search(rng, evidence)
             return found if found.overlap > after.overlap else after
         return after
@@ -208,10 +211,8 @@ class MultiviewTracker:
         s, particles, pose = self.settings, state.particles, state.pose
         weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
         for cycle in range(s.cycles):
-            around, scale = pose, s.cooling**cycle
-            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number,
-                             propose=lambda rng, poses: self.proposals(rng, poses, around, state.velocity, scale,  # noqa: B023
-                                                                       evidence.differing))
+            propose = partial(self.proposals, last=pose, velocity=state.velocity, unlike=evidence.differing, scale=s.cooling**cycle)
+            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number, propose=propose)
             weights = normalise(particles.log_weights)
             pose = particles.best if s.estimate == "best" else weights @ particles.poses
         return self.judge(pose, pose - state.pose, particles, evidence, weigh)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,10 @@ from shadowpuppet.io.calibration import read_toml
 from shadowpuppet.options import PATHS, make_options, plain_options
 from shadowpuppet.repeats import film_of
 
+Track = Callable[..., Any]
+"""Makes a run folder, as `pipeline.track_recording` does: of a recording, a folder, `Options`, a `Listener` or none, `Repeats` or none."""
+TRACK = "shadowpuppet.pipeline:track_recording"
+"""What makes a run unless something else is to."""
 PARTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
 """What of a recording's folder a run depends on; other files may come and go."""
 ENDS = 65536
@@ -48,14 +53,17 @@ class Task:
     """In words: recording, case, values of the grid, seed."""
     folder: str
     """Name of the run's folder: the label, and the id, so that it is one of its own."""
+    track: str
+    """What makes the run, `module:function`."""
 
     def wire(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
 
 
-def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: Sequence[int]) -> list[Task]:
-    """A task for each recording, case and seed, in this order. Raises `SettingsError` where two would be the same run."""
+def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: Sequence[int], track: Track | None = None) -> list[Task]:
+    """A task for each recording, case and seed, in this order. Raises `SettingsError` where two would be the same run, or where workers
+    could not find `track` by its name."""
     if not recordings:
         raise SettingsError("recordings: found none, expected one or more")
     if len(recordings) * len(cases) * len(seeds) > MOST:
@@ -67,22 +75,43 @@ def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: S
             raise SettingsError(f"recordings: found {recordings[n]} twice, expected each once")
     names = _names(paths)
     varied = sorted({name for case in cases for name in case.varied})
-    chosen = [_Chosen(case, varied) for case in cases]
+    chosen = [_Chosen(case, varied, name_of(track)) for case in cases]
     _check_different(chosen)
     prints = [fingerprint(path) for path in paths]
     return [choice.task(str(path), name, print_, seed) for path, name, print_ in zip(paths, names, prints) for choice in chosen
             for seed in seeds]  # fmt: skip
 
 
+def name_of(track: Track | None) -> str:
+    """The `module:function` by which workers find a function; None: `TRACK`. Raises `SettingsError` where they could not."""
+    if track is None:
+        return TRACK
+    module, name = getattr(track, "__module__", "__main__"), getattr(track, "__qualname__", "")
+    if module == "__main__" or not name.isidentifier():
+        raise SettingsError(f"track: found {name or track!r} of {module}, expected a function of a module that workers can import")
+    return f"{module}:{name}"
+
+
+def named(name: str) -> Track:
+    """The function of a name (`name_of`). Raises `SettingsError` where there is none."""
+    module, _, function = name.partition(":")
+    try:
+        return getattr(import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise SettingsError(f"track: found {name!r}, which cannot be imported ({error}); expected a function of a module that every worker "
+                            "has") from None
+
+
 class _Chosen:
     """A case's settings, complete."""
 
-    def __init__(self, case: Case, varied: Sequence[str]) -> None:
-        self.case = case
+    def __init__(self, case: Case, varied: Sequence[str], track: str) -> None:
+        self.case, self.track = case, track
         self.settings = plain(plain_options(make_options(case.values)), "settings")
         self.varied = {name: _found(self.settings, name) for name in varied}
         files = {name: fingerprint(Path(self.settings[name])) for name in PATHS if name in self.settings}
-        self.said = {key: value for key, value in (self.settings | files).items() if key != "seed"}
+        other = {} if track == TRACK else {"track": track}
+        self.said = {key: value for key, value in (self.settings | files | other).items() if key != "seed"}
 
     def task(self, recording: str, name: str, content: str, seed: int) -> Task:
         said = json.dumps([name, content, self.said, seed], sort_keys=True)
@@ -90,7 +119,7 @@ class _Chosen:
         label, id = ", ".join(filter(None, [name, self.case.label, f"seed {seed}"])), _hash(said)
         words = re.sub(r"[^A-Za-z0-9.+_-]+", "-", label.replace(", ", "_")).strip("-.")
         return Task(id, recording, name, self.case.name, seed, self.settings | {"seed": seed}, self.varied, _hash(film), self.case.label,
-                    label, f"{words[:80]}_{id}")
+                    label, f"{words[:80]}_{id}", self.track)
 
 
 def _check_different(chosen: Sequence[_Chosen]) -> None:

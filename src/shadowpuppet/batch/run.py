@@ -13,7 +13,7 @@ from typing import Any
 
 from shadowpuppet.batch.crew import Alone, BatchListener, Crew, Outcome, Processes
 from shadowpuppet.batch.grid import PLAIN, Case, Grid
-from shadowpuppet.batch.plan import Task, make_tasks
+from shadowpuppet.batch.plan import Task, Track, make_tasks
 from shadowpuppet.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
 from shadowpuppet.batch.task import PART, PLAN, RUNS
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, shown
@@ -48,13 +48,14 @@ class Batch:
 
 def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | None = None, seeds: Sequence[int] | None = None, *,
               workers: int | None = None, retries: int = 1, threads: int = 1, scheduler: str | None = None, reuse: bool = True,
-              table: str = "csv", listener: BatchListener | None = None) -> Batch:
+              table: str = "csv", listener: BatchListener | None = None, track: Track | None = None) -> Batch:
     """Track recordings with all settings of a grid (`make_grid`, `read_grid`) and all seeds; a run folder each in `out`/runs.
 
     `seeds` holds over those of the grid; with neither there is one, 0. `workers`: processes, if left out one a core; 0 for none but
     this. `threads`: that each may use. `retries`: how often a run is tried again that failed of its machine: a worker that was killed, a
     full disk; what cannot be used is not. `scheduler`: address of a Dask cluster, whose workers do it. `reuse`: runs of the same film
     take the survey and silhouettes of the one before, with the same result; leave it out to measure speed. `table`: csv or parquet.
+    `track`: what makes a run folder, in place of `track_recording` and called as that is: a function of a module that the workers have too.
 
     Runs that `out` has already are not done again: those of the same recording, settings and seed. A run that fails does not stop the
     others. Raises a `ShadowPuppetError` where nothing can be begun; `KeyboardInterrupt` goes on after the summary was written.
@@ -66,7 +67,7 @@ def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | No
             raise SettingsError(f"{name}: found {shown(number)}, expected {least} to 1000")
     grid = grid or Grid((Case(PLAIN, {}, {}),))
     chosen = tuple(seeds) if seeds is not None else grid.seeds or (0,)
-    tasks = make_tasks(recordings, grid.cases, chosen)
+    tasks = make_tasks(recordings, grid.cases, chosen, track)
     with _claimed(out):
         count = workers if workers is not None else usable_cores()
         work = _Work(out, tasks, listener, retries)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from shadowpuppet.batch.task import RUNS, read_mark
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io._files import read_text, write_whole
 from shadowpuppet.io._table import csv_line
+from shadowpuppet.io.parquet import write_lists
 
 TABLES = ("csv", "parquet")
 """Formats of the summary."""
@@ -67,7 +67,7 @@ def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
     rows = [run.row() for run in runs]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     if path.suffix == ".parquet":
-        return _write_parquet(rows, columns, path)
+        return write_lists(path, {name: _column(rows, name) for name in columns})
     lines = [csv_line(columns), *(csv_line(_cell(row.get(name)) for name in columns) for row in rows)]
     write_whole(path, "".join(lines))
 
@@ -80,19 +80,13 @@ def check_table(table: str) -> None:
         raise ShadowPuppetError("table: parquet needs pyarrow, which is not installed; pip install 'shadowpuppet[formats]', or take csv")
 
 
-def _write_parquet(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path: Path) -> None:
-    import pyarrow
-    import pyarrow.parquet
-
-    def column(name: str) -> list[Any]:
-        values = [row.get(name) for row in rows]
-        kinds = {type(value) for value in values if value is not None}
-        return values if len(kinds) < 2 else [None if v is None else float(v) for v in values] if kinds <= {int, float} else [
-            None if v is None else _cell(v) for v in values]  # fmt: skip
-
-    out = io.BytesIO()
-    pyarrow.parquet.write_table(pyarrow.table({name: column(name) for name in columns}), out)
-    write_whole(path, out.getvalue())
+def _column(rows: Sequence[Mapping[str, Any]], name: str) -> list[Any]:
+    """A column of one kind of values: numbers of two kinds as the wider, else text."""
+    values = [row.get(name) for row in rows]
+    kinds = {type(value) for value in values if value is not None}
+    if len(kinds) < 2:
+        return values
+    return [None if value is None else float(value) if kinds <= {int, float} else _cell(value) for value in values]
 
 
 def _cell(value: Any) -> str:

@@ -15,11 +15,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from shadowpuppet.batch.plan import named
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io._files import read_text, write_whole
 from shadowpuppet.io.run import versions
 from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import track_recording
 from shadowpuppet.repeats import Repeats
 from shadowpuppet.running import Listener
 
@@ -58,7 +58,7 @@ def _run(task: Mapping[str, Any], out: Path, repeats: Repeats | None, listener: 
     try:
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", ShadowPuppetWarning)
-            track_recording(task["recording"], part, make_options(task["settings"]), listener, repeats)
+            named(task["track"])(task["recording"], part, make_options(task["settings"]), listener, repeats)
         mark = {key: task[key] for key in ("id", "recording", "name", "case", "seed")}
         mark |= {"seconds": round(time.perf_counter() - began, 3), "version": versions().get("shadowpuppet"),
                  "warnings": list(dict.fromkeys(" ".join(str(w.message).split()) for w in said))}

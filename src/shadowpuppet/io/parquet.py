@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +23,13 @@ TOLD = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up;
 
 def write_parquet(path: str | Path, columns: Columns) -> None:
     """Write columns; null where not a number. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
+    write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
+
+
+def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
+    """Write columns of plain values, each of one kind or None; raises as `write_parquet`."""
     arrow, parquet = _arrow(path)
-    values = {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()}
-    arrays = {name: arrow.array(column, from_pandas=True) for name, column in values.items()}
+    arrays = {name: arrow.array(column, from_pandas=True) for name, column in columns.items()}
     out = io.BytesIO()
     parquet.write_table(arrow.table(arrays).replace_schema_metadata(TOLD), out)
     write_whole(Path(path), out.getvalue())
