@@ -304,21 +304,20 @@ def test_a_name_that_another_site_turned_to_this_machine_is_refused():
 def test_whoever_is_slow_gets_the_newest_frame_and_holds_nobody_up():
     who, number = subject("anatomical"), 1500
     told = posed(who)
-    with served() as (outlet, url), raw_listener(outlet.port) as slow, connect(url, close_timeout=0.1) as quick:
+    with served() as (outlet, url), raw_listener(outlet.port) as slow, connect(url) as quick:
         outlet.begin(who)
         seen = []
-        reader = threading.Thread(target=lambda: seen.extend(json.loads(quick.recv(5)).get("time") for _ in range(40)), daemon=True)
+        reader = threading.Thread(target=lambda: seen.extend(json.loads(text).get("time") for text in quick), daemon=True)
         reader.start()
         for n in range(1, number + 1):
             outlet.send(told._replace(time=float(n)))
             time.sleep(0.0005)
-        reader.join(5)
-        assert len(seen) == 40
         received = drained(slow, lambda text: f'"time":{number}.0' in text)
         times = [float(found) for found in re.findall(r'"type":"frame","time":([0-9.]+)', received)]
         assert times[-1] == number  # the newest came, and at once after what had been on its way
         assert times == sorted(times)
         assert len(times) < number / 2
+        assert len(seen) > 40
 
 
 def test_whoever_hangs_does_not_hold_up_the_end():

@@ -45,7 +45,8 @@ class Terminal(LiveListener):
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._task = self._progress.add_task(what, total=total, done="")
-        self._progress.start()
+        if not self._progress.disable:
+            self._progress.start()
 
     def advance(self, frames: int) -> None:
         """Show how many frames are done, and how fast."""
@@ -59,7 +60,7 @@ class Terminal(LiveListener):
     def look(self, look: Look | RigLook) -> None:
         """Show what was found, and what is in doubt."""
         if not self.quiet:
-            self._progress.stop()
+            self.stop()
             show(rig_look_table(look) if isinstance(look, RigLook) else look_table(look))
         self.doubt(look)
 
@@ -90,7 +91,8 @@ class Terminal(LiveListener):
 
     def stop(self) -> None:
         """Take the bar away."""
-        self._progress.stop()
+        if not self._progress.disable:  # rich 14.0 ends with an empty line even then
+            self._progress.stop()
 
     def _show_warning(self, message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None,
                       line: str | None = None) -> None:
