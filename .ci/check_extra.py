@@ -27,7 +27,7 @@ def report(folder: Path) -> None:
     """A plot is drawn."""
     from shadowpuppet.plots import AXES, COLOURS, plot_curves
 
-    plot_curves({axis: {"values": [1, 2]} | dict.fromkeys(COLOURS, [3.0, 4.0]) for axis in AXES}, folder / "curves.png")
+    plot_curves({axis: {"values": [1, 2]} | {body: [3.0, 4.0] for body in COLOURS} for axis in AXES}, folder / "curves.png")
     assert (folder / "curves.png").stat().st_size > 1000
 
 
