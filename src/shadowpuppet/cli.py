@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, machine_commands, motion_commands
+from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, machine_commands, motion_commands, viewer_commands
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
 from shadowpuppet.flags import (
     CAMERAS,
@@ -109,7 +109,12 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     with terminal(quiet, folder) as shown:
         told = open_outlets(validate(OutletSettings, given(outlets), "flags"))
-        display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
+        if chosen.show == "viewer":
+            from shadowpuppet.viewer.live import open_viewer
+
+            display = open_viewer(chosen.listen, chosen.port, chosen.record)
+        else:
+            display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
         metrics = run_live(folder, options, chosen, shown, display, outlets=told)
     if metrics is None:
         print("nobody was tracked: nothing was written", file=sys.stderr)
@@ -285,6 +290,7 @@ app.command(motion_commands.convert)
 app.command(motion_commands.play)
 app.command(batch_commands.batch)
 app.command(machine_commands.doctor)
+app.command(viewer_commands.view)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:

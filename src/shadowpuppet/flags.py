@@ -106,12 +106,14 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = OutletFlags = PriorFlags = SpecFlags = Any
+    Flags = LookFlags = ViewFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = OutletFlags = PriorFlags = SpecFlags = Any
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
     LookFlags = flags_of(Options, without=("every", "overlay"))
     """Those that matter where nothing is tracked."""
+    ViewFlags = flags_of(Options, without=("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay"))
+    """Those that matter where a recording is looked at."""
     BatchFlags = flags_of(Options, without=("seed",))
     """Those that many runs with seeds of their own may share."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay"))

@@ -35,10 +35,10 @@ STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).
 
 def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
     """A film's frames; its first one is decoded to learn the size. Raises `VideoError`."""
-    with _opened(path) as (container, stream):
+    with opened(path) as (container, stream):
         try:
-            first = next(_decoded(container, stream), None)
-        except _Break:
+            first = next(decoded(container, stream), None)
+        except Break:
             first = None
         if first is None:
             raise VideoError(f"{path}: no frame of it can be decoded ({stream.codec_context.name})")
@@ -60,17 +60,17 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
 
 def tells_times(path: Path) -> bool:
     """Whether a film's first frames have times. Raises `VideoError`."""
-    with _opened(path) as (container, stream), contextlib.suppress(_Break):
-        frames = _decoded(container, stream)
+    with opened(path) as (container, stream), contextlib.suppress(Break):
+        frames = decoded(container, stream)
         return all(frame.pts is not None or frame.dts is not None for frame, _ in zip(frames, range(3)))
     return True  # a damaged one, which is said elsewhere
 
 
 def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None) -> Iterator[Frame]:
     clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
-    with _opened(path) as (container, stream):
+    with opened(path) as (container, stream):
         try:
-            for frame in _decoded(container, stream):
+            for frame in decoded(container, stream):
                 before, time, image = clock.last, clock(frame), convert(frame)
                 shown = n / rate if rate else time
                 check_size(path, n, shown, image, film.size)
@@ -78,7 +78,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                     _say(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
                 yield Frame(shown, image)
                 longest, n = max(longest, time - before), n + 1
-        except _Break as cause:
+        except Break as cause:
             broken = str(cause)
     if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # not where there is no duration
         broken = f"the file ends, {film.duration:.3f} s were announced"
@@ -106,12 +106,13 @@ def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
 # Decoding
 
 
-class _Break(Exception):
+class Break(Exception):
     """A film cannot be decoded beyond this point."""
 
 
 @contextlib.contextmanager
-def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
+def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
+    """A film's container and its pictures. Raises `VideoError`."""
     import av
     import av.error
 
@@ -130,8 +131,8 @@ def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
         yield container, streams[0]
 
 
-def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
-    """Frames in order of presentation; raises `_Break` after the last whole one where the film is damaged."""
+def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
+    """Frames in order of presentation; raises `Break` after the last whole one where the film is damaged."""
     import av.error
 
     packets, broken, last = container.demux(stream), "", None
@@ -147,10 +148,10 @@ def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFr
             frames, broken = _held(stream, last), reason(error)
         for frame in frames:
             if frame.is_corrupt:
-                raise _Break("a damaged picture")
+                raise Break("a damaged picture")
             yield frame
             last = frame
-    raise _Break(broken)
+    raise Break(broken)
 
 
 def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:

@@ -68,14 +68,9 @@ def open_picture(path: Path, grey: bool) -> FrameSource:
 
 def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
     """A folder's pictures in natural order. Raises `VideoError`."""
-    paths = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES and p.name[0] != "."), key=_natural)
-    if not paths:
-        raise VideoError(f"{folder}: no pictures in this folder (endings looked for: {choices(IMAGE_SUFFIXES)})")
+    paths, times, assumed = in_folder(folder, rate)
     size, n = size_of(read_image(paths[0], grey)), len(paths)
-    stamps = None if rate else next((p for p in (folder / "timestamps.txt", folder / "timestamps.csv") if p.exists()), None)
-    times = np.arange(n) / (rate or ASSUMED_RATE) if stamps is None else _read_times(stamps, n)
     mean_rate = float((n - 1) / times[-1]) if n > 1 else math.nan
-    assumed = stamps is None and rate is None and n > 1
 
     def read() -> Iterator[Frame]:
         if assumed:
@@ -87,6 +82,17 @@ def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
             yield Frame(time, image)
 
     return FrameSource(str(folder), size, mean_rate, n, n / mean_rate, read)
+
+
+def in_folder(folder: Path, rate: float | None = None) -> tuple[list[Path], NDArray[np.float64], bool]:
+    """A folder's pictures in natural order, their times (s), and whether these are assumed. Raises `VideoError`."""
+    paths = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES and p.name[0] != "."), key=_natural)
+    if not paths:
+        raise VideoError(f"{folder}: no pictures in this folder (endings looked for: {choices(IMAGE_SUFFIXES)})")
+    n = len(paths)
+    stamps = None if rate else next((p for p in (folder / "timestamps.txt", folder / "timestamps.csv") if p.exists()), None)
+    times = np.arange(n) / (rate or ASSUMED_RATE) if stamps is None else _read_times(stamps, n)
+    return paths, times, stamps is None and rate is None and n > 1
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

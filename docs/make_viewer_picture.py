@@ -1,0 +1,111 @@
+"""Make docs/assets/viewer*.png, the page of `view`: python docs/make_viewer_picture.py [DEMO]. Needs Chromium, Playwright, and minutes.
+
+DEMO is a folder that `shadowpuppet demo` made; without one it is made anew.
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from PIL import Image
+from playwright.sync_api import Browser, sync_playwright
+
+from shadowpuppet.options import Options
+from shadowpuppet.viewer.looking import first_wish
+from shadowpuppet.viewer.opening import show_of
+from shadowpuppet.viewer.panel import Panel
+from shadowpuppet.viewer.pictures import Look
+from shadowpuppet.viewer.server import address_of, close_server, open_server
+from shadowpuppet.viewer.show import Show
+from shadowpuppet.viewer.stage import Stage, Wish
+
+ASSETS = Path(__file__).parent / "assets"
+SIZE, COLOURS, LARGEST = (1280, 760), (255, 160, 96, 64), 150_000
+"""Pixels; and how many colours a picture has, the first number with which its file is small enough, bytes."""
+FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage")
+SETTLED = 6000
+"""Milliseconds after which all is drawn."""
+
+
+@contextmanager
+def played(show: Show, wish: Wish) -> Iterator[tuple[str, Panel]]:
+    """A show served, and its controls."""
+    server = open_server(port=0)
+    panel = Panel(server, Stage(server, show, wish, width=480))
+    thread = threading.Thread(target=panel.follow)
+    thread.start()
+    try:
+        yield address_of(server), panel
+    finally:
+        panel.stop()
+        thread.join()
+        panel.stage.close()
+        close_server(server)
+
+
+def photographed(browser: Browser, show: Show, wish: Wish, name: str, second: float, then: Callable[[Panel], None] = lambda panel: None,
+                 size: tuple[int, int] = SIZE) -> None:
+    """A picture of the page at a second of the show."""
+    with played(show, wish) as (address, panel):
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.goto(address)
+        page.wait_for_selector("canvas")
+        page.wait_for_timeout(SETTLED)
+        notice = page.locator(".mantine-Notification-closeButton")  # that there is no graphics card
+        if notice.count():
+            notice.first.click()
+        panel.timeline.seek(int(abs(show.times - second).argmin()))
+        panel.again()
+        then(panel)
+        page.wait_for_timeout(SETTLED)
+        shot = Image.open(io.BytesIO(page.screenshot(timeout=120_000))).convert("RGB")
+        page.close()
+    path = ASSETS / f"{name}.png"
+    for colours in COLOURS:
+        shot.quantize(colours, dither=Image.Dither.NONE).save(path, optimize=True)
+        if path.stat().st_size < LARGEST:
+            break
+    print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+
+
+def through(name: str) -> Callable[[Panel], None]:
+    """Looks through a camera."""
+    return lambda panel: setattr(panel.through, "value", name)
+
+
+def main() -> None:
+    """Make the pictures that are named, or all."""
+    arguments = [argument for argument in sys.argv[1:] if not argument.startswith("viewer")]
+    wanted = [argument for argument in sys.argv[1:] if argument.startswith("viewer")]
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        sys.exit("found no Chromium, which takes the pictures")
+    with tempfile.TemporaryDirectory() as made, sync_playwright() as tool:
+        demo = Path(arguments[0]) if arguments else Path(made) / "demo"
+        if not demo.exists():
+            subprocess.run([sys.executable, "-m", "shadowpuppet", "demo", "-o", str(demo), "--quiet"], check=True)
+        opened = tool.chromium.launch(executable_path=browser, args=[*FLAGS])
+        several, one = show_of(demo / "run-ring"), show_of(demo / "run")
+        ring = Path(several.facts["recording"])
+        pictures: dict[str, Callable[[str], None]] = {
+            "viewer": lambda name: photographed(opened, several, first_wish(several), name, 2.0),
+            "viewer_hull": lambda name: photographed(opened, show_of(ring, Options()), Wish(hull=True, pictures=Look.PICTURE), name, 2.0),
+            "viewer_through": lambda name: photographed(opened, several, first_wish(several), name, 2.0,
+                                                        through(several.eyes[0].camera.name)),
+            "viewer_particles": lambda name: photographed(opened, one, Wish(glass=True, cloud=True, pictures=Look.SILHOUETTE), name, 4.0),
+        }
+        for name in wanted or pictures:
+            pictures[name](name)
+        opened.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,176 @@
+"""A live session in space: the puppet, the camera and what it sees, on the viewer's page, with the session's buttons."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any, Self
+
+import numpy as np
+
+from shadowpuppet.body import Body
+from shadowpuppet.body_animation import BodyTree
+from shadowpuppet.display.choice import FOOTERS
+from shadowpuppet.display.drawing import drawn
+from shadowpuppet.display.view import Display, View
+from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.puppet_mesh import body_mesh
+from shadowpuppet.rasterize import Picture
+from shadowpuppet.viewer.pictures import Plain
+from shadowpuppet.viewer.server import address_of, close_server, open_server
+from shadowpuppet.viewer.show import Eye, Figure, Show
+from shadowpuppet.viewer.stage import Stage, Wish
+
+MOST_A_SECOND = 10.0
+"""Views that are drawn a second; more cost the tracker time."""
+BUTTONS = {"Stop": "stop", "Learn the background anew": "learn", "Measure the person anew": "measure"}
+WIDE, QUALITY = 320, 80
+"""Pixels of the picture's width, and how well it is kept."""
+
+
+class ViewerDisplay(Display):
+    """Serves the viewer's page from its `with` block's beginning to its end; it is drawn by a thread of its own, the newest view only."""
+
+    def __init__(self, listen: str = "127.0.0.1", port: int | None = None, footer: str = "") -> None:
+        """`footer`: what the page says at its foot. Raises as `open_server` does."""
+        self.server = open_server(listen, port)
+        self.where = f"at {address_of(self.server)}"
+        gui = self.server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 92, 148))
+        gui.set_panel_label("shadowpuppet live")
+        self.status = gui.add_markdown("getting ready")
+        self.image = gui.add_image(np.full((9, 16, 3), 40, np.uint8), format="jpeg", jpeg_quality=QUALITY)
+        for label, wish in BUTTONS.items():
+            gui.add_button(label).on_click(lambda _, wish=wish: self._ask(wish))
+        gui.add_markdown(footer)
+        self._wish, self._over = "", False
+        self._view: View | None = None
+        self._phase = ""
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._follow, name="viewer", daemon=True)
+        self._stage: _Scene | None = None
+
+    def __enter__(self) -> Self:
+        """Begin to draw."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Draw the last view, and close."""
+        with self._changed:
+            self._over = True
+            self._changed.notify_all()
+        self._thread.join(timeout=5)
+        close_server(self.server)
+
+    def show(self, view: View) -> None:
+        """The next view; what was not drawn is left out."""
+        if view.image is None and not view.trouble and view.phase == self._phase:
+            return  # nothing new: what was seen last stays
+        with self._changed:
+            self._view, self._phase = view, view.phase
+            self._changed.notify_all()
+
+    def wish(self) -> str:
+        """The last button that was pressed."""
+        wish, self._wish = self._wish, ""
+        return wish
+
+    def _ask(self, wish: str) -> None:
+        self._wish = wish
+
+    def _follow(self) -> None:
+        while True:
+            with self._changed:
+                if self._view is None and not self._over:
+                    self._changed.wait(1.0)
+                view, self._view = self._view, None
+                if self._over:
+                    return
+            if view is not None:
+                began = time.monotonic()
+                self._draw(view)
+                time.sleep(max(1 / MOST_A_SECOND - (time.monotonic() - began), 0.0))
+
+    def _draw(self, view: View) -> None:
+        self.status.content = words(view)
+        image = drawn(view)
+        if image is not None:
+            self.image.image = _small(image)
+        if view.picture is None or view.image is None:
+            return
+        if self._stage is None or self._stage.picture is not view.picture:
+            self._stage = _Scene(self.server, view.picture)
+        self._stage.to(view)
+
+
+class _Scene:
+    """What there is to be drawn once a person is known; made anew when they are measured anew."""
+
+    def __init__(self, server: Any, picture: Picture) -> None:
+        self.picture = picture
+        self.root = inverse(picture.camera.T_camera_world) @ picture.T_camera_base
+        self.tree, self.mesh = BodyTree(picture.body), body_mesh(picture.body)
+        rest = picture.body.skeleton.clamp(np.zeros((1, len(picture.body.skeleton.dofs))))
+        self.figure = posed(picture.body, self.tree, self.mesh, rest[0], self.root)
+        server.scene.reset()
+        show = Show(title="live", times=np.zeros(1), figures=(self.figure,), eyes=(Eye(picture.camera),))
+        self.stage = Stage(server, show, Wish(), width=WIDE)
+        for client in server.get_clients().values():  # who looks already
+            client.camera.position, client.camera.look_at = show.viewpoint, show.middle
+        self.plain = Plain(picture.camera, WIDE)
+
+    def to(self, view: View) -> None:
+        """Draw a view."""
+        figure = None if view.pose is None else posed(self.picture.body, self.tree, self.mesh, view.pose, self.root)
+        puppet, eye = self.stage.figures[0], self.stage.eyes[0]
+        image = drawn(View(phase=view.phase, image=view.image, mask=view.mask))
+        with self.stage.server.atomic():
+            if figure is not None:
+                puppet.figure = figure
+            puppet.to(0.0, figure is not None)
+            if image is not None:
+                eye.put(np.ascontiguousarray(self._fitted(image)[..., ::-1]), True)
+        self.stage.server.flush()
+
+    def _fitted(self, image: np.ndarray) -> np.ndarray:
+        """A picture of any size as the frustum has it."""
+        import cv2
+
+        width, height = self.picture.camera.size
+        return self.plain(np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8))
+
+
+def open_viewer(listen: str = "127.0.0.1", port: int | None = None, record: bool = False) -> ViewerDisplay:
+    """The display for `--show viewer`. Raises `SettingsError` where it cannot be had there, `ShadowPuppetError` without viser."""
+    return ViewerDisplay(listen, port, FOOTERS[record])
+
+
+def posed(body: Body, tree: BodyTree, mesh: Any, pose: Array, root: Array) -> Figure:
+    """A body in one pose (D,), its frame at `root` (4, 4) in the world."""
+    animation = tree.animation(np.zeros(1), np.asarray(pose, float)[None], root)
+    places, turns = animation.world()
+    return Figure(body.name, animation.times, mesh, animation.rest, places, turns)
+
+
+def _small(image: np.ndarray) -> np.ndarray:
+    """A picture (H, W, 3) blue green red as the page has it: of its width, red green blue."""
+    import cv2
+
+    height, width = image.shape[:2]
+    return np.ascontiguousarray(cv2.resize(image, (WIDE, max(1, round(WIDE * height / width))), interpolation=cv2.INTER_AREA)[..., ::-1])
+
+
+def words(view: View) -> str:
+    """A view's state and figures, for the head of the page."""
+    figures = view.figures()
+    said = [f"**{figures['chip']}**", figures["message"]]
+    if figures["latency"] is not None:
+        said.append(f"{figures['latency']:.0f} ms from capture to pose")
+    if figures["rate"] is not None:
+        said.append(f"{figures['rate']:.0f} frames/s")
+    if figures["overlap"] is not None:
+        said.append(f"overlap {figures['overlap']:.2f}")
+    if figures["countdown"]:
+        said.append(f"{np.ceil(figures['countdown']):.0f}")
+    return " · ".join(word for word in said if word)

@@ -1,0 +1,39 @@
+"""A show served until it is told to end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from shadowpuppet.viewer.panel import Panel
+from shadowpuppet.viewer.pictures import Look
+from shadowpuppet.viewer.server import address_of, close_server, open_server
+from shadowpuppet.viewer.show import Show
+from shadowpuppet.viewer.stage import Stage, Wish
+
+
+def look(show: Show, listen: str = "127.0.0.1", port: int | None = None, wish: Wish | None = None,
+         told: Callable[[str], None] = lambda address: None, done: Callable[[], bool] = lambda: False) -> None:
+    """Serve a show's page until `done` says so, or Ctrl-C. `told` is called with its address once it is there.
+
+    Raises `SettingsError` where the address or port cannot be had, `ShadowPuppetError` without viser.
+    """
+    server = open_server(listen, port)
+    try:
+        stage = Stage(server, show, wish or first_wish(show))
+        stage.people(stage.time)
+        panel = Panel(server, stage, time.monotonic)
+        told(address_of(server))
+        panel.follow(done)
+    finally:
+        close_server(server)
+
+
+def first_wish(show: Show, pictures: bool = True) -> Wish:
+    """What is seen of a show at first: bodies seen through where there is a truth within them, hull points where nobody else is there, the
+    pictures of films (or their silhouettes alone)."""
+    kinds = {figure.kind for figure in show.figures}
+    look = Look.PICTURE if pictures else Look.SILHOUETTE
+    return replace(Wish(), glass="truth" in kinds and "estimate" in kinds, hull=show.hull is not None and "estimate" not in kinds,
+                   pictures=look, spread=show.states_spread)

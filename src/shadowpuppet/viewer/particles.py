@@ -1,0 +1,115 @@
+"""A frame's particles: the run does not keep them, so that its filter is run again on that frame, from the pose before it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from shadowpuppet.body import Body
+from shadowpuppet.body_animation import fitted
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evidence import Evidence
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion import BONES, Motion
+from shadowpuppet.options import Options
+from shadowpuppet.particle_filter import Particles, diffuse, evaluate
+from shadowpuppet.rasterize import Picture
+from shadowpuppet.resampling import normalise
+from shadowpuppet.tracking import MonocularTracker, MultiviewState, MultiviewTracker, State
+from shadowpuppet.viewer.show import Cloud, Eye, Spread
+from shadowpuppet.visual_hull import VisualHull
+
+SEED = 0
+"""The same frame has the same particles whenever it is looked at."""
+FEWEST = 1e-4
+"""Metres; no axis of an ellipsoid is drawn shorter."""
+
+
+class Rerun:
+    """`rerun(time)`: the particles of the frame nearest to a time (s); None where it, or the one before, has no pose or no silhouette.
+
+    Not the run's own, which are gone, but drawn by the same filter with the same settings from the run's pose a frame before; of several
+    cameras by plain dynamics, without the motion prior that the run may have had.
+    """
+
+    def __init__(self, body: Body, motion: Motion, options: Options, eyes: Sequence[Eye]) -> None:
+        """`motion`: the run's, of this body. Raises `ShadowPuppetError` where no frame is known."""
+        self.body, self.motion, self.options = body, motion, options
+        self.eyes = [eye for eye in eyes if eye.seen is not None]
+        self.names = [name for name in motion.joint_names if name in body.landmark_names]
+        self.bones = [(self.names.index(a), self.names.index(b)) for a, b in BONES if a in self.names and b in self.names]
+        self.root = self._root()
+
+    def __call__(self, time: float) -> Cloud | None:
+        """See the class."""
+        n = int(np.abs(self.motion.times - time).argmin())
+        before = self.motion.poses[max(n - 1, 0)]
+        if not (np.isfinite(before).all() and np.isfinite(self.motion.poses[n]).all()):
+            return None
+        rng = np.random.default_rng(SEED + n)
+        found = self._one(rng, float(self.motion.times[n]), before) if len(self.eyes) == 1 else self._several(
+            rng, float(self.motion.times[n]), before)  # fmt: skip
+        return None if found is None else self._cloud(*found)
+
+    def _one(self, rng: np.random.Generator, time: float, before: Array) -> tuple[Array, Array] | None:
+        """Poses (N, D) and weights (N,) of all stages together."""
+        mask = self.eyes[0].seen.mask(time) if self.eyes[0].seen else None
+        if mask is None or not mask.any():
+            return None
+        tracker = self._tracker
+        observation = tracker.observe(mask, before)
+        start = []
+        for stage in tracker.stages:
+            values = stage.clamp(diffuse(rng, np.repeat(before[None, stage.dofs], stage.number, axis=0), stage.sigma))
+            start.append(evaluate(values, stage.weigh(observation, before, before)))
+        state = tracker.cycle(rng, State(before, tuple(start), np.nan, 0.0, "tracked"), mask)
+        poses = [stage.put(state.pose, found.poses)
+                 for stage, found in zip(tracker.stages, state.particles)]  # fmt: skip
+        weights = [normalise(found.log_weights) for found in state.particles]
+        return np.concatenate(poses), np.concatenate([weight / weight.max() for weight in weights])
+
+    def _several(self, rng: np.random.Generator, time: float, before: Array) -> tuple[Array, Array] | None:
+        tracker, masks = self._rig_tracker, [eye.seen.mask(time) if eye.seen else None for eye in self.eyes]
+        evidence = Evidence(tracker.stage, self._hull.points(masks), masks)
+        if not tracker.is_present(evidence):
+            return None
+        still = np.zeros_like(before)
+        start = Particles(np.repeat(before[None], tracker.number, axis=0), np.zeros(tracker.number), np.zeros(tracker.number))
+        found = tracker.cycle(rng, MultiviewState(before, still, start, np.nan, 1.0, "tracked"), evidence).particles
+        weights = normalise(found.log_weights)
+        return found.poses, weights / weights.max()
+
+    def _cloud(self, poses: Array, weights: Array) -> Cloud:
+        places = self.body.points(poses, self.root, self.names)
+        lines = np.stack([places[:, [a for a, _ in self.bones]], places[:, [b for _, b in self.bones]]], 2)
+        share = weights / weights.sum()
+        middle = np.einsum("n,nkx->kx", share, places)
+        off = places - middle
+        variances, turns = np.linalg.eigh(np.einsum("n,nkx,nky->kxy", share, off, off))
+        mirrored = np.linalg.det(turns) < 0
+        turns[mirrored, :, 0] *= -1
+        return Cloud(lines, weights, Spread(middle, np.maximum(np.sqrt(np.maximum(variances, 0)), FEWEST), turns))
+
+    @cached_property
+    def _tracker(self) -> MonocularTracker:
+        camera = self.eyes[0].camera
+        return MonocularTracker(Picture(self.body, camera, camera.T_camera_world @ self.root), self.options.tracker)
+
+    @cached_property
+    def _rig_tracker(self) -> MultiviewTracker:
+        return MultiviewTracker(self.body, tuple(eye.camera for eye in self.eyes), self.options.multiview)
+
+    @cached_property
+    def _hull(self) -> VisualHull:
+        return VisualHull([eye.camera for eye in self.eyes], self.options.multiview.hull)
+
+    def _root(self) -> Array:
+        """Where the body's frame stands in the world (4, 4)."""
+        known = np.isfinite(self.motion.poses).all(1) & np.isfinite(self.motion.joints).all((1, 2))
+        if not known.any():
+            raise ShadowPuppetError("found no frame with a pose, expected one at least")
+        columns = [self.motion.joint_names.index(name) for name in self.names]
+        ours = self.body.points(self.motion.poses[known], names=self.names)
+        return fitted(ours.reshape(-1, 3), self.motion.joints[known][:, columns].reshape(-1, 3))
