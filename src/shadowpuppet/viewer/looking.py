@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 from shadowpuppet.viewer.panel import Panel
 from shadowpuppet.viewer.pictures import Look
@@ -31,9 +30,9 @@ def look(show: Show, listen: str = "127.0.0.1", port: int | None = None, wish: W
 
 
 def first_wish(show: Show, pictures: bool = True) -> Wish:
-    """What is seen of a show at first: bodies seen through where there is a truth within them, hull points where nobody else is there, the
-    pictures of films (or their silhouettes alone)."""
+    """What is seen of a show at first: bodies seen through where a truth or an uncertainty is within them, hull points where nobody else is
+    there, the pictures of films (or their silhouettes alone)."""
     kinds = {figure.kind for figure in show.figures}
     look = Look.PICTURE if pictures else Look.SILHOUETTE
-    return replace(Wish(), glass="truth" in kinds and "estimate" in kinds, hull=show.hull is not None and "estimate" not in kinds,
-                   pictures=look, spread=show.states_spread)
+    glass = "estimate" in kinds and ("truth" in kinds or show.states_spread)
+    return Wish(glass=glass, hull=show.hull is not None and "estimate" not in kinds, pictures=look, spread=show.states_spread)

@@ -26,6 +26,8 @@ SIGMAS = 2.0
 """Standard deviations that half an axis of an ellipsoid is long: within it are 74 % of what is normally spread in space."""
 SHARE, LEAST_AND_MOST = 0.22, (0.18, 0.75)
 """How long frustums are, of what is shown, within metres."""
+ALONE = 0.6
+"""The same of a camera with nobody beside it."""
 
 
 @dataclass
@@ -129,7 +131,8 @@ class Stage:
                                    cell_color=(214, 218, 224), section_color=(176, 182, 192), shadow_opacity=0.0)
 
     def _near(self) -> float:
-        return float(np.clip(SHARE * self.show.size, *LEAST_AND_MOST))
+        share = SHARE if self.show.figures or len(self.show.eyes) > 1 else ALONE
+        return float(np.clip(share * self.show.size, *LEAST_AND_MOST))
 
     def _particles(self, time: float, unstated: bool) -> Cloud | None:
         """Particles, where they are asked for, or how far they are spread and the run states nothing."""
@@ -168,10 +171,10 @@ class Stage:
         turns = np.roll(Rotation.from_matrix(spread.turns).as_quat(), 1, axis=1).astype(np.float32)
         places, axes = spread.points.astype(np.float32), (SIGMAS * spread.axes).astype(np.float32)
         if self._ellipsoids is None or len(self._ellipsoids.batched_positions) != len(places):
-            points, faces = ball()
+            points, faces = ball()  # drawn as nets: what is solid hides, and glass within glass is hidden
             self._ellipsoids = self.server.scene.add_batched_meshes_simple(
-                "/uncertainty", points, faces, turns, places, batched_scales=axes, batched_colors=(214, 60, 90), opacity=0.4, lod="off",
-                cast_shadow=False, receive_shadow=False)  # fmt: skip
+                "/uncertainty", points, faces, turns, places, batched_scales=axes, batched_colors=(214, 60, 90), lod="off",
+                wireframe=True, cast_shadow=False, receive_shadow=False)  # fmt: skip
         else:
             self._ellipsoids.batched_positions, self._ellipsoids.batched_scales = places, axes
             self._ellipsoids.batched_wxyzs, self._ellipsoids.visible = turns, True
