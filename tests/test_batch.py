@@ -14,19 +14,25 @@ import time
 import tomllib
 from importlib.util import find_spec
 from pathlib import Path
+from time import monotonic
+from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 
 import made
+from shadowpuppet import cli
 from shadowpuppet.batch import Batch, BatchListener, make_grid, run_batch
 from shadowpuppet.batch import crew as crews
 from shadowpuppet.batch.plan import make_tasks, named
 from shadowpuppet.batch.run import _claimed
 from shadowpuppet.batch.task import _put, do
+from shadowpuppet.batch_terminal import LINES, BatchTerminal, _pace
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
+from shadowpuppet.terminal import Terminal
 
 SETTINGS = {"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 QUICK = make_grid(SETTINGS)
@@ -403,6 +409,48 @@ def test_batch_tells_what_came_of_it(shell, recording, tmp_path, monkeypatch):
     made.copied(recording, tmp_path / "gone")
     code, out, err = shell(*command)
     assert (code, err) == (0, "4 of 8 runs are done already\n")
+
+
+def test_figures_stay_whole_however_long_a_name_is(recording, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    long = made.copied(recording, tmp_path / "a_recording_with_a_rather_long_name_indeed_and_a_half")
+    assert cli.run(["batch", str(recording), str(long), "-o", str(tmp_path / "out"), "--seeds", "0:2", "--workers", "0", *FLAGS]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert sum(line.count(" ± ") for line in lines) == 4
+    assert not any("…" in line for line in lines)
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_what_goes_on_is_shown_in_a_line_each(width):
+    shown = Terminal()
+    shown.console = Console(width=width, force_terminal=True, color_system=None)
+    told = BatchTerminal(shown)
+
+    def lines():
+        with shown.console.capture() as seen:
+            shown.console.print(told._table())
+        return [line.rstrip() for line in seen.get().splitlines()]
+
+    told.begin(4321, 0)
+    told.stop()
+    assert [line.strip() for line in lines()] == ["workers are starting", "0 of 4321 runs done"]
+    tasks = [SimpleNamespace(name="bad", label=f"a recording with a name of many words, seed {n}") for n in range(20)]
+    for worker, task in enumerate(tasks):
+        told.working(worker, task, "tracking", 1234, 5000)
+    told.done, told.failed, told._began = 3000, 21, monotonic() - 3021 * 7200
+    found = lines()
+    assert len(found) == LINES + 2
+    assert max(map(len, found)) <= width
+    assert all(line.startswith(f"{n + 1:3}  a recording") and "tracking 1234/5000" in line for n, line in enumerate(found[:LINES]))
+    assert found[LINES].strip() == "and 4 more"
+    assert "3000 of 4321 runs done, 21 failed" in found[-1]
+    assert width == 60 or "0.5 runs/h, 2600:00:00 left" in found[-1]
+
+
+@pytest.mark.parametrize(("pace", "told"), [(26.3, "26 runs/s"), (0.5, "0.5 runs/s"), (0.4, "24 runs/min"), (1 / 7200, "0.5 runs/h")])
+def test_a_pace_is_told_in_a_unit_that_suits_it(pace, told):
+    assert _pace(pace) == told
 
 
 def test_quiet_is_quiet(shell, recording):

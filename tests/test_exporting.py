@@ -201,5 +201,5 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
 
 
 def test_help_names_the_formats(shell):
-    assert "bvh, c3d, csv, glb, mot, npz, parquet, trc" in " ".join(shell("export", "--help")[1].split())
+    assert "bvh, c3d, csv, glb, mot, npz, parquet, trc" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
     assert "--source-unit" in shell("convert", "--help")[1]

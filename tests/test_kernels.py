@@ -6,6 +6,12 @@ import os
 import subprocess
 import sys
 
+import numba
+import pytest
+from numba.core import caching
+
+from shadowpuppet.kernels import compiled
+
 FIRST_RUN = """
 from shadowpuppet.bench.ring import Around
 around = Around(cameras=3, points=300, particles=4, size=(160, 120))
@@ -21,3 +27,15 @@ def test_what_is_compiled_now_and_what_is_loaded_from_the_cache_agree_to_the_las
     assert list(tmp_path.rglob("*.nbc"))
     assert len(first) > 1000
     assert first == second
+
+
+def test_where_there_is_no_folder_for_it_kernels_are_compiled_all_the_same(monkeypatch):
+    """As in an installation that can only be read, of somebody without a home."""
+    monkeypatch.setattr(getattr(caching, "CacheImpl", None) or caching._CacheImpl, "_locator_classes", [])  # the latter of older Numba
+    with pytest.raises(RuntimeError, match="no locator available"):
+        numba.njit(cache=True)(plus_one)
+    assert compiled(nogil=True)(plus_one)(4) == 5
+
+
+def plus_one(x):
+    return x + 1

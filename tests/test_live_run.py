@@ -10,15 +10,19 @@ import json
 import math
 import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from websockets.sync.client import connect
 
 import made
+from listeners import OscEar
 from live_film import EMPTY, FLAGS, FOV, HEIGHT, QUICK, RATE, frames
 from shadowpuppet import cli
 from shadowpuppet.display.view import Display
@@ -250,6 +254,51 @@ def test_control_c_before_anybody_is_tracked_leaves_nothing(film, tmp_path):
     assert child.returncode == 0
     assert re.search("nobody was tracked: nothing was written", err)
     assert not (tmp_path / "run").exists()
+
+
+# Other programs
+
+
+def test_other_programs_get_every_frame_while_it_is_tracked(film, tmp_path, capsys):
+    folder = tmp_path / "run"
+    with OscEar() as ear, socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        heard, texts = [], []
+        listening = threading.Thread(target=lambda: heard.extend(ear.heard(60)), daemon=True)
+        listening.start()
+        port = free.getsockname()[1]
+        free.close()
+
+        def listen():
+            for _ in range(2000):
+                with contextlib.suppress(OSError), connect(f"ws://127.0.0.1:{port}") as session:
+                    texts.extend(session)
+                    return
+                time.sleep(0.01)
+
+        reading = threading.Thread(target=listen, daemon=True)
+        reading.start()
+        assert cli.run([*command(film, folder, "--osc", ear.port, "--websocket", port, "--speed", 2), *FLAGS]) == 0
+        reading.join(10)
+        listening.join(10)
+        heard += ear.heard(0.1)
+    motion, told = read_run(folder).motion, read_run(folder).metrics["live"]["outlets"]
+    assert f"WebSocket at ws://127.0.0.1:{port}/" in capsys.readouterr().err
+    begin, *frames = map(json.loads, texts)
+    assert begin["type"] == "begin"
+    assert begin["height"] == HEIGHT
+    places = {frame["time"]: frame["joints"] for frame in frames}
+    shared = [n for n, seconds in enumerate(motion.times) if round(float(seconds), 6) in places]
+    assert len(shared) > 0.8 * len(motion)
+    wrist = begin["joints"].index("left_wrist"), motion.joint_names.index("left_wrist")
+    for n in shared:
+        if motion.status[n] == "tracked":
+            found = places[round(float(motion.times[n]), 6)][wrist[0]]
+            np.testing.assert_allclose(found, motion.joints[n, wrist[1]], atol=2e-5)
+    assert told["osc"] == {"sent": len(motion), "failed": 0}
+    assert told["websocket"] == {"served": 1, "refused": 0}
+    assert 0 < len([0 for address, _ in heard if address == "/VMC/Ext/T"]) <= len(motion)
+    assert all(0 < frame["age"] < 10 for frame in frames)
 
 
 # Cameras that fail, from the reader to the run

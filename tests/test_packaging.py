@@ -18,7 +18,8 @@ from shadowpuppet.options import Options, settings_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "shadowpuppet"
-HEAVY = ("numpy", "scipy", "numba", "cv2", "av", "pydantic", "cyclopts", "rich", "matplotlib")
+HEAVY = ("numpy", "scipy", "numba", "cv2", "av", "pydantic", "cyclopts", "rich", "matplotlib", "viser", "websockets", "pylsl",
+         "distributed", "pyarrow", "asyncio")  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 

@@ -1,6 +1,6 @@
 """`python -m shadowpuppet`."""
 
-from shadowpuppet.cli import main
+from shadowpuppet.entry import main
 
 if __name__ == "__main__":
     main()

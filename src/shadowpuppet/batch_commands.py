@@ -7,10 +7,9 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from shadowpuppet.flags import OTHER, RUN, BatchFlags, given, output
+from shadowpuppet.errors import SOME_FAILED
+from shadowpuppet.flags import OTHER, RUN, BatchFlags, Quiet, given, output
 
-FAILED = 3
-"""Exit code: some of the runs failed, the others are done."""
 WORK = Group("Work", sort_key=0.5)
 ForBatch = Annotated[BatchFlags | None, Parameter(name="*")]
 
@@ -35,7 +34,7 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
           scheduler: Annotated[str | None, flag(WORK, "Address or file of a Dask scheduler, whose workers do the work.")] = None,
           afresh: Annotated[bool, switch(WORK, "Make silhouettes anew for every run, to measure speed.")] = False,
           table: Annotated[Literal["csv", "parquet"], flag(OTHER, "Format of the summary.")] = "csv",
-          quiet: Annotated[bool, switch(OTHER, "Show nothing but warnings and errors.")] = False,
+          quiet: Quiet = False,
           flags: ForBatch = None) -> int:  # fmt: skip
     """Track many recordings, with many seeds and settings: a run folder each in OUT/runs, and a table of all in OUT/summary.csv.
 
@@ -56,4 +55,4 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
         plot_batch(found.runs, folder / "summary.png")
     if not quiet:
         show(*batch_table(found, table))
-    return FAILED if found.failed else 0
+    return SOME_FAILED if found.failed else 0

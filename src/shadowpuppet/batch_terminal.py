@@ -23,6 +23,8 @@ from shadowpuppet.terminal import Terminal, terminal
 
 LINES = 16
 """Workers that are shown."""
+BAR = 30
+"""Width of the bar, where there is room for it."""
 PAUSE = 30.0
 """Seconds between two lines where there is no screen to show a table on."""
 
@@ -91,18 +93,21 @@ class BatchTerminal(BatchListener):
         left = self.total - self.before - self.done - self.failed
         pace = (self.done + self.failed) / max(monotonic() - self._began, 1e-9)
         failed = f", {self.failed} failed" if self.failed else ""
-        until = f"  {pace:.2g} runs/s, {_clock(left / pace)} left" if pace else ""
+        until = f"  {_pace(pace)}, {_clock(left / pace)} left" if pace else ""
         return f"{self.before + self.done} of {self.total} runs done{failed}{until}"
 
     def _table(self) -> RenderableType:
-        bar = Table.grid(padding=(0, 2))
-        bar.add_row(ProgressBar(self.total, self.before + self.done + self.failed, width=30), Text(self._counts()))
-        workers = Table.grid(padding=(0, 2))
+        bar, workers = Table.grid(padding=(0, 2)), Table.grid(padding=(0, 2))
+        counts = Text(self._counts(), no_wrap=True, overflow="ellipsis")
+        room = self._shown.console.width - counts.cell_len - 2
+        bar.add_row(ProgressBar(self.total, self.before + self.done + self.failed, width=min(max(room, 1), BAR)), counts)
         at = sorted(self._at.items())
         for number, (label, doing) in at[:LINES]:
             workers.add_row(Text(f"{number + 1:3}", style="dim"), Text(label, overflow="ellipsis", no_wrap=True), Text(doing, no_wrap=True))
         if len(at) > LINES:
             workers.add_row("", Text(f"and {len(at) - LINES} more"), "")
+        if not (at or self.done or self.failed):
+            workers.add_row("", Text("workers are starting"), "")
         return Group(workers, bar)
 
 
@@ -121,6 +126,8 @@ def batch_table(batch: Batch, table: str) -> Sequence[RenderableType]:
     """What came of it, a row a recording and choice of settings: over the seeds, mean and standard deviation."""
     names = ("error, mm", "overlap")
     found = plain_table("", ("recording", "settings", "runs", *names, "s"), right=(2, 3, 4, 5))
+    for column in found.columns[:2]:  # where there is little room, names get more lines, and figures stay whole
+        column.no_wrap, column.overflow = False, "fold"
     for (name, choice), runs in rows_of(batch.runs).items():
         done = [run for run in runs if run.status == "done"]
         count = str(len(done)) if len(done) == len(runs) else f"{len(done)} of {len(runs)}"
@@ -136,6 +143,12 @@ def _spread(values: Sequence[float], digits: int) -> str:
     if not len(known):
         return ""
     return f"{known.mean():.{digits}f}" + (f" ± {known.std(ddof=1):.{digits}f}" if len(known) > 1 else "")
+
+
+def _pace(pace: float) -> str:
+    """Runs a second; a minute or an hour where they take long."""
+    unit, times = next(((unit, times) for unit, times in (("s", 1), ("min", 60)) if pace * times >= 0.5), ("h", 3600))
+    return f"{pace * times:.2g} runs/{unit}"
 
 
 def _clock(seconds: float) -> str:

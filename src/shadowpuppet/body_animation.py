@@ -167,8 +167,19 @@ class BodyTree:
 def motion_animation(body: Body, motion: Motion) -> tuple[Animation, float]:
     """A run's motion as an animated skeleton, and by how many metres its joints lie off the run's at most.
 
-    Where the body's frame stands in the world is found from the joints: the same in all frames, as with cameras that stay; where that does
-    not fit, as after somebody was measured anew in a live run, in each frame. Raises `ShadowPuppetError` where no frame is known.
+    Raises `ShadowPuppetError` where no frame is known.
+    """
+    root, off = base_in_world(body, motion)
+    known: Known = np.asarray(np.isfinite(motion.poses).all(1) & np.isfinite(motion.joints).all((1, 2)))
+    poses = np.where(known[:, None], motion.poses, np.nan)
+    return BodyTree(body).animation(motion.times, poses, root), off
+
+
+def base_in_world(body: Body, motion: Motion) -> tuple[Array, float]:
+    """Where a body's frame stands in a run's world, found from the joints, and by how many metres these lie off at most.
+
+    The same (4, 4) in all frames, as with cameras that stay; where that does not fit, as after somebody was measured anew in a live run,
+    in each frame (T, 4, 4). Raises `ShadowPuppetError` where no frame is known.
     """
     known: Known = np.asarray(np.isfinite(motion.poses).all(1) & np.isfinite(motion.joints).all((1, 2)))
     if not known.any():
@@ -182,8 +193,7 @@ def motion_animation(body: Body, motion: Motion) -> tuple[Animation, float]:
         some = np.stack([fitted(a, b) for a, b in zip(ours, wanted)])
         off, root = _off(some, ours, wanted), np.tile(np.eye(4), (len(motion), 1, 1))
         root[known] = some
-    poses = np.where(known[:, None], motion.poses, np.nan)
-    return BodyTree(body).animation(motion.times, poses, root), off
+    return root, off
 
 
 def fitted(points: Array, targets: Array) -> Array:

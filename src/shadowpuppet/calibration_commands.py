@@ -8,11 +8,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from shadowpuppet.errors import RecordingError, SettingsError
-from shadowpuppet.flags import OTHER, LookFlags, options_from
+from shadowpuppet.flags import OTHER, AsJson, LookFlags, options_from
 
 ForCheck = Annotated[LookFlags | None, Parameter(name="*")]
 Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it.")]
-AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
 
 
 def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a calibration, of two cameras or more.")], /, *,

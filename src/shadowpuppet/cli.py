@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, motion_commands, viewer_commands
-from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, machine_commands, motion_commands, viewer_commands
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
 from shadowpuppet.flags import (
     CAMERAS,
     OTHER,
     RUN,
+    AsJson,
     DemoFlags,
     Flags,
     LiveFlags,
     LookFlags,
+    OutletFlags,
+    Quiet,
     SessionFlags,
     SpecFlags,
     given,
@@ -27,9 +31,6 @@ from shadowpuppet.flags import (
     output,
     spec_of,
 )
-
-MISTAKE, INTERRUPTED = 2, 130
-"""Exit codes: what the user gave cannot be used; Ctrl-C."""
 
 
 def _version() -> str:
@@ -42,13 +43,12 @@ app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppre
           help="Markerless motion capture from silhouettes.")
 Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it, or an earlier "
                                                             "run's run.toml. Flags go before it.")]
-Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]
-AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
 Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
 All = Annotated[Flags | None, Parameter(name="*")]
 ForLook = Annotated[LookFlags | None, Parameter(name="*")]
 ForSession = Annotated[SessionFlags | None, Parameter(name="*")]
 ForLive = Annotated[LiveFlags | None, Parameter(name="*")]
+ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
 ForDemo = Annotated[DemoFlags | None, Parameter(name="*")]
 ForSpec = Annotated[SpecFlags | None, Parameter(name="*")]
 To = Annotated[Path | None, Parameter(group=CAMERAS, help="Write the calibration there: NAME.toml for Pose2Sim, Anipose and this program, "
@@ -89,30 +89,33 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
 
 @app.command
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
-         quiet: Quiet = False, flags: ForSession = None, settings: ForLive = None) -> None:
+         quiet: Quiet = False, flags: ForSession = None, settings: ForLive = None, outlets: ForOutlets = None) -> None:
     """Track a person before a camera as it happens, shown in a window or on a page for a browser; Ctrl-C ends it.
 
     Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
-    No picture is kept unless --record is given.
+    No picture is kept unless --record is given. Joints go to no other program unless --osc, --websocket or --lsl is.
     """
     from time import strftime
 
     from shadowpuppet.display.choice import open_display
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.settings import LiveSettings
+    from shadowpuppet.outlets.choice import open_outlets
+    from shadowpuppet.outlets.settings import OutletSettings
     from shadowpuppet.settings import validate
     from shadowpuppet.terminal import terminal
 
     options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     with terminal(quiet, folder) as shown:
+        told = open_outlets(validate(OutletSettings, given(outlets), "flags"))
         if chosen.show == "viewer":
             from shadowpuppet.viewer.live import open_viewer
 
             display = open_viewer(chosen.listen, chosen.port, chosen.record)
         else:
             display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
-        metrics = run_live(folder, options, chosen, shown, display)
+        metrics = run_live(folder, options, chosen, shown, display, outlets=told)
     if metrics is None:
         print("nobody was tracked: nothing was written", file=sys.stderr)
     elif not quiet:
@@ -163,7 +166,7 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
 
 @app.command(name="fit-person")
 def measure_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
-                   config: Config = None, flags: ForLook = None) -> None:
+                   config: Config = None, quiet: Quiet = False, flags: ForLook = None) -> None:
     """Measure a person once, from reference pictures or the film, or from several cameras' first seconds; `track --person` uses the sizes
     again."""
     from shadowpuppet.fitting import Found
@@ -171,10 +174,12 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
     from shadowpuppet.tables import curves_table, fit_table, measured_table, sizes_table
     from shadowpuppet.terminal import show, terminal
 
-    with terminal() as shown:
+    with terminal(quiet) as shown:
         shown.begin("looking")
         found, look = fit_person(recording, file, options_from(flags, config))
         shown.doubt(look)
+    if quiet:
+        return
     if isinstance(found, Found):
         show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
     elif found.person is not None:
@@ -226,7 +231,27 @@ def settings(*, preset: str = "default") -> None:
 
 
 @app.command
-def bench(*, json: Path | None = None, picture: Path | None = None, quick: bool = False, quiet: Quiet = False) -> None:
+def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:
+    """Print a script that lets a shell complete commands, flags and files by the Tab key.
+
+    In ~/.bashrc: eval "$(shadowpuppet completion bash)"; in ~/.zshrc the same with zsh, after compinit; in config.fish:
+    shadowpuppet completion fish | source.
+
+    Parameters
+    ----------
+    shell
+        Which shell: bash, zsh, fish or powershell.
+    """
+    script = app.generate_completion(prog_name="shadowpuppet", shell=shell)
+    made = re.search(r"^(_\w+)\(\)", script, re.MULTILINE)
+    if shell == "zsh" and made is not None:  # by itself it is a file for zsh's own folders, and evaluated it would do nothing
+        script += f"\ncompdef {made[1]} shadowpuppet"
+    print(script)
+
+
+@app.command
+def bench(*, json: Path | None = None, picture: Path | None = None,
+          quick: Annotated[bool, Parameter(negative=(), show_default=False)] = False, quiet: Quiet = False) -> None:
     """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
     Parameters
@@ -262,7 +287,9 @@ app.command(motion_commands.fit_prior, name="fit-prior")
 app.command(motion_commands.humaneva)
 app.command(motion_commands.export)
 app.command(motion_commands.convert)
+app.command(motion_commands.play)
 app.command(batch_commands.batch)
+app.command(machine_commands.doctor)
 app.command(viewer_commands.view)
 
 
@@ -286,13 +313,11 @@ def _show_live(folder: Path, metrics: Mapping[str, Any]) -> None:
     show(measures_table(metrics), pairs([*live_rows(metrics["live"]), ("made", "\n".join(str(folder / name) for name in names))]))
 
 
-def main(tokens: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit: 0, or 2 for a user's mistake, or 130 after Ctrl-C; 3 where some of many runs failed."""
-    sys.exit(run(tokens))
-
-
 def run(tokens: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
+    """Run the command line; returns the exit code: 0, or 2 for a user's mistake; 1 and 3 are a command's own.
+
+    Ctrl-C is told here, and leaves with 130.
+    """
     try:
         code = app(list(tokens) if tokens is not None else None, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()

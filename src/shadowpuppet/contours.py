@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.kernels import compiled
 from shadowpuppet.masks import Mask
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ def _cells(mask: Mask, seen: Mask | None) -> NDArray[np.uint8]:
     return cells
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _follow(cells):  # pragma: no cover
     """All boundaries between pixels inside and outside: middles of the pixels' sides, starts, and whether a person is beside them."""
     first = _left_sides(cells)
@@ -70,7 +70,7 @@ def _follow(cells):  # pragma: no cover
     return points, starts[: m + 1].copy(), person
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _left_sides(cells):  # pragma: no cover
     """Pixels inside with none to the left, as indices into the flat array, row by row; eight pixels that are alike at once."""
     words, whole = cells.view(np.uint64), np.uint64(0x0101010101010101)
@@ -88,7 +88,7 @@ def _left_sides(cells):  # pragma: no cover
     return out[:n].copy()
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _changes_down(cells):  # pragma: no cover
     """How many pixels differ from the one above."""
     total = 0
@@ -98,7 +98,7 @@ def _changes_down(cells):  # pragma: no cover
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _follow_one(flat, stride, at, points, person, n):  # pragma: no cover
     """Once around, from the left side of pixel `at` upward, what is inside to the right; (dx, dy) is the step. Returns the end."""
     x, y, dx, dy = at % stride, at // stride + 1, 0, -1
@@ -120,7 +120,7 @@ def _follow_one(flat, stride, at, points, person, n):  # pragma: no cover
             dx, dy = -dy, dx
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _smooth(points, starts, person):  # pragma: no cover
     """Take off the stairs, but not at the picture's border, where straight runs are thinned."""
     kept_points, kept_starts, kept_person, n = np.empty_like(points), np.zeros_like(starts), np.empty_like(person), 0
@@ -147,7 +147,7 @@ def _smooth(points, starts, person):  # pragma: no cover
     return kept_points[:n].copy(), kept_starts, kept_person[:n].copy()
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _close(path):  # pragma: no cover
     """Write a closed path's last two vertices before its first, and its first two after its last (there may be only four)."""
     size = path.shape[0] - 4
@@ -155,7 +155,7 @@ def _close(path):  # pragma: no cover
     path[size + 2], path[size + 3] = path[2], path[3]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _far_from_others(person):  # pragma: no cover
     """Which of a closed contour's vertices have only a person's within `FIRM`."""
     size = person.size

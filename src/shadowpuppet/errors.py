@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+BROKEN, MISTAKE, SOME_FAILED, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes beside 0: the core does not work here (`doctor`), or a mistake of ours; what the user gave cannot be used; some of many runs
+failed (`batch`); Ctrl-C."""
+
 
 class ShadowPuppetError(Exception):
     """A user's mistake or bad input, told in one sentence: where, what was found, what is possible.

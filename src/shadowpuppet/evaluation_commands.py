@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from shadowpuppet.flags import OTHER, RUN
+from shadowpuppet.flags import RUN, AsJson, Quiet
 
 Switch = Annotated[bool, Parameter(negative=(), show_default=False)]
 
@@ -19,8 +19,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
                                                                       "matplotlib.")] = None,
              update: Annotated[bool, Parameter(group=RUN, negative=(), show_default=False, help="Put the figures into the run's own "
                                                                                                 "metrics.json, too.")] = False,
-             as_json: Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False,
-                                                help="Print all figures as JSON.")] = False) -> None:  # fmt: skip
+             quiet: Quiet = False, as_json: AsJson = False) -> None:  # fmt: skip
     """Measure a run: errors of joints and motion against a truth, overlap, cost, jitter, what was lost.
 
     Parameters
@@ -55,7 +54,8 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     if report is not None:
         check_report(report, run)
     written = {}
-    with terminal(quiet=as_json) as shown:
+    with terminal(quiet or as_json) as shown:
+        shown.begin("measuring")
         found = measure_run(run, truth, Comparison(names, start, end, offset, sync, align, angles))
         if file is not None:
             write_evaluation(file, found.measured, run)
@@ -68,5 +68,5 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
             written["report"] = report
     if as_json:
         show_json(found.measured)
-    else:
+    elif not quiet:
         show(*evaluation_tables(found.measured, written))

@@ -14,19 +14,21 @@ from pydantic import BeforeValidator
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.options import PATHS, Options, default_of, make_options, over, read_options, settings_of
+from shadowpuppet.outlets.settings import OutletSettings
 from shadowpuppet.settings import PriorSettings, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.specfile import read_spec
 
-HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Learning", "Other")
-RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
+HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other programs", "Learning", "Other")
+RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "overlay"), RUN),
     **dict.fromkeys(("height", "distance", "body", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
+    **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size", "every"), PICTURES),
 }
 SPEC_GROUPS = {
@@ -35,6 +37,8 @@ SPEC_GROUPS = {
     **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
     **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
 }
+Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]
+AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
 HIDDEN = Parameter(show=False)
 """Flags of the tables: many, and shown by `shadowpuppet settings`."""
 
@@ -102,7 +106,7 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = ViewFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = PriorFlags = SpecFlags = Any
+    Flags = LookFlags = ViewFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = OutletFlags = PriorFlags = SpecFlags = Any
 else:
     Flags = flags_of(Options)
     """All of `Options`."""
@@ -118,6 +122,8 @@ else:
     """Those that matter where a camera is tracked as it happens."""
     LiveFlags = flags_of(LiveSettings)
     """What can be set about that beside."""
+    OutletFlags = flags_of(OutletSettings)
+    """To whom motion is given."""
     PriorFlags = flags_of(PriorSettings, without=("regions",), groups={field.name: LEARNING for field, _, _ in settings_of(PriorSettings)})
     """How a motion prior is learnt."""
     SpecFlags = flags_of(Shorthand, groups=SPEC_GROUPS)

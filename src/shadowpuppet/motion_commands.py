@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from shadowpuppet.flags import PriorFlags, given, output
+from shadowpuppet.flags import OutletFlags, PriorFlags, Quiet, given, output
 
+ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
 ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 
 
@@ -16,7 +17,7 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .c
                                                                              "beside its .asf.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
               rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
-              flags: ForPrior = None) -> None:  # fmt: skip
+              quiet: Quiet = False, flags: ForPrior = None) -> None:  # fmt: skip
     """Learn what a motion is like from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
 
     Parameters
@@ -39,17 +40,18 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .c
     if not (regions == "choose" or (regions.isdecimal() and len(regions) < 10)):
         raise SettingsError(f"flags: regions: found {regions!r}, expected a number or choose")
     values = given(flags) | ({"regions": int(regions)} if regions.isdecimal() else {})
-    with terminal() as shown:
+    with terminal(quiet) as shown:
         shown.begin("learning")
         trained = prior_from_files(motions, file, validate(PriorSettings, values, "flags"), seed=seed, body=body, rate=rate,
                                    choose=regions == "choose")
-    show(*prior_tables(trained, file))
+    if not quiet:
+        show(*prior_tables(trained, file))
 
 
 def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
              folder: Annotated[Path | None, output("Folder of the recording. [default: the trial's name]")] = None,
              subject: str = "S2", action: str = "Walking", trial: int = 1, part: Literal["validation", "training", "all"] = "validation",
-             training_frames: int = 100) -> None:  # fmt: skip
+             training_frames: int = 100, quiet: Quiet = False) -> None:  # fmt: skip
     """Make a recording of a trial of HumanEva, which needs a licence: calibration, timing, truth and training; films stay in their place.
 
     Parameters
@@ -69,16 +71,18 @@ def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, w
     from shadowpuppet.tables import trial_table
     from shadowpuppet.terminal import show, terminal
 
-    with terminal():
+    with terminal(quiet) as shown:
+        shown.begin("reading")
         found = read_humaneva(data, subject, action, trial, part, training_frames)
         folder = folder or Path(found.recording.name)
         write_humaneva(found, folder)
-    show(trial_table(found, folder))
+    if not quiet:
+        show(trial_table(found, folder))
 
 
 def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, to: str = "bvh,c3d,trc,mot,csv,glb,npz",
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
-           unit: Literal["m", "cm", "mm"] = "m") -> None:  # fmt: skip
+           unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
 
     Parameters
@@ -93,16 +97,18 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     from shadowpuppet.terminal import show, terminal
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
-    with terminal() as shown:
+    with terminal(quiet) as shown:
         shown.begin("exporting")
         written = export_run(run, names, folder, unit)
-    show(pairs([("made", "\n".join(map(str, written)))]))
+    if not quiet:
+        show(pairs([("made", "\n".join(map(str, written)))]))
 
 
 def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, .csv, .npz, .parquet, .trc, or .amc beside its .asf.")],
             target: Annotated[Path, Parameter(help="File to be written: .bvh, .c3d, .csv, .glb, .mot, .npz, .parquet or .trc.")], /, *,
             all: Annotated[bool, Parameter(negative=(), show_default=False)] = False, rate: float | None = None,
-            source_unit: Literal["m", "cm", "mm", "in"] | None = None, unit: Literal["m", "cm", "mm"] = "m") -> None:  # fmt: skip
+            source_unit: Literal["m", "cm", "mm", "in"] | None = None, unit: Literal["m", "cm", "mm"] = "m",
+            quiet: Quiet = False) -> None:  # fmt: skip
     """Turn a file of motion into another: joints in metres, Z up, or as the other format wants them.
 
     A skeleton (.bvh, .amc) stays one in .bvh and .glb; to joints alone, a body is fitted where the target needs one.
@@ -125,7 +131,36 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
 
     if rate is not None and not 0 < rate < 1e6:
         raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
-    with terminal() as shown:
+    with terminal(quiet) as shown:
         shown.begin("converting")
         told = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
-    show(pairs([("made", str(target)), ("of", told)]))
+    if not quiet:
+        show(pairs([("made", str(target)), ("of", told)]))
+
+
+def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, speed: float = 1.0,
+         loop: Annotated[bool, Parameter(negative=(), show_default=False)] = False,
+         quiet: Quiet = False, outlets: ForOutlets = None) -> None:  # fmt: skip
+    """Give a run's motion to other programs at its own pace, as `live` does while it tracks: to try what receives it. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    speed
+        How many times as fast.
+    loop
+        Begin again at the end, until Ctrl-C.
+    """
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.outlets.choice import open_outlets
+    from shadowpuppet.outlets.settings import OutletSettings
+    from shadowpuppet.playing import play_run
+    from shadowpuppet.settings import validate
+    from shadowpuppet.terminal import terminal
+
+    if not 0 < speed <= 100:
+        raise SettingsError(f"flags: speed: found {speed}, expected more than 0, up to 100")
+    chosen = validate(OutletSettings, given(outlets), "flags")
+    if chosen == OutletSettings():
+        raise SettingsError("flags: found nobody to give the motion to, expected one of --osc, --websocket and --lsl")
+    with terminal(quiet) as shown:
+        play_run(run, open_outlets(chosen), shown, speed=speed, loop=loop)

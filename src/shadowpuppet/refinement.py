@@ -4,7 +4,7 @@ same points. Both run over many poses, each by itself."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +89,7 @@ class Refiner:
     def _numbers(self, tau: float | None = None) -> tuple[np.float32, np.float32]:
         return np.float32(self.settings.epsilon), np.float32(self.settings.tau if tau is None else tau)
 
-    def _room(self) -> tuple[Array, ...]:
+    def _room(self) -> tuple[NDArray[Any], ...]:
         """For the kernels; each call has its own, so that threads do not meet."""
         J, D, S = len(self.body.skeleton.joints), len(self.body.skeleton.dofs), len(self._parts)
         return (self._parts.copy(), np.zeros((J, 3, 4)), np.zeros((D, 6)), np.zeros((3, 3, 3)), np.zeros(8 * LANES, np.float32),

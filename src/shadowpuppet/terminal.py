@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,15 +9,18 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, TextIO
 
-from rich.console import Console, RenderableType
+from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.look import Look
+from shadowpuppet.printing import show
 from shadowpuppet.rig_look import RigLook
 from shadowpuppet.rig_tables import rig_look_table
 from shadowpuppet.tables import look_table
+
+__all__ = ["Terminal", "show", "show_json", "terminal"]
 
 REPEATED = 10.0
 """Seconds after which what was said is said again."""
@@ -43,7 +45,8 @@ class Terminal(LiveListener):
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._task = self._progress.add_task(what, total=total, done="")
-        self._progress.start()
+        if not self._progress.disable:
+            self._progress.start()
 
     def advance(self, frames: int) -> None:
         """Show how many frames are done, and how fast."""
@@ -57,7 +60,7 @@ class Terminal(LiveListener):
     def look(self, look: Look | RigLook) -> None:
         """Show what was found, and what is in doubt."""
         if not self.quiet:
-            self._progress.stop()
+            self.stop()
             show(rig_look_table(look) if isinstance(look, RigLook) else look_table(look))
         self.doubt(look)
 
@@ -88,7 +91,8 @@ class Terminal(LiveListener):
 
     def stop(self) -> None:
         """Take the bar away."""
-        self._progress.stop()
+        if not self._progress.disable:  # rich 14.0 ends with an empty line even then
+            self._progress.stop()
 
     def _show_warning(self, message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None,
                       line: str | None = None) -> None:
@@ -112,16 +116,6 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
             raise KeyboardInterrupt(kept) from None
         finally:
             shown.stop()
-
-
-def show(*parts: RenderableType) -> None:
-    """Print tables to standard output, with an empty line between them."""
-    console = Console(file=sys.stdout, highlight=False)
-    for n, part in enumerate(parts):
-        with console.capture() as shown:
-            console.print(part)
-        lines = [line.rstrip() for line in shown.get().splitlines()]  # rich fills columns with blanks, which files need not keep
-        print("\n" * bool(n) + "\n".join(lines))
 
 
 def show_json(value: Any) -> None:

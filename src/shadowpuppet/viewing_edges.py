@@ -6,13 +6,12 @@ of which a side of a polygon is crossed where its two ends lie on different side
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.contours import ARM
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import kernel
+from shadowpuppet.kernels import compiled, kernel
 from shadowpuppet.projection import NEAR, bend_within
 
 Indices = NDArray[np.int64]
@@ -29,7 +28,7 @@ CHUNK = 8
 """Sides of a contour in a run."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def straighten(points, starts, person, grid, width, height):  # pragma: no cover
     """Contours through the lens, closed; viewing planes' outward normals, 0 where none is known; where each polygon ends."""
     polygons = starts.size - 1
@@ -60,7 +59,7 @@ def straighten(points, starts, person, grid, width, height):  # pragma: no cover
     return lines, outward, starts + np.arange(polygons + 1)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def circles(lines, ends):  # pragma: no cover
     """Runs of sides of closed polygons, each within a circle: circles (3, C), first side and end of each (C, 2)."""
     count = 0
@@ -81,7 +80,7 @@ def circles(lines, ends):  # pragma: no cover
     return circles, spans
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def length(lines, outward):  # pragma: no cover
     """Length of the contours on which rays are taken."""
     total = 0.0
@@ -91,7 +90,7 @@ def length(lines, outward):  # pragma: no cover
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def spread(lines, outward, step):  # pragma: no cover
     """Vertices `step` apart along the contours, as near as there are any."""
     out, n, passed = np.empty(lines.shape[0], np.int64), 0, step / 2

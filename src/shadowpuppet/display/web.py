@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import json
 import socket
 import threading
@@ -16,6 +15,7 @@ from urllib.parse import urlsplit
 from shadowpuppet.display.drawing import drawn, jpeg
 from shadowpuppet.display.view import WISHES, Display, View
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.hosts import is_loopback, known_host, shown_host
 
 PORT = 8600
 """Tried first where none is asked for."""
@@ -47,7 +47,7 @@ class WebDisplay(Display):
         self._drawn: tuple[int, bytes] = (-1, b"")
         self._changed, self._drawing = threading.Condition(), threading.Lock()
         self.server = _listening(listen, port, self)
-        self.address = f"http://{_shown_host(listen)}:{self.server.server_port}/"
+        self.address = f"http://{shown_host(listen)}:{self.server.server_port}/"
         self.where = f"at {self.address}"
 
     def __enter__(self) -> Self:
@@ -195,37 +195,6 @@ class _Handler(BaseHTTPRequestHandler):
         return f"data: {json.dumps(figures, allow_nan=False)}\n\n".encode()
 
 
-def known_host(header: str, loopback: bool) -> bool:
-    """Whether a request's Host is an address, or this machine's name; on the loopback, whether it is that.
-
-    Other sites can have their names lead here, but not an address.
-    """
-    try:
-        name = urlsplit(f"//{header}").hostname or ""
-    except ValueError:
-        return False
-    if name == "localhost":
-        return True
-    address = _address(name)
-    if address is None:
-        return not loopback and name == socket.gethostname().lower()
-    return address.is_loopback or not loopback
-
-
-def is_loopback(listen: str) -> bool:
-    """Whether an address is reached from this machine alone."""
-    address = _address(listen)
-    return listen == "localhost" or (address is not None and address.is_loopback)
-
-
-def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """An address, where a text is one."""
-    try:
-        return ipaddress.ip_address(text)
-    except ValueError:
-        return None
-
-
 def _listening(listen: str, port: int | None, display: WebDisplay) -> _Server:
     kind, why = _Server6 if ":" in listen else _Server, ""
     for tried in (PORT, 0) if port is None else (port,):
@@ -238,10 +207,3 @@ def _listening(listen: str, port: int | None, display: WebDisplay) -> _Server:
         return server
     of = f"listen: {listen}" if port is None else f"listen: {listen}, port: {port}"
     raise SettingsError(f"{of}: the page cannot be served there ({why}); --listen takes an address of this machine, --port a free port")
-
-
-def _shown_host(listen: str) -> str:
-    address = _address(listen)
-    if address is not None and address.is_unspecified:
-        return socket.gethostname()
-    return f"[{listen}]" if ":" in listen else listen

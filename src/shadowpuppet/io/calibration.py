@@ -160,8 +160,8 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
     distance = float(np.linalg.norm(T[:3, 3])) * metres
     if not distance <= FARTHEST:
         raise CalibrationError(f"translation: found {T[:3, 3].tolist()}, {distance:g} long, expected at most {FARTHEST:g} "
-                               "metres; it is probably in millimetres: divide it by 1000, or say so: --unit mm, or unit = \"mm\" in "
-                               "recording.toml")
+                               "metres; it is probably in millimetres: say so by unit = \"mm\" in recording.toml, or write it in metres, "
+                               "with `shadowpuppet info FILE --unit mm --to NEW.toml`")
     size = draft.size or (sizes(draft.name) if sizes is not None else None) or _guessed(draft, notes)
     lens = np.ravel(np.asarray(draft.distortion, float))
     if not draft.fisheye:

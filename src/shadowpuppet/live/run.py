@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.display.view import Display
+from shadowpuppet.geometry import inverse
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
@@ -27,6 +28,7 @@ from shadowpuppet.live.vigil import Vigil
 from shadowpuppet.live.warming import warm_up
 from shadowpuppet.metrics import evaluate
 from shadowpuppet.options import Options, plain_options
+from shadowpuppet.outlets.outlet import Outlets, Subject
 from shadowpuppet.pipeline import Listener, named_body
 from shadowpuppet.settings import validate
 from shadowpuppet.video.capture import Capture
@@ -44,7 +46,7 @@ class LiveListener(Listener):
         """Something that the person before the camera, or at the terminal, is to know now."""
 
     def trouble(self, message: str) -> None:
-        """No pictures come, or none that can be used."""
+        """No pictures come, or none that can be used; or what is found cannot be given to other programs."""
 
 
 class _Nobody(Exception):
@@ -53,22 +55,24 @@ class _Nobody(Exception):
 
 def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
              listener: LiveListener | None = None, display: Display | None = None,
-             clock: Callable[[], float] = time.monotonic) -> dict[str, Any] | None:
+             clock: Callable[[], float] = time.monotonic, outlets: Outlets | None = None) -> dict[str, Any] | None:
     """Track a camera until Ctrl-C, the display's wish or a film's end, into a run folder; what is in metrics.json, or None.
 
-    The folder gets what `io.run` describes, person.toml, calibration.toml and, with `LiveSettings.record`, recording/. None,
-    and no folder, where nobody was tracked. Raises a `ShadowPuppetError` where something cannot be used.
+    Every frame is given to the `outlets`, too. The folder gets what `io.run` describes, person.toml, calibration.toml and, with
+    `LiveSettings.record`, recording/. None, and no folder, where nobody was tracked. Raises a `ShadowPuppetError` where something
+    cannot be used.
     """
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
+    outlets = outlets or Outlets()
     body, joints = named_body(options.tracker.body)
     told = validate(LiveSettings, asdict(settings) | {"camera": without_secrets(settings.camera)})
     info = {"camera": told.camera, "method": "Liu 2011, one camera, live", "started": datetime.now().astimezone().isoformat("T", "seconds"),
             "settings": plain_options(options), "live": told}
     folder = Path(folder)
     try:
-        with RunWriter(folder, options.tracker.body, body.skeleton.dof_names, joints, info) as run:
-            session = _Live(run, options, settings, listener, display, clock)
+        with outlets, RunWriter(folder, options.tracker.body, body.skeleton.dof_names, joints, info) as run:
+            session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
     except _Nobody:
         return None
@@ -82,8 +86,9 @@ class _Live:
     """What belongs together while it runs."""
 
     def __init__(self, run: RunWriter, options: Options, settings: LiveSettings, listener: LiveListener, display: Display,
-                 clock: Callable[[], float]) -> None:
+                 clock: Callable[[], float], outlets: Outlets) -> None:
         self.run_, self.options, self.listener, self.display, self.clock = run, options, listener, display, clock
+        self.outlets = outlets
         person = known_person(options)
         self.feed: Feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
         full = lens(options, self.feed.size)
@@ -125,6 +130,8 @@ class _Live:
         self.listener.begin(self.session.phase)
         if self.display.where:
             self.listener.note(f"to be seen {self.display.where}")
+        if self.outlets.where:
+            self.listener.note(f"given to other programs: {self.outlets.where}")
 
     def _follow(self) -> None:
         while not (self.stop.wished or (self.capture.ended and not self.capture.newest.waiting)):
@@ -146,11 +153,20 @@ class _Live:
             return
         if self.session.newly_measured():
             self._write_beside()
+            self.outlets.begin(self._subject(outcome))
+        self.outlets.follow(outcome.frame, outcome.view.latency)
         self.run_.write(outcome.frame)
         self.frames += 1
         self.listener.advance(self.frames)
         if self.keeper is not None and outcome.view.image is not None:
             self.keeper.write(outcome.frame.time, outcome.view.image, self.session.scene, self.session.measured.guess.height)
+
+    def _subject(self, outcome: Outcome) -> Subject:
+        """Who was measured, and where they stand."""
+        picture = outcome.view.picture
+        assert picture is not None
+        base = inverse(picture.camera.T_camera_world) @ picture.T_camera_base
+        return Subject(picture.body, base, self.session.measured.guess.height)
 
     def _write_beside(self) -> None:
         """Whom and what this run was made of; anew where the person was measured anew."""
@@ -162,6 +178,8 @@ class _Live:
     def _tell(self, outcome: Outcome) -> None:
         """Say what changed, once."""
         view, now = outcome.view, self.clock()
+        if said := self.outlets.trouble():
+            self.listener.trouble(said)
         if view.trouble and np.isnan(self.broke):
             self.broke, self.breaks = now, self.breaks + 1
             self.listener.trouble(view.trouble)
@@ -175,6 +193,7 @@ class _Live:
 
     def _measures(self) -> dict[str, Any]:
         live = {"pictures": self.capture.newest.put_count, "dropped": self.session.timing.dropped, "breaks": self.breaks}
+        live |= {"outlets": counts} if (counts := self.outlets.counts()) else {}
         return {"live": live | self.session.timing.summary()}
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from shadowpuppet.kernels import compiled
 
 NEUTRAL = 128.0
 """Cr and Cb of a pixel without colour, 8 bit."""
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@compiled(nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, asked, weak, strong, label):
     """Label (H, W) pixels: 0 background, 1 differing by `weak` standard deviations, 2 by `strong`.
 
@@ -41,7 +42,7 @@ def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, aske
             label[y, x] = np.uint8(squared >= weak) + np.uint8(squared >= strong) if squared >= weak or not dark else np.uint8(3)
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@compiled(nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def contrast(planes, mean, seen, out):
     """Euclidean difference (H, W), grey levels, of `planes` uint8 and `mean` float32 (H, W, 3) in the channels of `seen` (3,)."""
     for y in range(planes.shape[0]):
@@ -52,7 +53,7 @@ def contrast(planes, mean, seen, out):
             out[y, x] = np.sqrt(seen[0] * d0 * d0 + seen[1] * d1 * d1 + seen[2] * d2 * d2)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def far_from_samples(image, samples, squared_radius, needed, out):
     """Mark pixels (H, W) of an image (H, W, C) that fewer than `needed` of the samples (N, H, W, C) are near to, all uint8."""
     for y in range(image.shape[0]):

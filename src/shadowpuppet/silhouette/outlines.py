@@ -87,7 +87,7 @@ def outline_width(people: Iterable[tuple[Mask, Contrast]]) -> int:
     layers: list[list[NDArray[np.floating]]] = [[] for _ in range(WIDEST + 1)]
     areas = list[int]()
     for mask, contrast in people:
-        areas.append(np.count_nonzero(mask))
+        areas.append(int(np.count_nonzero(mask)))
         highest = cv2.dilate(contrast * mask, np.ones((2 * WIDEST + 1, 2 * WIDEST + 1), np.uint8))
         # Outside the picture the person goes on, so the picture's border is no outline.
         depth = cv2.distanceTransform(np.pad(mask, WIDEST + 1, mode="edge"), cv2.DIST_L2, 3)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numba
 import numpy as np
+
+from shadowpuppet.kernels import compiled
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image
@@ -71,7 +72,7 @@ def _limbs(sums: np.ndarray) -> Mask:
     return ((size >= LEAST) & (light <= DARK) & ((shaded & joined) | alone)).astype(np.uint8)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
     """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 11).
 
@@ -115,7 +116,7 @@ def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _deep(parts, row, column, part):
     """Whether a pixel's neighbours but one are of its part, too: nearer to the edge its light is blurred with that beyond."""
     if row < 2 or column < 2 or row + 2 >= parts.shape[0] or column + 2 >= parts.shape[1]:

@@ -12,7 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from shadowpuppet.kernels import compiled
 
 PLACED = 22
 FAR = 1e9
@@ -27,8 +28,8 @@ TILE = 8
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 # Without reference counting ("_nrt"): the kernels make no arrays, and counting references at every call took half of the time.
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FAST, "_nrt": False}
-kernel = njit(**OPTIONS)
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FAST, "_nrt": False}
+kernel = compiled(**OPTIONS)
 
 
 @kernel

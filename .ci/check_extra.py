@@ -1,0 +1,87 @@
+"""Whether an extra does what it is for, where the wheel and it are installed: PYTHON .ci/check_extra.py EXTRA. Imports no source."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+
+def shadowpuppet(*tokens: object) -> str:
+    """What a command prints; it must succeed."""
+    program = Path(sys.executable).with_name("shadowpuppet")
+    return subprocess.run([program, *map(str, tokens)], check=True, text=True, stdout=subprocess.PIPE).stdout
+
+
+def formats(folder: Path) -> None:
+    """A table of joints becomes Parquet, and comes back."""
+    (folder / "in.csv").write_text("time,neck_x,neck_y,neck_z\n0.0,0.1,0.2,1.5\n0.1,0.1,0.25,1.5\n")
+    shadowpuppet("convert", folder / "in.csv", folder / "joints.parquet", "--quiet")
+    shadowpuppet("convert", folder / "joints.parquet", folder / "out.csv", "--quiet")
+    assert "0.25" in (folder / "out.csv").read_text()
+
+
+def report(folder: Path) -> None:
+    """A plot is drawn."""
+    from shadowpuppet.plots import AXES, COLOURS, plot_curves
+
+    plot_curves({axis: {"values": [1, 2]} | {body: [3.0, 4.0] for body in COLOURS} for axis in AXES}, folder / "curves.png")
+    assert (folder / "curves.png").stat().st_size > 1000
+
+
+def live(folder: Path) -> None:
+    """A program connects, and is told of a person."""
+    import numpy as np
+    from websockets.sync.client import connect
+
+    from shadowpuppet.bodies import average_sizes, make_body
+    from shadowpuppet.outlets.choice import open_outlets
+    from shadowpuppet.outlets.outlet import Subject
+    from shadowpuppet.outlets.settings import OutletSettings
+
+    with open_outlets(OutletSettings(websocket="0")) as outlets:
+        outlets.begin(Subject(make_body("rounded", average_sizes("rounded", 1.75)), np.eye(4)))
+        with connect(outlets.where.rpartition(" ")[2]) as connection:
+            assert json.loads(connection.recv(10))["type"] == "begin"
+
+
+def lsl(folder: Path) -> None:
+    """A stream is announced; where pylsl brings no liblsl, that is said."""
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.outlets.lsl import LslOutlet
+
+    try:
+        LslOutlet("check")
+    except SettingsError as error:
+        print(f"lsl: {error}")
+
+
+def batch(folder: Path) -> None:
+    """The scheduler's client can be loaded."""
+    import distributed
+
+    import shadowpuppet.batch.cluster
+
+    assert distributed.Client
+    assert shadowpuppet.batch.cluster
+
+
+def view(folder: Path) -> None:
+    """The viewer's library can be loaded."""
+    import viser
+
+    assert viser.ViserServer
+
+
+CHECKS = {check.__name__: check for check in (formats, report, live, lsl, batch, view)}
+
+if __name__ == "__main__":
+    extra = sys.argv[1]
+    with tempfile.TemporaryDirectory() as made:
+        CHECKS[extra](Path(made))
+    found = {finding["name"]: finding["state"] for finding in json.loads(shadowpuppet("doctor", "--json"))["findings"]}
+    if found[f"extra {extra}"] != "works" and extra != "lsl":
+        sys.exit(f"doctor says of the extra {extra}: {found[f'extra {extra}']}")
+    print(f"extra {extra}: works")

@@ -1,0 +1,32 @@
+"""The command about this machine."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+from shadowpuppet.errors import BROKEN
+from shadowpuppet.flags import AsJson
+
+
+def doctor(*, as_json: AsJson = False) -> int:
+    """Say what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, window, cameras.
+
+    Exit code 1: something that tracking needs does not work.
+    """
+    import json
+    from dataclasses import asdict
+
+    from rich.console import Console
+
+    from shadowpuppet.doctor import examine, works
+    from shadowpuppet.doctor_table import doctor_table
+    from shadowpuppet.printing import show
+
+    told = Console(stderr=True, quiet=as_json)
+    with told.status("trying what works") if told.is_terminal else nullcontext():  # not `terminal`, which needs what may be broken
+        found = examine()
+    if as_json:
+        print(json.dumps({"works": works(found), "findings": [asdict(finding) for finding in found]}, indent=1))
+    else:
+        show(*doctor_table(found))
+    return 0 if works(found) else BROKEN

@@ -1,0 +1,50 @@
+"""Frames as JSON: the first message says whose they are, then comes one a frame. docs/live.md has the schema."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.outlets.outlet import Subject, Told
+
+VERSION = 1
+"""Of the messages: it grows where a program that reads them must be changed."""
+FRAME = "right-handed, Z up: the calibration's world, or of a camera that has none its own, X right, Y away from it"
+ROTATIONS = "quaternions x, y, z, w, from the axes of who stands at zero with hanging arms (X forward, Y left, Z up) to the world"
+
+
+def beginning(subject: Subject) -> str:
+    """Who is tracked, and how the frames' lists are to be read."""
+    return _text({
+        "type": "begin", "format": "shadowpuppet", "version": VERSION, "body": subject.body.name, "height": _number(subject.height, 4),
+        "joints": subject.names, "parents": subject.parents, "angles": subject.body.skeleton.dof_names,
+        "units": {"time": "s", "length": "m", "angle": "rad"}, "frame": FRAME, "rotations": ROTATIONS,
+    })  # fmt: skip
+
+
+def framed(frame: Told) -> str:
+    """One frame; null for what is not known."""
+    turns = None
+    if frame.turns is not None:
+        turns = Rotation.from_matrix(frame.turns).as_quat(canonical=True)
+    return _text({
+        "type": "frame", "time": _number(frame.time, 6), "status": frame.status, "overlap": _number(frame.overlap, 4),
+        "age": _number(frame.age, 4), "joints": _numbers(frame.places, 5), "rotations": _numbers(turns, 6),
+        "angles": _numbers(frame.pose, 5),
+    })  # fmt: skip
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+def _number(value: float | None, digits: int) -> float | None:
+    return None if value is None or not np.isfinite(value) else round(float(value), digits)
+
+
+def _numbers(values: Array | None, digits: int) -> Any:
+    return None if values is None else (np.round(values, digits) + 0.0).tolist()

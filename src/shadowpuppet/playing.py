@@ -1,0 +1,97 @@
+"""A run's motion given to other programs at its own pace, as a live session does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.bodies import make_body
+from shadowpuppet.body import Body
+from shadowpuppet.body_animation import base_in_world
+from shadowpuppet.errors import FormatError
+from shadowpuppet.geometry import Array
+from shadowpuppet.io.person import read_person
+from shadowpuppet.io.run import read_run
+from shadowpuppet.live.run import LiveListener
+from shadowpuppet.live.stopping import Stop
+from shadowpuppet.motion import Motion, MotionFrame
+from shadowpuppet.outlets.outlet import Outlets, Subject
+
+NAP = 0.05
+"""Seconds after which Ctrl-C is heeded."""
+MOVED = 0.01
+"""How far, in metres and radians, the body's frame moves where somebody was measured anew."""
+UNMOVED = 2e-3
+"""The same, up to which it is the world's: several cameras were calibrated, and the floor is at Z = 0."""
+
+
+def play_run(folder: str | Path, outlets: Outlets, listener: LiveListener | None = None, *, speed: float = 1.0, loop: bool = False,
+             clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], None] = time.sleep) -> int:
+    """Give every frame of a run to outlets when it is due, until its end, or with `loop` until Ctrl-C; how many were given.
+
+    Times go on where the run begins again. Raises a `ShadowPuppetError` for a run that cannot be read, has no person.toml, which
+    rotations need, or has no frame with a pose.
+    """
+    listener = listener or LiveListener()
+    with outlets, Stop() as stop:
+        played = _read(Path(folder))
+        motion, given, base = played.motion, 0, np.full((4, 4), np.inf)
+        listener.note(f"given to other programs: {outlets.where}")
+        listener.begin("playing", None if loop else len(motion))
+        begun = clock()
+        for n, frame in _frames(motion, loop):
+            due = begun + (frame.time - motion.times[0]) / speed
+            while (left := due - clock()) > 0 and not stop.wished:
+                sleep(min(left, NAP))
+            if stop.wished:
+                break
+            if np.isfinite(motion.poses[n]).all() and np.abs(played.bases[n] - base).max() > MOVED:
+                base = played.bases[n]
+                outlets.begin(Subject(played.body, base, played.height, 0.0 if _is_world(base) else None))
+            outlets.follow(frame, max(clock() - due, 0.0))
+            given += 1
+            listener.advance(given)
+            if said := outlets.trouble():
+                listener.trouble(said)
+    return given
+
+
+class _Played(NamedTuple):
+    """A run, and what its rotations need."""
+
+    motion: Motion
+    body: Body
+    height: float | None
+    """Metres, shoes on."""
+    bases: Array
+    """Where the body's frame stands in the world, of shape (T, 4, 4)."""
+
+
+def _read(folder: Path) -> _Played:
+    motion, path = read_run(folder).motion, folder / "person.toml"
+    if not path.exists():
+        raise FormatError(f"{path}: found no such file, expected the person's sizes, which rotations of joints need")
+    person = read_person(path, motion.body_name)
+    body = make_body(motion.body_name, person.sizes)
+    if motion.dof_names != body.skeleton.dof_names:
+        raise FormatError(f"{folder}: found degrees of freedom that are not those of the body {body.name!r}")
+    return _Played(motion, body, person.height, np.broadcast_to(base_in_world(body, motion)[0], (len(motion), 4, 4)))
+
+
+def _frames(motion: Motion, loop: bool) -> Iterator[tuple[int, MotionFrame]]:
+    """Every frame with its number; with `loop` again and again, at later times."""
+    step = float(np.median(np.diff(motion.times))) if len(motion) > 1 else 1.0
+    length = float(motion.times[-1] - motion.times[0]) + step
+    for turn in count() if loop else (0,):
+        for n in range(len(motion)):
+            yield n, MotionFrame(float(motion.times[n]) + turn * length, str(motion.status[n]), motion.poses[n], motion.joints[n],
+                                 cost=float(motion.cost[n]), overlap=float(motion.overlap[n]))
+
+
+def _is_world(base: Array) -> bool:
+    return bool(np.abs(base - np.eye(4)).max() < UNMOVED)

@@ -1,0 +1,127 @@
+"""What works on this machine: told as it is, whatever is broken."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from shadowpuppet import cli, doctor
+from shadowpuppet.doctor import Finding, examine, works
+
+
+@pytest.fixture
+def told(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def run(*tokens):
+        code = cli.run(["doctor", *tokens])
+        said = capsys.readouterr()
+        assert said.err == ""
+        return code, said.out
+
+    return run
+
+
+def named(found: list[Finding]) -> dict[str, Finding]:
+    return {finding.name: finding for finding in found}
+
+
+def test_where_the_tests_run_the_core_works(told):
+    code, out = told()
+    assert code == 0
+    assert out.rstrip().endswith("tracking works here")
+    assert "\x1b" not in out
+    assert max(map(len, out.splitlines())) <= 80
+    for name, _, needed in doctor.CHECKS:
+        if needed:
+            assert f"\n{name}  " in "\n" + out
+
+
+def test_json_has_everything(told):
+    code, out = told("--json")
+    read = json.loads(out)
+    assert (code, read["works"]) == (0, True)
+    names = [finding["name"] for finding in read["findings"]]
+    assert {"Python", "libraries", "kernels", "films", "codecs", "processor", "window", "browser", "cameras"} <= set(names)
+    assert {f"extra {extra}" for extra in doctor.EXTRAS} <= set(names)
+    assert all(finding["remedy"] for finding in read["findings"] if finding["state"] == "missing")
+
+
+def test_every_extra_is_known():
+    from importlib.metadata import metadata
+
+    assert set(metadata("shadowpuppet").get_all("Provides-Extra") or []) <= set(doctor.EXTRAS)
+
+
+@pytest.mark.parametrize("name", ["av", "tomli_w", "cv2"])
+def test_a_library_that_cannot_be_loaded_breaks_the_core(name, told, monkeypatch):
+    monkeypatch.setitem(sys.modules, name, None)
+    code, out = told()
+    assert code == 1
+    assert "tracking does not work here: libraries" in out
+    assert doctor.REPAIR in out
+    assert f"import of {name} halted" in " ".join(out.split())
+
+
+def test_films_that_cannot_be_written_break_the_core(monkeypatch):
+    def fail(*_, **__):
+        raise OSError("no encoder\nfor H.264")
+
+    monkeypatch.setattr("shadowpuppet.video.write_frames", fail)
+    found = named(examine())["films"]
+    assert (found.state, found.told, found.needed) == ("broken", "OSError: no encoder for H.264", True)
+    assert not works([found])
+
+
+def test_films_that_come_back_wrong_break_the_core(monkeypatch):
+    from shadowpuppet import video
+
+    original = video.open_frames
+
+    def spoilt(path):
+        for frame in original(path):
+            yield frame._replace(image=255 - frame.image)
+
+    monkeypatch.setattr("shadowpuppet.video.open_frames", spoilt)
+    found = named(list(doctor._films()))["films"]
+    assert found.state == "broken"
+    assert "film.mp4: 8 of 8 frames came back, off by" in found.told
+
+
+def test_kernels_that_are_wrong_break_the_core(monkeypatch):
+    from shadowpuppet.body import Body
+
+    monkeypatch.setattr(Body, "points", lambda *_, **__: np.array([[[0, 0, 7.0]]]))
+    found = named(list(doctor._kernels()))["kernels"]
+    assert (found.state, found.needed) == ("broken", True)
+
+
+def test_what_is_not_there_is_told_with_what_would_bring_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    monkeypatch.setattr(doctor, "CODECS", {"Nonsense": "no_such_codec", "H.264": "h264"})
+    monkeypatch.setattr(doctor, "_writable", lambda _: False)
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    found = examine()
+    assert works(found)
+    assert named(found)["extra view"].remedy == "pip install 'shadowpuppet[view]'"
+    assert named(found)["codecs"].told == "H.264 can be read; not Nonsense"
+    assert "NUMBA_CACHE_DIR" in named(found)["compiled code"].remedy
+
+
+def test_a_window_that_cannot_be_opened_is_told(monkeypatch):
+    from shadowpuppet.display import choice, window
+
+    monkeypatch.setattr(choice, "has_screen", lambda: True)
+    monkeypatch.setattr(window, "no_window", lambda: "Python's tkinter is not installed")
+    (found,) = doctor._window()
+    assert (found.state, found.needed) == ("missing", False)
+    assert "apt install python3-tk" in found.remedy
+
+
+def test_an_old_python_breaks_the_core(monkeypatch):
+    monkeypatch.setattr(doctor, "LEAST", (9, 0))
+    (found,) = doctor._python()
+    assert (found.state, found.remedy) == ("broken", "install Python 9.0 or later")
