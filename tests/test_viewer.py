@@ -622,6 +622,15 @@ def test_without_viser_the_command_says_how_to_get_it(tmp_path):
     assert "pip install 'shadowpuppet[view]'" in done.stderr
 
 
+def test_a_live_session_that_cannot_begin_leaves_no_words_of_the_library(tmp_path):
+    pytest.importorskip("viser")
+    command = [sys.executable, "-m", "shadowpuppet", "live", "--show", "viewer", "--port", "0", "--camera", str(tmp_path / "none.mp4"),
+               "--height", "1.7", "--fov", "60", "-o", str(tmp_path / "run")]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "none.mp4" in done.stderr
+
+
 def test_the_command_line_brings_no_viewer():
     code = "import sys, json; import shadowpuppet.cli; print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import io
 import socket
 import threading
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -26,6 +28,8 @@ POLICY = ("default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' '
 HEADERS = {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
            "Cross-Origin-Resource-Policy": "same-origin", "Content-Security-Policy": f"{POLICY}; frame-ancestors 'none'"}  # fmt: skip
 _starting = threading.Lock()
+_leaving: dict[viser.ViserServer, Callable[[], None]] = {}
+"""What stops each open server where the program ends before somebody else did."""
 
 
 def check_viser() -> None:
@@ -48,6 +52,8 @@ def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.Vis
         free = _free_port(listen, port)
         with guarded(is_loopback(listen)) as installed, _silent():
             server = viser.ViserServer(host=listen, port=free, label="shadowpuppet", verbose=False)
+        _leaving[server] = partial(close_server, server)
+        atexit.register(_leaving[server])  # before viser's own, which prints
         if not installed() or (free and server.get_port() != free):
             close_server(server)
             raise ShadowPuppetError(f"the page cannot be served at port {free}: " + (
@@ -60,9 +66,12 @@ def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.Vis
 
 
 def close_server(server: viser.ViserServer) -> None:
-    """Stop a server."""
-    with _silent():
-        server.stop()
+    """Stop a server; nothing where it was stopped before."""
+    leave = _leaving.pop(server, None)
+    if leave is not None:
+        atexit.unregister(leave)
+        with _silent():
+            server.stop()
 
 
 def address_of(server: viser.ViserServer) -> str:
