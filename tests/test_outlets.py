@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import re
+import signal
 import socket
 import sys
 import threading
@@ -574,20 +576,23 @@ def test_a_run_without_sizes_is_refused(tmp_path, capsys):
     assert "person.toml: found no such file, expected the person's sizes, which rotations of joints need" in capsys.readouterr().err
 
 
-def test_a_loop_goes_on_with_later_times(run):
+@pytest.fixture
+def heeding():
+    """Ctrl-C is heeded, as it is not where the tests were begun in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_loop_goes_on_with_later_times(run, heeding):
     class Listener(LiveListener):
         given = 0
 
         def advance(self, frames):
             self.given = frames
             if frames == 45:
-                signal_me()
-
-    import os
-    import signal
-
-    def signal_me():
-        os.kill(os.getpid(), signal.SIGINT)
+                os.kill(os.getpid(), signal.SIGINT)
+            assert frames < 100
 
     with OscEar() as ear:
         heard_by = Listener()
