@@ -27,7 +27,8 @@ def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, 
             return WindowDisplay(FOOTERS[record])
         if show == "window":
             raise SettingsError(f"show: no window can be opened ({why}); --show browser shows the same on a page")
-    from shadowpuppet.display.web import WebDisplay, is_loopback
+    from shadowpuppet.display.web import WebDisplay
+    from shadowpuppet.hosts import is_loopback
 
     display = WebDisplay(listen, port, FOOTERS[record])
     if not is_loopback(listen):

@@ -13,8 +13,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from shadowpuppet.display.web import is_loopback, known_host
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.hosts import is_loopback, known_host
 
 if TYPE_CHECKING:
     import viser
