@@ -10,22 +10,19 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
 from shadowpuppet.options import Options
-from shadowpuppet.viewer.looking import first_wish
+from shadowpuppet.viewer.looking import first_wish, served
 from shadowpuppet.viewer.opening import show_of
 from shadowpuppet.viewer.panel import Panel
 from shadowpuppet.viewer.pictures import Look
-from shadowpuppet.viewer.server import address_of, close_server, open_server
 from shadowpuppet.viewer.show import Show
-from shadowpuppet.viewer.stage import Stage, Wish
+from shadowpuppet.viewer.stage import Wish
 
 ASSETS = Path(__file__).parent / "assets"
 SIZE, COLOURS, LARGEST = (1280, 760), (255, 160, 96, 64), 150_000
@@ -35,26 +32,10 @@ SETTLED = 6000
 """Milliseconds after which all is drawn."""
 
 
-@contextmanager
-def played(show: Show, wish: Wish) -> Iterator[tuple[str, Panel]]:
-    """A show served, and its controls."""
-    server = open_server(port=0)
-    panel = Panel(server, Stage(server, show, wish, width=480))
-    thread = threading.Thread(target=panel.follow)
-    thread.start()
-    try:
-        yield address_of(server), panel
-    finally:
-        panel.stop()
-        thread.join()
-        panel.stage.close()
-        close_server(server)
-
-
 def photographed(browser: Browser, show: Show, wish: Wish, name: str, second: float, then: Callable[[Panel], None] = lambda panel: None,
                  size: tuple[int, int] = SIZE) -> None:
     """A picture of the page at a second of the show."""
-    with played(show, wish) as (address, panel):
+    with served(show, wish, width=480) as (address, panel):
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.goto(address)
         page.wait_for_selector("canvas")

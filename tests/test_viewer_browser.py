@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -108,27 +107,8 @@ def greenish(image):
     return int(((green > red + 20) & (green > blue + 20)).sum())
 
 
-@contextmanager
-def served(show, wish):
-    """A show served in this process, and its controls."""
-    from shadowpuppet.viewer.panel import Panel
-    from shadowpuppet.viewer.server import address_of, close_server, open_server
-    from shadowpuppet.viewer.stage import Stage
-
-    server = open_server(port=0)
-    panel = Panel(server, Stage(server, show, wish))
-    thread = threading.Thread(target=panel.follow)
-    thread.start()
-    try:
-        yield address_of(server), panel
-    finally:
-        panel.stop()
-        thread.join()
-        panel.stage.close()
-        close_server(server)
-
-
 def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_program(browser, run):
+    from shadowpuppet.viewer.looking import served
     from shadowpuppet.viewer.stage import Wish
 
     show = replace(show_of(run), charts=())  # which are canvases, too

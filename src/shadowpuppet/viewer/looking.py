@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from shadowpuppet.viewer.panel import Panel
 from shadowpuppet.viewer.pictures import Look
@@ -26,6 +28,22 @@ def look(show: Show, listen: str = "127.0.0.1", port: int | None = None, wish: W
         told(address_of(server))
         panel.follow(done)
     finally:
+        close_server(server)
+
+
+@contextmanager
+def served(show: Show, wish: Wish, **more: int) -> Iterator[tuple[str, Panel]]:
+    """Serve a show beside the program that asks for it: the page's address, and its controls. `more`: of `Stage`. Raises as `look`."""
+    server = open_server(port=0)
+    panel = Panel(server, Stage(server, show, wish, **more))
+    thread = threading.Thread(target=panel.follow)
+    thread.start()
+    try:
+        yield address_of(server), panel
+    finally:
+        panel.stop()
+        thread.join()
+        panel.stage.close()
         close_server(server)
 
 
