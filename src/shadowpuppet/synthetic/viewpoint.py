@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import inverse, rigid, rotation_about, transform
+from shadowpuppet.settings import STRICT
 
-STRICT = ConfigDict(extra="forbid")
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
 Side = Annotated[int, Field(ge=16, le=4096)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
