@@ -29,12 +29,12 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
+from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig
 from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.rig_look import look_at_rig
 from shadowpuppet.rig_run import Puppet, training_of
-from shadowpuppet.tracking import MultiviewTracker
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
 
 ROWS: dict[str, dict[str, Any]] = {

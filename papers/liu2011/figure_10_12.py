@@ -12,7 +12,7 @@ from papers.liu2011.shown import stem, told
 from shadowpuppet.geometry import Array
 from shadowpuppet.overlay import draw_model, in_colour, matching
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.tracking import UNCERTAIN
+from shadowpuppet.status import UNCERTAIN
 from shadowpuppet.video import Image
 
 COLUMNS, WIDTH, GREYS = 6, 1200, 6

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from shadowpuppet.metrics import evaluate
     from shadowpuppet.motion import JointTable, Motion
     from shadowpuppet.motion_prior import MotionPrior
+    from shadowpuppet.multiview_tracker import MultiviewTracker
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.rasterize import Picture
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
-    from shadowpuppet.tracking import MonocularTracker, MultiviewTracker
+    from shadowpuppet.tracking import MonocularTracker
     from shadowpuppet.video import open_frames, write_frames
     from shadowpuppet.visual_hull import SurfacePoints, VisualHull
     from shadowpuppet.vqpca import choose_regions, fit_prior
@@ -65,7 +66,7 @@ _HOMES = {
     "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull",
     "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
     "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
-    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking", "MultiviewSettings": "settings",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "settings",
     "make_multiview_settings": "settings", "export_run": "exporting", "convert_motion": "exporting",
     "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation", "read_truth": "io.truth",
     "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",

@@ -20,9 +20,9 @@ from shadowpuppet.errors import TrackingError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.masks import Mask
+from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.sizes import HEIGHTS
-from shadowpuppet.tracking import MultiviewState, MultiviewTracker
 from shadowpuppet.visual_hull import SurfacePoints
 from shadowpuppet.whole_sizes import BoneSizes
 

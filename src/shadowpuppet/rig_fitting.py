@@ -14,12 +14,12 @@ from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.measuring import likely_height, measure, spread_of
 from shadowpuppet.motion import JointTable
+from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.priors import familiar
 from shadowpuppet.rig import Rig
 from shadowpuppet.rig_look import Opening
 from shadowpuppet.rig_run import Puppet
-from shadowpuppet.tracking import MultiviewTracker
 from shadowpuppet.visual_hull import VisualHull
 from shadowpuppet.whole_sizes import WHOLE, BoneSizes
 

@@ -24,7 +24,8 @@ from shadowpuppet.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options
 from shadowpuppet.pipeline import motion_frame, named_body, next_state
 from shadowpuppet.silhouette import learn_background
-from shadowpuppet.tracking import LOST, MonocularTracker, State
+from shadowpuppet.status import LOST
+from shadowpuppet.tracking import MonocularTracker, State
 from shadowpuppet.video import Image
 from shadowpuppet.video.feed import Snapshot
 

@@ -13,11 +13,12 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion import BONES, Motion
+from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import normalise
-from shadowpuppet.tracking import MonocularTracker, MultiviewState, MultiviewTracker, State
+from shadowpuppet.tracking import MonocularTracker, State
 from shadowpuppet.viewer.show import Cloud, Eye, Spread
 from shadowpuppet.visual_hull import VisualHull
 

@@ -1,0 +1,186 @@
+"""Ni 2008, section V: the tracker of several cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet import postures
+from shadowpuppet.body import Body
+from shadowpuppet.camera import Camera
+from shadowpuppet.evidence import Evidence, Stage
+from shadowpuppet.geometry import Array
+from shadowpuppet.likelihood import Cost
+from shadowpuppet.masks import Mask
+from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.particle_filter import Particles, Refine, Weigh, step
+from shadowpuppet.proposals import Proposals
+from shadowpuppet.refinement import Pass, Refiner
+from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
+from shadowpuppet.settings import MultiviewSettings
+from shadowpuppet.status import status_of
+from shadowpuppet.tracking import SETTLE
+from shadowpuppet.usual import Usual
+from shadowpuppet.visual_hull import SurfacePoints
+
+FEW, SMALLEST = 50, 0.5
+"""Surface points, and their extent (m), from which on somebody may be there."""
+MANY, FEWER, ENOUGH = 40, 16, 6
+"""Particles with few cameras, with many, and how many are that."""
+SUDDEN = 0.2
+"""An overlap that is less than the last one by this is as good as lost: limbs that are drawn to somebody who is elsewhere may overlap."""
+
+
+class MultiviewState(NamedTuple):
+    """What a tracker of several cameras knows after a frame; all that the next one needs."""
+
+    pose: Array
+    """The estimate, of shape (D,)."""
+    velocity: Array
+    """How it moved since the last frame, of shape (D,)."""
+    particles: Particles
+    cost: float
+    """Of the estimate, m^2."""
+    overlap: float
+    """Intersection over union of the drawn estimate and the silhouettes, the mean of all cameras."""
+    status: str
+    """`tracked`, `uncertain`, `lost` or `absent`."""
+
+
+@dataclass(frozen=True, eq=False)
+class MultiviewTracker:
+    """Ni 2008: the posture of a whole body from surface points of its visual hull, by a particle filter whose proposals come from a motion
+    prior and are refined (V). Causal, and repeatable, as `MonocularTracker`."""
+
+    body: Body
+    cameras: tuple[Camera, ...]
+    settings: MultiviewSettings = field(default_factory=MultiviewSettings)
+    prior: MotionPrior | None = None
+    """Of poses at the film's rate; None: Gaussian proposals only."""
+    library: Array | None = None
+    """Poses (L, D) that the person may begin in, such as those of the training motion; None: a few usual ones."""
+    scheme: Scheme | None = None
+    """A resampling scheme of your own, in place of the settings'."""
+
+    def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
+             also: Cost | None = None) -> MultiviewState:
+        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes back, is searched for
+        afresh (`recover`). `also`: a cost of your own, poses (N, D) to m^2 (N,), which is added to that of the surface."""
+        evidence = Evidence(self.stage, points, masks, also)
+        if not self.is_present(evidence):
+            return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
+        recover = self.settings.recover
+        if state.status == "absent" and recover:
+            return self.search(rng, evidence)
+        after = self.cycle(rng, state, evidence)
+        if recover and (after.status == "lost" or after.overlap < state.overlap - SUDDEN):
+            found = self.search(rng, evidence)
+            return found if found.overlap > after.overlap else after
+        return after
+
+    def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
+              also: Cost | None = None) -> MultiviewState:
+        """A state from one frame's points and masks (H, W): the best of many poses in all directions, refined; or `absent`."""
+        evidence = Evidence(self.stage, points, masks, also)
+        if not self.is_present(evidence):
+            rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
+            return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
+        return self.search(rng, evidence)
+
+    def cycle(self, rng: np.random.Generator, state: MultiviewState, evidence: Evidence) -> MultiviewState:
+        """The loop body of V-A: select by weight, propose, refine, weigh."""
+        s, particles, pose = self.settings, state.particles, state.pose
+        weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
+        for cycle in range(s.cycles):
+            propose = partial(self.proposals, last=pose, velocity=state.velocity, unlike=evidence.differing, scale=s.cooling**cycle)
+            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number, propose=propose)
+            weights = normalise(particles.log_weights)
+            pose = particles.best if s.estimate == "best" else weights @ particles.poses
+        return self.judge(pose, pose - state.pose, particles, evidence, weigh)
+
+    def search(self, rng: np.random.Generator, evidence: Evidence) -> MultiviewState:
+        """A state from nothing but this frame."""
+        weigh = self.weigh(evidence)
+        found = postures.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
+        state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
+        for _ in range(SETTLE):
+            state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)
+        return state._replace(velocity=np.zeros_like(state.pose))
+
+    def weigh(self, evidence: Evidence) -> Weigh:
+        """Costs (N,), m^2, and log weights (eq. 29) of poses (N, D)."""
+        s = self.settings
+
+        def weigh(poses: Array) -> tuple[Array, Array]:
+            costs = self.refiner.costs(poses, evidence.full)
+            if s.silhouettes:
+                costs = costs + s.silhouettes * evidence.differing(poses)
+            if s.posture:
+                costs = costs + s.posture * self.usual.strain(poses)
+            if evidence.also is not None:
+                costs = costs + evidence.also(poses)
+            return costs, -costs / s.sigma_cost**2
+
+        return weigh
+
+    def refine(self, evidence: Evidence, last: Array) -> Refine | None:
+        """What makes poses (N, D) better; they are pulled a little to the last pose (D,)."""
+        s, g = self.settings, self.settings.gauss_newton
+        if s.method == "particle_filter":
+            return None
+        if s.refinement == "forces" or s.method == "image_force":
+            some, half = evidence.cloud(g.share), s.forces.iterations // 2  # far from the goal, some of the points are enough
+            coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
+            return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), evidence.full, fine)
+        # many cameras' surface tells enough, and costs more time already
+        space = evidence.space if g.emptiness and len(self.cameras) < ENOUGH else None
+        coarse = Pass(evidence.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
+        fine = Pass(evidence.full, g.fine, g.fine_tau, space, g.emptiness)
+        centre, pull = self.usual.held(last, g.pull, s.posture)
+        return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
+
+    def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
+        """The state of a pose (D,), with its cost, overlap and status."""
+        overlap = evidence.overlap(pose)
+        return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, status_of(overlap))
+
+    def is_present(self, evidence: Evidence) -> bool:
+        """Whether there is enough of a person: points on a hull of a size that a person has."""
+        points = evidence.surface.points
+        return len(points) >= FEW and float(np.linalg.norm(np.ptp(points, axis=0))) > SMALLEST
+
+    @cached_property
+    def number(self) -> int:
+        """Particles."""
+        if self.settings.method == "image_force":
+            return 1
+        return self.settings.particles or (MANY if len(self.cameras) < ENOUGH else FEWER)
+
+    @cached_property
+    def stage(self) -> Stage:
+        """The body among the cameras."""
+        return Stage(self.body, self.cameras)
+
+    @cached_property
+    def refiner(self) -> Refiner:
+        """The body's half of refinement."""
+        return Refiner(self.body, self.settings.surface)
+
+    @cached_property
+    def usual(self) -> Usual:
+        """What postures are usual."""
+        return Usual.of(self.body.skeleton, self.library)
+
+    @cached_property
+    def proposals(self) -> Proposals:
+        """Where poses may be next."""
+        return Proposals(self.body.skeleton, self.settings, self.prior)
+
+    @cached_property
+    def resample(self) -> Scheme:
+        """How particles are selected."""
+        return make_scheme(self.settings.resampling, 0.0) if self.scheme is None else with_best(self.scheme)

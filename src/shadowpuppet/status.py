@@ -1,0 +1,12 @@
+"""Status of an estimate from the overlap of model and silhouette."""
+
+from __future__ import annotations
+
+ABSENT, LOST, UNCERTAIN = 0.2, 0.5, 0.7
+"""A silhouette under this share of the drawn body's area is nobody; an overlap (intersection over union) under these is lost or
+uncertain. A cardbox that fits overlaps by 0.8 to 0.9."""
+
+
+def status_of(overlap: float) -> str:
+    """What an overlap says of an estimate."""
+    return "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
