@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from shadowpuppet.euler import ORDERS, clear_order, continuous_angles
+from shadowpuppet.geometry import ORDERS, clear_order, continuous_angles
 
 
 def made(order: str, angles) -> np.ndarray:

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.clips import mirrored
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.euler import three_turns
-from shadowpuppet.geometry import Array, rotation_about
+from shadowpuppet.geometry import Array, rotation_about, three_turns
 from shadowpuppet.inverse_kinematics import _along, _Linear, _solved, fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.motion import JointTable

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from shadowpuppet.geometry import rotation_from_vector
-from shadowpuppet.procrustes import align
+from shadowpuppet.geometry import align, rotation_from_vector
 
 vectors = st.tuples(*[st.floats(-3, 3)] * 3).map(np.array)
 

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body import Body
-from shadowpuppet.euler import branch, three_turns
-from shadowpuppet.geometry import Array, rotation_about
+from shadowpuppet.geometry import Array, branch, rotation_about, three_turns, unit
 from shadowpuppet.motion import JointTable
-from shadowpuppet.plausibility import SIDES, across, middle, of, unit
+from shadowpuppet.plausibility import SIDES, across, middle, of
 from shadowpuppet.skeleton import AXES, Dof
 
 STRAIGHT = 0.15

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.geometry import Array, vector_from_rotation
+from shadowpuppet.geometry import Alignment, Array, align, vector_from_rotation
 from shadowpuppet.metrics import GROUPS, LOST, JointErrors, accelerations, bone_lengths, joint_errors
 from shadowpuppet.motion import BLANK, JointTable, Motion
-from shadowpuppet.procrustes import Alignment, align
 
 ROOTS = (("pelvis",), ("left_hip", "right_hip"), ("neck",), ("left_shoulder", "right_shoulder"))
 """What joints are told from in root-relative errors: the first that run and truth have, or the middle of two. The pelvis of a run without

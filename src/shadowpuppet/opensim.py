@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.euler import continuous_angles
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, continuous_angles
 from shadowpuppet.motion import JointTable
 
 MARKERS = {

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, unit
 from shadowpuppet.motion import JointTable
 
 SIDES = ("left", "right")
@@ -53,12 +53,6 @@ def middle(table: JointTable, joint: str) -> Array:
 def of(table: JointTable, joint: str) -> Array:
     """Places (T, 3) of a joint; not a number throughout where the table lacks it."""
     return table.positions[:, table.names.index(joint)] if joint in table.names else np.full((len(table.times), 3), np.nan)
-
-
-def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) of length one; not a number for those of none."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def across(table: JointTable) -> Array:

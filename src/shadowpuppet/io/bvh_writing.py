@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
-from shadowpuppet.euler import clear_order, continuous_angles
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, clear_order, continuous_angles
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._table import shorten
 from shadowpuppet.io.trc import METRES
