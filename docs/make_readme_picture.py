@@ -23,7 +23,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.motion import BONES
+from shadowpuppet.members import BONES
 from shadowpuppet.options import make_options
 from shadowpuppet.overlay import draw_model, draw_skeleton, write_text
 from shadowpuppet.pipeline import track_recording

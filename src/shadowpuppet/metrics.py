@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import BONES, JointTable, Motion
+from shadowpuppet.members import BONES
+from shadowpuppet.motion import JointTable, Motion
 from shadowpuppet.synchrony import in_step, match
 
 UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")

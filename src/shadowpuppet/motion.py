@@ -19,14 +19,6 @@ BLANK = ("lost", "absent")
 """Statuses of frames that have no pose and no joints: there is no honest value."""
 SERIES = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
 """The fields of a `Motion` that have a row a frame."""
-BONES = (
-    ("pelvis", "neck"), ("neck", "head"),
-    ("neck", "left_shoulder"), ("left_shoulder", "left_elbow"), ("left_elbow", "left_wrist"), ("left_wrist", "left_hand"),
-    ("neck", "right_shoulder"), ("right_shoulder", "right_elbow"), ("right_elbow", "right_wrist"), ("right_wrist", "right_hand"),
-    ("pelvis", "left_hip"), ("left_hip", "left_knee"), ("left_knee", "left_ankle"),
-    ("pelvis", "right_hip"), ("right_hip", "right_knee"), ("right_knee", "right_ankle"),
-)
-"""Pairs of joints with a bone between them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.motion import BONES
+from shadowpuppet.members import BONES
 
 if TYPE_CHECKING:  # both bring much with them
     from shadowpuppet.rasterize import Picture

@@ -9,7 +9,8 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError
 from shadowpuppet.io._table import shorten
-from shadowpuppet.motion import BONES, JointTable
+from shadowpuppet.members import BONES
+from shadowpuppet.motion import JointTable
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
 """Ours."""

@@ -15,8 +15,9 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.footage import footage_of, opened
 from shadowpuppet.geometry import Array
+from shadowpuppet.members import BONES
 from shadowpuppet.metrics import LOST
-from shadowpuppet.motion import BLANK, BONES, JointTable
+from shadowpuppet.motion import BLANK, JointTable
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.overlay import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.rig import chosen_views

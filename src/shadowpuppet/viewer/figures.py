@@ -10,7 +10,8 @@ from shadowpuppet.animation import Animation
 from shadowpuppet.body import Body
 from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import BONES, JointTable
+from shadowpuppet.members import BONES
+from shadowpuppet.motion import JointTable
 from shadowpuppet.puppet_mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.viewer.show import Figure
 

@@ -12,7 +12,8 @@ from shadowpuppet.body_animation import fitted
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import BONES, Motion
+from shadowpuppet.members import BONES
+from shadowpuppet.motion import Motion
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate
