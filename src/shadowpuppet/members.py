@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.angles import angles_of
 from shadowpuppet.body import SIDES, Body
 from shadowpuppet.geometry import Array, rotation_about
-from shadowpuppet.joint_frames import angles_of
 from shadowpuppet.skeleton import Dof, Skeleton
 
 
