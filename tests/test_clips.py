@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.clips import mirrored, resampled, resampled_table, without_gaps
+from shadowpuppet.clips import mirrored, without_gaps
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion import JointTable
+from shadowpuppet.steady import resampled, resampled_table
 
 NAMES = ("pelvis", "left_hip", "left_knee", "right_hip", "right_knee")
 

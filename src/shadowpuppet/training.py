@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.bodies import average_sizes, make_body
-from shadowpuppet.clips import mirrored, resampled, resampled_table, without_gaps
+from shadowpuppet.clips import mirrored, without_gaps
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
@@ -19,6 +19,7 @@ from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.settings import PriorSettings
 from shadowpuppet.skeleton import Skeleton
+from shadowpuppet.steady import resampled, resampled_table
 from shadowpuppet.vqpca import Choice, Fit, choose_regions, fit_prior
 from shadowpuppet.whole_skeleton import GLOBAL
 

@@ -10,14 +10,13 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.clips import resampled
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._table import shorten
 from shadowpuppet.io.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
 from shadowpuppet.motion import JointTable
-from shadowpuppet.steady import steady
+from shadowpuppet.steady import resampled, steady
 
 MM = 1000.0
 """The file's unit: millimetres of a metre."""
