@@ -13,8 +13,9 @@ from shadowpuppet.body import BODIES, CardboxSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, VideoError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.overlay import OverlayWriter, draw_model, matching, overlay_frame
+from shadowpuppet.overlay import draw_model, matching, overlay_frame
 from shadowpuppet.rasterize import Picture, unpack
+from shadowpuppet.rig_overlay import OverlayWriter
 from shadowpuppet.video import open_frames
 
 SIZES = CardboxSizes(*(1.8 * share for share in (

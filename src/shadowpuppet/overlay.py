@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +13,7 @@ from shadowpuppet.members import BONES
 
 if TYPE_CHECKING:  # both bring much with them
     from shadowpuppet.rasterize import Picture
-    from shadowpuppet.video import FrameWriter, Image
+    from shadowpuppet.video import Image
 
 # Colours (blue, green, red) that people who see colours differently tell apart: Okabe & Ito 2008.
 BLACK, GREY, WHITE = (0, 0, 0), (96, 96, 96), (255, 255, 255)
@@ -95,31 +94,6 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
     for radius, colour in ((3, BLACK), (2, WHITE)):
         for dot in dots:
             cv2.circle(image, dot, round(radius * unit) << SUBPIXEL, colour, -1, cv2.LINE_AA, SUBPIXEL)
-
-
-class OverlayWriter:
-    """A film of overlays: `with OverlayWriter("overlay.mp4", 25, picture) as film: film.write(image, mask, pose, ...)`."""
-
-    def __init__(self, path: str | Path, rate: float, picture: Picture) -> None:
-        """`rate`: frames/s. Raises `VideoError` for endings that are no film's, and later where it cannot be written."""
-        from shadowpuppet.video import write_frames
-
-        self.picture = picture
-        self._film: FrameWriter = write_frames(path, rate)
-
-    def __enter__(self) -> Self:
-        """Use it in a `with` block."""
-        self._film.__enter__()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Finish the film; after an error what there is can be played from `<name>.part.<ending>`."""
-        self._film.__exit__(kind)
-
-    def write(self, image: Image, mask: ArrayLike, pose: ArrayLike, *, status: str, time: float, overlap: float = np.nan,
-              ignore: ArrayLike | None = None) -> None:
-        """Add a frame; the arguments are those of `overlay_frame`."""
-        self._film.write(overlay_frame(image, mask, self.picture, pose, status=status, time=time, overlap=overlap, ignore=ignore))
 
 
 def in_colour(image: Image) -> Image:

@@ -22,12 +22,12 @@ from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.look import Look, Prepared, check, prepare
 from shadowpuppet.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options, plain_options
-from shadowpuppet.overlay import OverlayWriter
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.repeats import Repeats
 from shadowpuppet.rig import chosen_views, open_rig
 from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.rig_look import RigLook, check_rig, look_at_rig
+from shadowpuppet.rig_overlay import OverlayWriter
 from shadowpuppet.rig_run import Puppet, track_rig, training_of
 from shadowpuppet.running import (
     FALLBACK_RATE,

@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shadowpuppet.motion import MotionFrame
-from shadowpuppet.overlay import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, write_text
+from shadowpuppet.overlay import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, overlay_frame, write_text
+from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import FrameSet
+from shadowpuppet.video import FrameWriter, Image
 
 if TYPE_CHECKING:  # both bring much with them
     from shadowpuppet.masks import Mask
@@ -97,3 +100,28 @@ class RigOverlayWriter:
     def write(self, seen: FrameSet, frame: MotionFrame) -> None:
         """Add a set of pictures with what was found in them."""
         self._film.write(rig_overlay(seen, frame, self.pictures))
+
+
+class OverlayWriter:
+    """A film of overlays: `with OverlayWriter("overlay.mp4", 25, picture) as film: film.write(image, mask, pose, ...)`."""
+
+    def __init__(self, path: str | Path, rate: float, picture: Picture) -> None:
+        """`rate`: frames/s. Raises `VideoError` for endings that are no film's, and later where it cannot be written."""
+        from shadowpuppet.video import write_frames
+
+        self.picture = picture
+        self._film: FrameWriter = write_frames(path, rate)
+
+    def __enter__(self) -> Self:
+        """Use it in a `with` block."""
+        self._film.__enter__()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Finish the film; after an error what there is can be played from `<name>.part.<ending>`."""
+        self._film.__exit__(kind)
+
+    def write(self, image: Image, mask: ArrayLike, pose: ArrayLike, *, status: str, time: float, overlap: float = np.nan,
+              ignore: ArrayLike | None = None) -> None:
+        """Add a frame; the arguments are those of `overlay_frame`."""
+        self._film.write(overlay_frame(image, mask, self.picture, pose, status=status, time=time, overlap=overlap, ignore=ignore))
