@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, humaneva, named_specs, proving_ground, proving_rings
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.spec import Bystander, Gesture, Scene, Spec, spec_from
+from shadowpuppet.synthetic.script import Gesture
+from shadowpuppet.synthetic.spec import Bystander, Scene, Spec, spec_from
 from shadowpuppet.synthetic.specfile import read_spec, spec_text
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 

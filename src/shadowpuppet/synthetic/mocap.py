@@ -20,7 +20,7 @@ from shadowpuppet.synthetic.mannequin import Mannequin
 
 if TYPE_CHECKING:
     from shadowpuppet.io.amc import Capture
-    from shadowpuppet.synthetic.spec import Gesture
+    from shadowpuppet.synthetic.script import Gesture
 
 Points = dict[str, Array]
 

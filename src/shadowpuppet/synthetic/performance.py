@@ -16,7 +16,7 @@ from shadowpuppet.synthetic.mannequin import Mannequin
 from shadowpuppet.synthetic.whole_body import ACTS
 
 if TYPE_CHECKING:
-    from shadowpuppet.synthetic.spec import Gesture
+    from shadowpuppet.synthetic.script import Gesture
 
 BLEND = 0.4
 """Seconds before and after the change from one part to the next over which trunk and arms go from one to the other."""

@@ -12,7 +12,8 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.spec import Gesture, Spec, spec_from, spec_values
+from shadowpuppet.synthetic.script import Gesture
+from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.viewpoint import STRICT
 from shadowpuppet.synthetic.walls import Background
 

@@ -13,44 +13,9 @@ from pydantic.dataclasses import dataclass
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic.furniture import Furniture, Obstacle, Place
 from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.paths import PathName
+from shadowpuppet.synthetic.script import Gesture
 from shadowpuppet.synthetic.viewpoint import STRICT, Name, Ring, Viewpoint
 from shadowpuppet.synthetic.walls import Background
-
-MotionName = Literal[
-    "stand", "wave_hands", "bend_aside", "bow_forward", "twist", "reach", "forearms_up", "overhead", "random",
-    "walk", "jog", "box", "lift", "squat", "sit", "march", "jump", "turn_around", "random_body", "mocap",
-]  # fmt: skip
-
-
-@dataclass(frozen=True, config=STRICT, kw_only=True)
-class Gesture:
-    """A motion and how long it takes."""
-
-    motion: MotionName
-    """Its name: a gesture of the arms and trunk, an act of the whole body, `walk`, `jog`, or `mocap` from a file."""
-    seconds: Annotated[float, Field(ge=2, le=3600)] = 4.0
-    """Its length; of a file no more than there is."""
-    speed: Annotated[float, Field(ge=0.4, le=5)] | None = None
-    """Of walk (0.4 to 2.0) and jog (1.6 to 5), m/s; without it a comfortable one."""
-    path: PathName = "circle"
-    """Where walk and jog go: a circle or ellipse to the left, a line there and back, or on the spot as on a treadmill."""
-    size: Annotated[float, Field(ge=0.5, le=20)] = 1.2
-    """Radius of the circle, half the longer axis of the ellipse, length of the line, metres."""
-    file: str | None = None
-    """Motion capture to play (`mocap`): a .amc file; its skeleton, the .asf file, lies beside it."""
-    start: Annotated[float, Field(ge=0)] = 0.0
-    """Seconds of the file to leave out."""
-    file_rate: Annotated[float, Field(gt=0, le=1000)] = 120.0
-    """Frames a second of the file."""
-
-    def __post_init__(self) -> None:
-        """A speed must fit the gait, and motion capture needs a file."""
-        low, high = {"walk": (0.4, 2.0), "jog": (1.6, 5.0)}.get(self.motion, (0.0, 5.0))
-        if self.speed is not None and not low <= self.speed <= high:
-            raise ValueError(f"speed: found {self.speed:g}, expected {low:g} to {high:g} for {self.motion}")
-        if (self.motion == "mocap") != (self.file is not None):
-            raise ValueError("file: needed by the motion mocap, and only by it")
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
