@@ -17,9 +17,9 @@ from shadowpuppet.initialization import Guess
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import prepare
 from shadowpuppet.metrics import UPPER, joint_errors
+from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options, make_options
-from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.tracking import MonocularTracker
 
 ALIGNED = [name.replace("hand", "wrist") for name in UPPER]

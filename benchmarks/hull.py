@@ -19,7 +19,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.masks import Mask
-from shadowpuppet.settings import HullSettings
+from shadowpuppet.multiview_settings import HullSettings
 from shadowpuppet.video import open_frames
 from shadowpuppet.visual_hull import VisualHull, _silhouette
 

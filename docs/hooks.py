@@ -23,8 +23,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import tomli_w
 
-from shadowpuppet.options import Options, default_of, settings_of
-from shadowpuppet.settings import MULTIVIEW_PRESETS, PRESETS
+from shadowpuppet.monocular_settings import PRESETS
+from shadowpuppet.multiview_settings import MULTIVIEW_PRESETS
+from shadowpuppet.options import Options
+from shadowpuppet.settings import default_of, settings_of
 from shadowpuppet.synthetic.spec import TABLES, Spec
 
 MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)

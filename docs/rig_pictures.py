@@ -21,11 +21,11 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
+from shadowpuppet.multiview_settings import ForceSettings
 from shadowpuppet.options import Options
 from shadowpuppet.overlay import draw_model
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.refinement import Refiner
-from shadowpuppet.settings import ForceSettings
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Ring, Spec
 from shadowpuppet.video import open_frames, write_image

@@ -21,8 +21,8 @@ from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation, silhouette_costs
+from shadowpuppet.monocular_settings import make_settings
 from shadowpuppet.plots import plot_curves
-from shadowpuppet.settings import make_settings
 
 ISSUED = ("particle_us", "arm_us", "ratio_opencv_full", "ratio_opencv_arm", "ratio_naive_frame", "ratio_boxes", "step_fps", "default_fps",
           "chain_fps", "peak_mb", "growth_mb")

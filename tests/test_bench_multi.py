@@ -14,8 +14,8 @@ from shadowpuppet.bench.timing import Times, in_turns
 from shadowpuppet.forces import push
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import read_recording
+from shadowpuppet.multiview_settings import ForceSettings, make_multiview_settings
 from shadowpuppet.plots import plot_curves
-from shadowpuppet.settings import ForceSettings, make_multiview_settings
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video import open_frames
 

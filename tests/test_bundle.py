@@ -16,7 +16,7 @@ from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.bundle import solve_bundle
 from shadowpuppet.closest import LANES, Cloud, make_cloud
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.settings import SurfaceSettings
+from shadowpuppet.multiview_settings import SurfaceSettings
 from shadowpuppet.whole_body import anatomical
 from shadowpuppet.whole_sizes import AnatomicalSizes
 

@@ -15,8 +15,8 @@ from shadowpuppet.fitting import wrong_posture
 from shadowpuppet.hypotheses import Bodies, Guess, Hypotheses
 from shadowpuppet.initialization import POSTURES, Fit, find_person, fit_references, refine
 from shadowpuppet.likelihood import Observation, silhouette_costs
+from shadowpuppet.monocular_settings import InitializationSettings
 from shadowpuppet.rasterize import Picture, place, unpack
-from shadowpuppet.settings import InitializationSettings
 from shadowpuppet.sizes import SUBSETS, CardboxSizes
 
 CAMERA = camera((320, 240))

@@ -13,7 +13,7 @@ from shadowpuppet.anthropometry import shares_of
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.measuring import EXACT, SHOWN, measure, seen_height, spread_of
-from shadowpuppet.settings import MultiviewSettings
+from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.visual_hull import SurfacePoints
 from shadowpuppet.whole_body import anatomical
 from shadowpuppet.whole_sizes import WHOLE, AnatomicalSizes

@@ -14,10 +14,11 @@ import actor
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.multiview_settings import MultiviewSettings, make_multiview_settings
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.particle_filter import evaluate
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.resampling import normalise
-from shadowpuppet.settings import MultiviewSettings, PriorSettings, make_multiview_settings
 from shadowpuppet.visual_hull import SurfacePoints
 from shadowpuppet.vqpca import fit_prior
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 import shadowpuppet
-from shadowpuppet.options import Options, settings_of
+from shadowpuppet.options import Options
+from shadowpuppet.settings import settings_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "shadowpuppet"

@@ -16,7 +16,7 @@ from papers.common import runner
 from papers.common.experiment import Request
 from papers.ni2008 import figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
 from papers.ni2008.__main__ import EXPERIMENTS, main
-from shadowpuppet.settings import make_multiview_settings
+from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.synthetic import Ring, Scene, Spec, humaneva, synthesize
 from shadowpuppet.synthetic.shorthand import gestures_from
 

@@ -10,8 +10,8 @@ import pytest
 import actor
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
-from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.subspaces import Subspaces
 from shadowpuppet.usual import usual_arms
 

@@ -20,10 +20,10 @@ from shadowpuppet.bodies import make_body as make_named
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_about
+from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.part_sums import EQUATIONS, gather_down, sweep
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.screws import place_one
-from shadowpuppet.settings import ForceSettings, SurfaceSettings
 from shadowpuppet.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.whole_sizes import WHOLE
 

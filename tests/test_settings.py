@@ -11,24 +11,20 @@ import pytest
 
 from shadowpuppet.bodies import ALL
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.options import Options, make_options
-from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.settings import (
+from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings
+from shadowpuppet.multiview_settings import (
     MULTIVIEW_PRESETS,
-    PRESETS,
     ForceSettings,
     GaussNewtonSettings,
     HullSettings,
-    InitializationSettings,
-    MonocularSettings,
     MultiviewSettings,
-    PartSettings,
-    PriorSettings,
     SurfaceSettings,
     make_multiview_settings,
-    make_settings,
-    validate,
 )
+from shadowpuppet.options import Options, make_options
+from shadowpuppet.prior_settings import PriorSettings
+from shadowpuppet.resampling import SCHEMES
+from shadowpuppet.settings import validate
 from shadowpuppet.silhouette import SilhouetteSettings
 from shadowpuppet.whole_sizes import WHOLE
 

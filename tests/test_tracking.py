@@ -14,9 +14,9 @@ from shadowpuppet.errors import SettingsError, TrackingError
 from shadowpuppet.first_pose import search
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation, silhouette_costs
+from shadowpuppet.monocular_settings import MonocularSettings, make_settings
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.settings import MonocularSettings, make_settings
 from shadowpuppet.tracking import MonocularTracker, State
 
 FLAT = ("torso+left_arm+right_arm",)

@@ -14,7 +14,7 @@ from movers import walk
 from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.motion import JointTable
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.training import GLOBAL, matched, modelled, train_prior
 

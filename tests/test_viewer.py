@@ -30,7 +30,7 @@ from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.viewer.curves import AROUND, data_around, limits
 from shadowpuppet.viewer.figures import of_animation, of_poses, of_table
 from shadowpuppet.viewer.of_prior import body_of as body_of_prior

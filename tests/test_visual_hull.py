@@ -17,7 +17,7 @@ from shadowpuppet.camera import Camera
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector, transform
 from shadowpuppet.io.calibration import read_calibration
-from shadowpuppet.settings import HullSettings
+from shadowpuppet.multiview_settings import HullSettings
 from shadowpuppet.video import open_frames
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull, _silhouette
 from solids import Box, Ellipsoid, looking, masks_of, ring

@@ -12,7 +12,7 @@ from scipy.special import xlogy
 
 from motions import gait, prior, walk
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.vqpca import Fit, _fill, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
 
 seeds = st.integers(0, 2**32 - 1)

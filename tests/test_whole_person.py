@@ -15,10 +15,10 @@ from shadowpuppet.hypotheses import Guess
 from shadowpuppet.initialization import Fit, as_whole, find_person
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.members import steady
+from shadowpuppet.monocular_settings import InitializationSettings, make_settings
 from shadowpuppet.options import Options
 from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.rig_fitting import prepare_puppet
-from shadowpuppet.settings import InitializationSettings, make_settings
 from shadowpuppet.tracking import MonocularTracker
 from shadowpuppet.whole_person import whole_person
 from shadowpuppet.whole_sizes import WHOLE

@@ -14,9 +14,10 @@ from shadowpuppet.body import Hulls, Quads, cardbox, rounded
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.hypotheses import Bodies, Guess
 from shadowpuppet.initialization import find_person, fit_references
+from shadowpuppet.monocular_settings import InitializationSettings, make_settings
+from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.settings import InitializationSettings, make_multiview_settings, make_settings
 from shadowpuppet.tracking import MonocularTracker, State
 
 BRIEF = InitializationSettings(rounds=3, sweeps=1)

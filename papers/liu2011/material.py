@@ -23,10 +23,10 @@ from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import Prepared, check, prepare
 from shadowpuppet.making import make_recording
 from shadowpuppet.metrics import match
+from shadowpuppet.monocular_settings import MonocularSettings, make_settings
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options, make_options, plain_options
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.settings import MonocularSettings, make_settings
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.motions import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from

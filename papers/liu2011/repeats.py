@@ -19,9 +19,9 @@ from shadowpuppet.batch import BatchListener, make_grid, run_batch
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.run import write_metrics
+from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.running import Listener
-from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking import MonocularTracker
 

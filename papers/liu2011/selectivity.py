@@ -13,8 +13,8 @@ from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import METHODS, repeat, with_method
 from papers.liu2011.shown import stem, told
 from papers.liu2011.sweeps import COLUMNS, Measured, cells, finish, measured, plot
+from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.resampling import normalise
-from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.tracking import MonocularTracker
 
 SHARES, FEW = (1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125), (1.0, 0.0625)

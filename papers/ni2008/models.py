@@ -13,9 +13,9 @@ from shadowpuppet.bodies import average_sizes, make_body
 from shadowpuppet.body import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.limbs import Limbs
+from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.overlay import draw_model
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.settings import make_multiview_settings
 from shadowpuppet.synthetic import Viewpoint
 
 HEIGHT, LIFT = 1.75, 0.95

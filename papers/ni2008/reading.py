@@ -22,11 +22,11 @@ from shadowpuppet.io.recording import read_recording
 from shadowpuppet.masks import Mask
 from shadowpuppet.measuring import measure, spread_of
 from shadowpuppet.motion import JointTable
+from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.options import make_options
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import follow, open_rig
 from shadowpuppet.rig_look import check_rig, look_at_rig
-from shadowpuppet.settings import make_multiview_settings
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull

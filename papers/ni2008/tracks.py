@@ -21,8 +21,9 @@ from papers.ni2008.inputs import BODY, Case, key_of, opened
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion import JointTable
+from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.multiview_tracker import MultiviewTracker
-from shadowpuppet.settings import PriorSettings, make_multiview_settings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.training import modelled
 from shadowpuppet.vqpca import Fit, fit_prior
 

@@ -27,21 +27,16 @@ if TYPE_CHECKING:
     from shadowpuppet.io.truth import read_truth
     from shadowpuppet.look import Look
     from shadowpuppet.metrics import evaluate
+    from shadowpuppet.monocular_settings import MonocularSettings, make_settings
     from shadowpuppet.motion import JointTable, Motion
     from shadowpuppet.motion_prior import MotionPrior
+    from shadowpuppet.multiview_settings import HullSettings, MultiviewSettings, make_multiview_settings
     from shadowpuppet.multiview_tracker import MultiviewTracker
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
+    from shadowpuppet.prior_settings import PriorSettings
     from shadowpuppet.rasterize import Picture
     from shadowpuppet.report.page import write_report
-    from shadowpuppet.settings import (
-        HullSettings,
-        MonocularSettings,
-        MultiviewSettings,
-        PriorSettings,
-        make_multiview_settings,
-        make_settings,
-    )
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
@@ -60,14 +55,14 @@ _HOMES = {
     "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",
     "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "metrics", "JointTable": "motion", "Motion": "motion",
     "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
-    "Picture": "rasterize", "MonocularSettings": "settings", "make_settings": "settings", "SilhouetteSettings": "silhouette",
+    "Picture": "rasterize", "MonocularSettings": "monocular_settings", "make_settings": "monocular_settings", "SilhouetteSettings": "silhouette",
     "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video",
-    "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
-    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "settings", "SurfacePoints": "visual_hull",
+    "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "prior_settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
+    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "multiview_settings", "SurfacePoints": "visual_hull",
     "VisualHull": "visual_hull", "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics",
     "AnatomicalSizes": "whole_sizes", "CylinderSizes": "whole_sizes",
-    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "settings",
-    "make_multiview_settings": "settings", "export_run": "exporting", "convert_motion": "exporting",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "multiview_settings",
+    "make_multiview_settings": "multiview_settings", "export_run": "exporting", "convert_motion": "exporting",
     "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation", "read_truth": "io.truth",
     "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",
 }  # fmt: skip

@@ -16,8 +16,8 @@ from shadowpuppet.body import Body
 from shadowpuppet.closest import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel
+from shadowpuppet.multiview_settings import SurfaceSettings
 from shadowpuppet.screws import Chain, make_chain, place_one
-from shadowpuppet.settings import SurfaceSettings
 from shadowpuppet.sizes import Sizes
 
 Measured = TypeVar("Measured", bound=Sizes)

@@ -13,9 +13,10 @@ from pydantic import BeforeValidator
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.options import PATHS, Options, default_of, make_options, over, read_options, settings_of
+from shadowpuppet.options import PATHS, Options, make_options, over, read_options
 from shadowpuppet.outlets.settings import OutletSettings
-from shadowpuppet.settings import PriorSettings, validate
+from shadowpuppet.prior_settings import PriorSettings
+from shadowpuppet.settings import default_of, settings_of, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values

@@ -8,10 +8,10 @@ from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.members import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
+from shadowpuppet.monocular_settings import MonocularSettings, pixel_scale
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
-from shadowpuppet.settings import MonocularSettings, pixel_scale
 
 WANDER, AROUND = 0.3, 0.2
 """Where a stage explores: deviation of the torso's angles from upright, and of a limb's from a coarse one, rad."""

@@ -17,8 +17,8 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import Mask
+from shadowpuppet.monocular_settings import InitializationSettings, pixel_scale
 from shadowpuppet.rasterize import Picture, place
-from shadowpuppet.settings import InitializationSettings, pixel_scale
 from shadowpuppet.sizes import CardboxSizes, Sizes
 
 NAMES = CardboxSizes.names()

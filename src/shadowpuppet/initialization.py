@@ -16,8 +16,8 @@ from shadowpuppet.first_pose import beside, search
 from shadowpuppet.geometry import Array
 from shadowpuppet.hypotheses import Guess, Hypotheses
 from shadowpuppet.masks import NEARLY_ALL, Mask, check_mask, may_be_person
+from shadowpuppet.monocular_settings import InitializationSettings
 from shadowpuppet.rasterize import place
-from shadowpuppet.settings import InitializationSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.whole_person import whole_person
 from shadowpuppet.whole_sizes import WHOLE, BoneSizes

@@ -20,8 +20,8 @@ from shadowpuppet.errors import TrackingError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.masks import Mask
+from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.sizes import HEIGHTS
 from shadowpuppet.visual_hull import SurfacePoints
 from shadowpuppet.whole_sizes import BoneSizes

@@ -17,11 +17,11 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Cost
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.particle_filter import Particles, Refine, Weigh, step
 from shadowpuppet.proposals import Proposals
 from shadowpuppet.refinement import Pass, Refiner
 from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
-from shadowpuppet.settings import MultiviewSettings
 from shadowpuppet.status import status_of
 from shadowpuppet.tracking import SETTLE
 from shadowpuppet.usual import Usual

@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, fields, is_dataclass
-from dataclasses import Field as DataclassField
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.settings import (
-    MULTIVIEW_PRESETS,
-    PRESETS,
-    InitializationSettings,
-    MonocularSettings,
-    MultiviewSettings,
-    PriorSettings,
-    checked,
-    make_multiview_settings,
-    make_settings,
-    validate,
-)
+from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
+from shadowpuppet.multiview_settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
+from shadowpuppet.prior_settings import PriorSettings
+from shadowpuppet.settings import checked, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres
 from shadowpuppet.whole_sizes import WHOLE
@@ -162,30 +151,6 @@ def plain_options(options: Options) -> dict[str, Any]:
 def options_text(options: Options) -> str:
     """Every option with its explanation, as a TOML file of settings."""
     return "\n".join(_lines(options, ""))
-
-
-def settings_of(kind: type) -> Iterator[tuple[DataclassField, Any, str]]:
-    """Every setting of a settings class: its field, its type, and what its docstring says."""
-    hints, told = get_type_hints(kind, include_extras=True), _docstrings(kind)
-    for field in fields(kind):
-        yield field, hints[field.name], told.get(field.name, "")
-
-
-def default_of(field: DataclassField) -> Any:
-    """What a setting is when it is left out; pydantic wraps some defaults."""
-    default = getattr(field.default, "default", field.default)
-    return field.default_factory() if default is MISSING and field.default_factory is not MISSING else default
-
-
-def _docstrings(kind: type) -> dict[str, str]:
-    """What is written under each field of a class."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
-    assert isinstance(tree, ast.ClassDef)
-    told = {}
-    for field, below in zip(tree.body, tree.body[1:]):
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
-            told[field.target.id] = " ".join(str(ast.literal_eval(below.value)).split())
-    return told
 
 
 def _plain(value: Any) -> Any:

@@ -18,7 +18,7 @@ from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.options import Options
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.training import RATE, Trained, matched, train_prior

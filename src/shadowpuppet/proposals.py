@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.settings import MultiviewSettings
+from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.usual import usual_arms
 from shadowpuppet.whole_skeleton import GLOBAL

@@ -16,9 +16,9 @@ from shadowpuppet.forces import push
 from shadowpuppet.free_space import FreeSpace, free_space, push_inside, spheres_in
 from shadowpuppet.geometry import Array
 from shadowpuppet.kernels import kernel
+from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.part_sums import COST, EQUATIONS, FORCES, MODULATED, ROBUST, SUMS, gather_down, sweep
 from shadowpuppet.screws import STEP, TRANSLATION, make_chain, place_one
-from shadowpuppet.settings import ForceSettings, SurfaceSettings
 
 
 class Pass(NamedTuple):

@@ -14,10 +14,10 @@ from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Cost, Observation
 from shadowpuppet.masks import Mask, check_mask
 from shadowpuppet.members import dofs_of, limbs_of
+from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.rasterize import Picture, count
 from shadowpuppet.resampling import Scheme
-from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.status import ABSENT, status_of
 
 SETTLE = 10

@@ -17,7 +17,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
 from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.steady import resampled, resampled_table
 from shadowpuppet.vqpca import Choice, Fit, choose_regions, fit_prior

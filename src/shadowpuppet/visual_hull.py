@@ -18,8 +18,8 @@ from shadowpuppet.contours import trace
 from shadowpuppet.errors import CalibrationError, TrackingError
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.masks import Mask, check_mask, may_be_person
+from shadowpuppet.multiview_settings import HullSettings
 from shadowpuppet.projection import make_lens
-from shadowpuppet.settings import HullSettings
 from shadowpuppet.viewing_edges import circles, cut, length, spread, straighten
 
 GRID = 4

@@ -19,7 +19,7 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.hidden_markov import posterior
 from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.subspaces import Regions, Subspaces, principal_subspaces
 
 GREATEST = 1e9

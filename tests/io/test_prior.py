@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from motions import gait, prior
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.prior import read_prior, write_prior
-from shadowpuppet.settings import PriorSettings
+from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.vqpca import fit_prior
 
 

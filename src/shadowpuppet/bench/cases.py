@@ -15,8 +15,8 @@ from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
+from shadowpuppet.monocular_settings import make_settings
 from shadowpuppet.rasterize import Picture, place, unpack
-from shadowpuppet.settings import make_settings
 from shadowpuppet.tracking import MonocularTracker
 
 SIZE = (320, 240)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.hierarchy import FilterStage
+from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.settings import MonocularSettings
 from shadowpuppet.skeleton import AXES, Skeleton
 
 Mask = NDArray[np.bool_]

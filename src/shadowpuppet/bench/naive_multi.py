@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body import Body
 from shadowpuppet.geometry import Array, rotation_about, rotation_from_vector
 from shadowpuppet.limbs import Limbs
-from shadowpuppet.settings import ForceSettings, SurfaceSettings
+from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.skeleton import AXES, Skeleton
 
 FLAT = 1e-4

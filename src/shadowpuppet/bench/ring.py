@@ -17,10 +17,10 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.multiview_settings import ForceSettings, MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.refinement import Refiner
-from shadowpuppet.settings import ForceSettings, MultiviewSettings
 from shadowpuppet.synthetic import Ring
 from shadowpuppet.training import RATE, train_prior
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
