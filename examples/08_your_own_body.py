@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 import shadowpuppet as sp
-from shadowpuppet.body import Quads, cardbox
+from shadowpuppet.body import cardbox
+from shadowpuppet.limbs import Quads
 from shadowpuppet.synthetic import Spec, synthesize
 
 

@@ -10,11 +10,10 @@ import made_rig
 import naive_limbs
 from scans import scan
 from shadowpuppet.bodies import average_sizes, make_body
-from shadowpuppet.body import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Limbs
+from shadowpuppet.limbs import Body, Limbs
 from shadowpuppet.masks import Mask
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.skeleton import Skeleton

@@ -11,21 +11,10 @@ import pytest
 
 from people import SIZES, random_poses
 from shadowpuppet.bodies import make_body
-from shadowpuppet.body import (
-    BODIES,
-    FOREARM,
-    HAND_POINT,
-    SIDES,
-    TO_TIP,
-    Body,
-    Hulls,
-    Quads,
-    boxes,
-    cardbox,
-    rounded,
-)  # fmt: skip
+from shadowpuppet.body import BODIES, FOREARM, HAND_POINT, SIDES, TO_TIP, boxes, cardbox, rounded  # fmt: skip
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
+from shadowpuppet.limbs import Body, Hulls, Quads  # fmt: skip
 from shadowpuppet.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.skeleton import Skeleton
 

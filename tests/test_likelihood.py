@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 import naive
 from people import camera, picture, random_poses
 from shadowpuppet import kinematics, projection, rasterize, spans
-from shadowpuppet.body import BODIES, Body, Quads
+from shadowpuppet.body import BODIES
 from shadowpuppet.kernels import BLOCK
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
+from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.members import parts_of
 from shadowpuppet.rasterize import Picture, pack, unpack
 from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 import naive
 from people import LENSES, camera, picture, random_poses
-from shadowpuppet.body import BODIES, Body, Quads
+from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import rigid, rotation_from_vector
+from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.projection import DIRECTIONS, NEAR, make_lens
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.skeleton import Joint, Skeleton

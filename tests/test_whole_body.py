@@ -9,11 +9,10 @@ from scipy import ndimage
 from people import random_poses
 from shadowpuppet.anthropometry import ANATOMICAL, CYLINDERS, SOLE
 from shadowpuppet.bodies import ALL, average_sizes, make_body
-from shadowpuppet.body import Body, Hulls
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.limbs import Limbs
+from shadowpuppet.limbs import Body, Hulls, Limbs
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.synthetic.mannequin import JOINTS

@@ -9,9 +9,10 @@ import numpy as np
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from shadowpuppet.anthropometry import sizes_from_height
-from shadowpuppet.body import BODIES, Body, Quads
+from shadowpuppet.body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, rigid, rotation_about
+from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.overlay import draw_model, write_text
 from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.sizes import SUBSETS, CardboxSizes

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 import shadowpuppet
 from papers.common.experiment import Request
 from shadowpuppet.bodies import make_body
-from shadowpuppet.body import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration, write_calibration
+from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.synthetic import Spec, humaneva, synthesize

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from shadowpuppet.anthropometry import PROPORTIONS, SOLE, shares_of, sizes_from_height, whole_sizes_from_bones, whole_sizes_from_height
-from shadowpuppet.body import BODIES, HAND_SHARE, WRIST_SHARE, Body
+from shadowpuppet.body import BODIES, HAND_SHARE, WRIST_SHARE
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.limbs import Body
 from shadowpuppet.sizes import CardboxSizes, Sizes
 from shadowpuppet.whole_body import anatomical, cylinders
 from shadowpuppet.whole_sizes import BoneSizes, sizes_kind

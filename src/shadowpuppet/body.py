@@ -9,102 +9,17 @@ The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Limbs
+from shadowpuppet.limbs import Body, Hulls, Quads
 from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
 SIDES = ("left", "right")
-
-
-@dataclass(frozen=True, eq=False)
-class Quads:
-    """Flat convex quads, each fixed to a joint."""
-
-    joints: NDArray[np.int64]
-    """Joint of each, of shape (S, 1)."""
-    corners: Array
-    """In the joint's frame, of shape (S, 4, 3), metres."""
-
-    @property
-    def arrays(self) -> tuple[Array, ...]:
-        """What depends on a person's sizes, and linearly so."""
-        return (self.corners,)
-
-
-@dataclass(frozen=True, eq=False)
-class Hulls:
-    """Convex hulls of a few ellipsoids each, every ellipsoid fixed to a joint."""
-
-    joints: NDArray[np.int64]
-    """Joint of each ellipsoid, of shape (S, E)."""
-    centres: Array
-    """In the joint's frame, of shape (S, E, 3), metres."""
-    radii: Array
-    """Along the axes of the joint's frame, of shape (S, E, 3), metres."""
-
-    @cached_property
-    def numbers(self) -> NDArray[np.int64]:
-        """Ellipsoids of each hull (S,), without copies of its last."""
-        same = self.joints == self.joints[:, -1:]
-        for array in self.arrays:
-            same &= (array == array[:, -1:]).all(2)
-        return same.shape[1] + 1 - np.cumprod(same[:, ::-1], axis=1).sum(1)
-
-    @property
-    def arrays(self) -> tuple[Array, ...]:
-        """What depends on a person's sizes, and linearly so."""
-        return self.centres, self.radii
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """Shapes fixed to the joints of a skeleton, and named points on it."""
-
-    name: str
-    skeleton: Skeleton
-    shapes: Quads | Hulls
-    """S shapes."""
-    parts: tuple[str, ...]
-    """Body part that each shape belongs to, S names."""
-    landmarks: Mapping[str, tuple[str, tuple[float, float, float]]]
-    """Points that a motion reports: name to joint and place in its frame, metres."""
-    hem: Array | None
-    """The two ends of the waist's lower edge in the pelvis' frame, of shape (2, 3), metres: the model ends here; None: it has legs."""
-    limbs: Limbs | None = None
-    """The same as solids that points can be compared with; None: only its picture is known."""
-
-    @cached_property
-    def landmark_names(self) -> tuple[str, ...]:
-        """Names of the landmarks, L of them."""
-        return tuple(self.landmarks)
-
-    def shapes_of(self, *parts: str) -> NDArray[np.int64]:
-        """Indices of the shapes of some parts. Raises `ShadowPuppetError` for a part that the body lacks."""
-        unknown = set(parts) - set(self.parts)
-        if unknown:
-            raise ShadowPuppetError(f"body {self.name!r}: unknown part {choices(unknown)}; there are: {choices(set(self.parts))}")
-        return np.array([i for i, part in enumerate(self.parts) if part in parts], np.int64)
-
-    def points(self, poses: ArrayLike, root: ArrayLike | None = None, names: Iterable[str] | None = None) -> Array:
-        """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to; all, or those named."""
-        joints, places = self._fixed
-        chosen = [self.landmark_names.index(name) for name in (self.landmark_names if names is None else names)]
-        return self.skeleton.points(poses, joints[chosen], places[chosen], root)
-
-    @cached_property
-    def _fixed(self) -> tuple[NDArray[np.int64], Array]:
-        """Joints (L,) of the landmarks, and where in their frames these are (L, 3), metres."""
-        joints = np.array([self.skeleton.joint_index(joint) for joint, _ in self.landmarks.values()], np.int64)
-        return joints, np.array([place for _, place in self.landmarks.values()], float).reshape(-1, 3)
 
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:

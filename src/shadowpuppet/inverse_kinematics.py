@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from shadowpuppet.anthropometry import shares_of, stature_of, whole_sizes_from_bones
 from shadowpuppet.bodies import make_body
-from shadowpuppet.body import Body
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.joint_frames import guess
+from shadowpuppet.limbs import Body
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import SIDES, check_person, of
 from shadowpuppet.sizes import LEAST

@@ -13,12 +13,12 @@ from typing import Generic
 import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT, shares_of, stature_of
-from shadowpuppet.body import Body
 from shadowpuppet.bundle import Measured, solve_bundle
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
+from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.angles import angles_of
-from shadowpuppet.body import SIDES, Body
+from shadowpuppet.body import SIDES
 from shadowpuppet.geometry import Array, rotation_about
+from shadowpuppet.limbs import Body
 from shadowpuppet.skeleton import Dof, Skeleton
 
 

@@ -66,7 +66,7 @@ def draw_model(image: Image, picture: Picture, pose: Array) -> None:
     """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, nearer shapes over farther ones."""
     import cv2
 
-    from shadowpuppet.body import Quads
+    from shadowpuppet.limbs import Quads
 
     pieces = _of_quads(picture, pose) if isinstance(picture.body.shapes, Quads) else _of_hulls(picture, pose)
     width = max(1, round(image.shape[0] / 300))

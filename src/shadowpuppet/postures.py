@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shadowpuppet.body import Body
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
+from shadowpuppet.limbs import Body
 from shadowpuppet.particle_filter import Particles, Weigh, evaluate
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.usual import usual_arms, usual_postures

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.body import Body, Hulls
-from shadowpuppet.limbs import Limbs
+from shadowpuppet.limbs import Body, Hulls, Limbs
 from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
 from shadowpuppet.whole_skeleton import SIDES, anatomical_skeleton, cylinder_skeleton

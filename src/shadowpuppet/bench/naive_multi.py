@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body import Body
 from shadowpuppet.geometry import Array, rotation_about, rotation_from_vector
-from shadowpuppet.limbs import Limbs
+from shadowpuppet.limbs import Body, Limbs
 from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.skeleton import AXES, Skeleton
 

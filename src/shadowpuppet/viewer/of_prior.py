@@ -8,10 +8,10 @@ import numpy as np
 
 from shadowpuppet.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.bodies import ALL, average_sizes, make_body
-from shadowpuppet.body import Body
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.prior import read_prior
+from shadowpuppet.limbs import Body
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.figures import of_poses
