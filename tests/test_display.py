@@ -24,7 +24,7 @@ from shadowpuppet.display.view import Angle, Display, View
 from shadowpuppet.display.web import PORT, WebDisplay
 from shadowpuppet.display.window import WindowDisplay
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
-from shadowpuppet.hosts import is_loopback, known_host
+from shadowpuppet.network import is_loopback, known_host
 from shadowpuppet.video import read_image
 
 ROOM = np.full((120, 160, 3), 90, np.uint8)

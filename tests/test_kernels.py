@@ -10,7 +10,7 @@ import numba
 import pytest
 from numba.core import caching
 
-from shadowpuppet.kernels import compiled
+from shadowpuppet.jit import compiled
 
 FIRST_RUN = """
 from shadowpuppet.bench.ring import Around

@@ -11,7 +11,7 @@ import naive
 from people import camera, picture, random_poses
 from shadowpuppet import kinematics, projection, rasterize, spans
 from shadowpuppet.body import BODIES
-from shadowpuppet.kernels import BLOCK
+from shadowpuppet.jit import BLOCK
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
 from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.members import parts_of

@@ -28,10 +28,10 @@ from listeners import OscEar, composed, osc_messages
 from shadowpuppet import cli
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import inverse, transform
-from shadowpuppet.hosts import host_and_port
 from shadowpuppet.io.run import read_run
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.motion import MotionFrame
+from shadowpuppet.network import host_and_port
 from shadowpuppet.outlets import websocket
 from shadowpuppet.outlets.avatar import Avatar
 from shadowpuppet.outlets.choice import open_outlets

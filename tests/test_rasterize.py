@@ -14,7 +14,7 @@ from shadowpuppet.body import BODIES, upper_body_skeleton
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.kernels import BLOCK
+from shadowpuppet.jit import BLOCK
 from shadowpuppet.limbs import Body
 from shadowpuppet.rasterize import Picture, count, draw_polygon, pack, place, unpack
 from test_body import mirrored

@@ -12,7 +12,7 @@ from people import SIZES, random_poses
 from shadowpuppet.body import RISE, SIDES, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
-from shadowpuppet.kernels import BLOCK
+from shadowpuppet.jit import BLOCK
 from shadowpuppet.kinematics import sines
 from shadowpuppet.skeleton import AXES, Coupling, Dof, Joint, Skeleton
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.closest import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import kernel
+from shadowpuppet.jit import kernel
 from shadowpuppet.limbs import Body
 from shadowpuppet.multiview_settings import SurfaceSettings
 from shadowpuppet.screws import Chain, make_chain, place_one

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import part, summing
+from shadowpuppet.jit import part, summing
 from shadowpuppet.limbs import Limbs
 
 Single = NDArray[np.float32]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.kernels import compiled
+from shadowpuppet.jit import compiled
 from shadowpuppet.masks import Mask
 
 Array = NDArray[np.float64]

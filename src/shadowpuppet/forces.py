@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shadowpuppet.kernels import kernel, part
+from shadowpuppet.jit import kernel, part
 from shadowpuppet.part_sums import gather_down, sweep
 from shadowpuppet.screws import STEP, TRANSLATION, place_one
 

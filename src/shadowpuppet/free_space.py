@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import kernel, part
+from shadowpuppet.jit import kernel, part
 from shadowpuppet.limbs import Limbs
 from shadowpuppet.masks import Mask
 from shadowpuppet.projection import NEAR, bend_within, make_lens

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import joined, kernel
+from shadowpuppet.jit import joined, kernel
 
 NEGLIGIBLE = -40.0
 """A term of a sum that is less than e^NEGLIGIBLE of its greatest changes no digit of it."""

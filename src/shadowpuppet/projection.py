@@ -6,7 +6,7 @@ import numpy as np
 
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import kernel, part
+from shadowpuppet.jit import kernel, part
 
 DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
 """Directions in which a hull's outline is taken: the corners of its polygon."""

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
-from shadowpuppet.kernels import BLOCK, kernel, part
+from shadowpuppet.jit import BLOCK, kernel, part
 from shadowpuppet.kinematics import load_joints, place_joints
 from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads

@@ -14,7 +14,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.forces import push
 from shadowpuppet.free_space import FreeSpace, free_space, push_inside, spheres_in
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import kernel
+from shadowpuppet.jit import kernel
 from shadowpuppet.limbs import Body
 from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.part_sums import COST, EQUATIONS, FORCES, MODULATED, ROBUST, SUMS, gather_down, sweep

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import kernel
+from shadowpuppet.jit import kernel
 from shadowpuppet.skeleton import AXES, Skeleton
 
 TRANSLATION, ROTATION, VECTOR = 0, 1, 2

@@ -13,7 +13,7 @@ from numba.core import config, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from shadowpuppet.kernels import joined, kernel, part
+from shadowpuppet.jit import joined, kernel, part
 
 ROWS = 8
 """Rows of a strip."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.contours import ARM
 from shadowpuppet.geometry import Array
-from shadowpuppet.kernels import compiled, kernel
+from shadowpuppet.jit import compiled, kernel
 from shadowpuppet.projection import NEAR, bend_within
 
 Indices = NDArray[np.int64]

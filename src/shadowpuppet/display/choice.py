@@ -28,7 +28,7 @@ def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, 
         if show == "window":
             raise SettingsError(f"show: no window can be opened ({why}); --show browser shows the same on a page")
     from shadowpuppet.display.web import WebDisplay
-    from shadowpuppet.hosts import is_loopback
+    from shadowpuppet.network import is_loopback
 
     display = WebDisplay(listen, port, FOOTERS[record])
     if not is_loopback(listen):

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 from shadowpuppet.display.drawing import drawn, jpeg
 from shadowpuppet.display.view import WISHES, Display, View
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.hosts import is_loopback, known_host, shown_host
+from shadowpuppet.network import is_loopback, known_host, shown_host
 
 PORT = 8600
 """Tried first where none is asked for."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.hosts import host_and_port, is_loopback
+from shadowpuppet.network import host_and_port, is_loopback
 from shadowpuppet.outlets.outlet import Outlet, Outlets
 from shadowpuppet.outlets.settings import OutletSettings
 

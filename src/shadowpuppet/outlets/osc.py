@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.hosts import is_loopback
+from shadowpuppet.network import is_loopback
 
 NOW = struct.pack(">Q", 1)
 """The time tag of what counts at once."""

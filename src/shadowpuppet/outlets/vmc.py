@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shadowpuppet.hosts import shown_host
+from shadowpuppet.network import shown_host
 from shadowpuppet.outlets.avatar import Avatar
 from shadowpuppet.outlets.osc import Message, Sender, bundles
 from shadowpuppet.outlets.outlet import Outlet, Subject, Told

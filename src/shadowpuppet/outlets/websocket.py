@@ -10,7 +10,7 @@ from http import HTTPStatus
 from typing import Any, Self
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.hosts import host_of, is_loopback, known_host, shown_host
+from shadowpuppet.network import host_of, is_loopback, known_host, shown_host
 from shadowpuppet.outlets.json_messages import beginning, framed
 from shadowpuppet.outlets.outlet import Outlet, Subject, Told
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.kernels import compiled
+from shadowpuppet.jit import compiled
 
 NEUTRAL = 128.0
 """Cr and Cb of a pixel without colour, 8 bit."""

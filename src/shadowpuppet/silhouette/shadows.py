@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.kernels import compiled
+from shadowpuppet.jit import compiled
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.kernels import compiled
+from shadowpuppet.jit import compiled
 
 PLACED = 22
 FAR = 1e9

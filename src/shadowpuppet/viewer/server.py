@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.hosts import is_loopback, known_host
+from shadowpuppet.network import is_loopback, known_host
 
 if TYPE_CHECKING:
     import viser
