@@ -36,7 +36,7 @@ def live(folder: Path) -> None:
     import numpy as np
     from websockets.sync.client import connect
 
-    from shadowpuppet.bodies import average_sizes, make_body
+    from shadowpuppet.body.models import average_sizes, make_body
     from shadowpuppet.outlets.choice import open_outlets
     from shadowpuppet.outlets.outlet import Subject
     from shadowpuppet.outlets.settings import OutletSettings

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from cases import COLUMNS, Case, means
 
-from shadowpuppet.body import HAND_SHARE
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.upper_body import HAND_SHARE
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import make_options
-from shadowpuppet.sizes import CardboxSizes
 
 ROWS: dict[str, dict[str, Any]] = {
     "default": {},

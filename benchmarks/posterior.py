@@ -17,7 +17,7 @@ import numpy as np
 from cases import Case
 from proving_ground import HERE, made
 
-from shadowpuppet.body import SIDES
+from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.first_pose import arm_dofs
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost

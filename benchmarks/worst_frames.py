@@ -15,13 +15,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.io.run import read_run
-from shadowpuppet.limbs import Body
 from shadowpuppet.metrics import LIMBS, joint_errors
 from shadowpuppet.motion import JointTable
 from shadowpuppet.rasterize import Picture

@@ -16,14 +16,14 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.limbs import Body
-from shadowpuppet.members import BONES
 from shadowpuppet.options import make_options
 from shadowpuppet.overlay import draw_model, draw_skeleton, write_text
 from shadowpuppet.pipeline import track_recording

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from shadowpuppet.bench import naive_multi as naive
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.demo import run_demo
@@ -20,7 +21,6 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.limbs import Body
 from shadowpuppet.multiview_settings import ForceSettings
 from shadowpuppet.options import Options
 from shadowpuppet.overlay import draw_model

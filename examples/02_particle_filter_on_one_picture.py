@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.anthropometry import sizes_from_height
-from shadowpuppet.body import cardbox
+from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.upper_body import cardbox
 from shadowpuppet.camera import Camera
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.overlay import matching

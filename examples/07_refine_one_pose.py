@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import shadowpuppet as sp
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.multiview_settings import ForceSettings
 from shadowpuppet.overlay import draw_model

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 import shadowpuppet as sp
-from shadowpuppet.body import cardbox
-from shadowpuppet.limbs import Quads
+from shadowpuppet.body.shapes import Quads
+from shadowpuppet.body.upper_body import cardbox
 from shadowpuppet.synthetic import Spec, synthesize
 
 

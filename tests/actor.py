@@ -9,16 +9,16 @@ import numpy as np
 import made_rig
 import naive_limbs
 from scans import scan
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body, Limbs
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body, Limbs
 from shadowpuppet.masks import Mask
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
-from shadowpuppet.whole_sizes import AnatomicalSizes
 
 CAMERAS = 5
 """Of four in a ring, two and two face each other."""

@@ -8,13 +8,13 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.body.shapes import Hulls
+from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, rotation_from_vector, transform
 from shadowpuppet.hidden_markov import Posterior
-from shadowpuppet.limbs import Hulls
 from shadowpuppet.projection import DIRECTIONS, NEAR
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.skeleton import AXES, Skeleton
 
 Mask = NDArray[np.bool_]
 

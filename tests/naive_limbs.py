@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Limbs
 
 
 def one_limb(length=0.4, shear=(0.0, 0.0), start=(0.1, 0.08), end=(0.1, 0.08), caps=(0.0, 0.0), rotation=None, at=(0.0, 0.0, 0.0)) -> Limbs:

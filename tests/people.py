@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.anthropometry import sizes_from_height
-from shadowpuppet.body import BODIES
+from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.rasterize import Picture, place
-from shadowpuppet.sizes import CardboxSizes
-from shadowpuppet.skeleton import Skeleton
 
 SIZES = sizes_from_height(1.75)
 LENSES = {

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.bodies import ALL, average_sizes, make_body
+from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion import MotionFrame
 
 BODIES = tuple(ALL)

@@ -8,8 +8,8 @@ import numpy as np
 
 import naive_limbs
 from shadowpuppet.bench import naive_multi as naive
+from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.geometry import Array
-from shadowpuppet.skeleton import Dof, Joint, Skeleton
 
 
 def make_body(seed: int = 1) -> SimpleNamespace:

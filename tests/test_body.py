@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from people import SIZES, random_poses
-from shadowpuppet.bodies import make_body
-from shadowpuppet.body import BODIES, FOREARM, HAND_POINT, SIDES, TO_TIP, boxes, cardbox, rounded  # fmt: skip
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body, Hulls, Quads  # fmt: skip
+from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.upper_body import BODIES, FOREARM, HAND_POINT, SIDES, TO_TIP, boxes, cardbox, rounded  # fmt: skip
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.limbs import Body, Hulls, Quads  # fmt: skip
-from shadowpuppet.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.skeleton import Skeleton
 
 NAMES = CardboxSizes.names()
 

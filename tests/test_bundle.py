@@ -11,14 +11,14 @@ import actor
 from scans import make_body as random_tree
 from scans import scan, some_pose
 from shadowpuppet import bundle
-from shadowpuppet.anthropometry import shares_of
 from shadowpuppet.bench import naive_multi as naive
+from shadowpuppet.body.anthropometry import shares_of
+from shadowpuppet.body.whole_body import anatomical
+from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.bundle import solve_bundle
 from shadowpuppet.closest import LANES, Cloud, make_cloud
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.multiview_settings import SurfaceSettings
-from shadowpuppet.whole_body import anatomical
-from shadowpuppet.whole_sizes import AnatomicalSizes
 
 MEAN = actor.sizes()
 NAMES = AnatomicalSizes.names()

@@ -12,6 +12,7 @@ import pytest
 
 import made
 from shadowpuppet import cli
+from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.demo import contact_sheet
 from shadowpuppet.evaluation import angle_errors
 from shadowpuppet.inverse_kinematics import fit_poses
@@ -20,7 +21,6 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.metrics import LIMBS
 from shadowpuppet.synthetic import demo_ring_spec
-from shadowpuppet.whole_sizes import AnatomicalSizes
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
          "--initialization.hypotheses", "60"]  # fmt: skip

@@ -92,7 +92,7 @@ def test_films_that_come_back_wrong_break_the_core(monkeypatch):
 
 
 def test_kernels_that_are_wrong_break_the_core(monkeypatch):
-    from shadowpuppet.limbs import Body
+    from shadowpuppet.body.shapes import Body
 
     monkeypatch.setattr(Body, "points", lambda *_, **__: np.array([[[0, 0, 7.0]]]))
     found = named(list(doctor._kernels()))["kernels"]

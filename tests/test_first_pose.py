@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from people import camera, picture
-from shadowpuppet.body import BODIES, SIDES
+from shadowpuppet.body.segments import coarse_arms, parts_of
+from shadowpuppet.body.upper_body import BODIES, SIDES
 from shadowpuppet.first_pose import search
 from shadowpuppet.likelihood import Observation
-from shadowpuppet.members import coarse_arms, parts_of
 
 LIBRARY = coarse_arms()
 VIEW = picture("rounded")

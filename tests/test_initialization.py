@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from people import camera, random_poses
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePrior, sizes_from_height
-from shadowpuppet.body import BODIES
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePrior, sizes_from_height
+from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
+from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.fitting import wrong_posture
 from shadowpuppet.hypotheses import Bodies, Guess, Hypotheses
@@ -17,7 +18,6 @@ from shadowpuppet.initialization import POSTURES, Fit, find_person, fit_referenc
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.monocular_settings import InitializationSettings
 from shadowpuppet.rasterize import Picture, place, unpack
-from shadowpuppet.sizes import SUBSETS, CardboxSizes
 
 CAMERA = camera((320, 240))
 AVERAGE = sizes_from_height(1.78)

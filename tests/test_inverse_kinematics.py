@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.clips import mirrored
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about, three_turns
@@ -19,7 +20,6 @@ from shadowpuppet.io.joints import read_joints
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import NEEDED
 from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.whole_sizes import WHOLE
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
 SOMEONE = {"upper_arm_length": 0.27, "forearm_length": 0.25, "thigh_length": 0.41, "shank_length": 0.39, "hip_distance": 0.19,

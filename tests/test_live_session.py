@@ -173,7 +173,7 @@ def test_work_in_the_background_gives_its_result_or_its_error():
 
 
 def test_known_sizes_are_kept(pictures):
-    from shadowpuppet.anthropometry import sizes_from_height
+    from shadowpuppet.body.anthropometry import sizes_from_height
     from shadowpuppet.io.person import Person
 
     sizes = sizes_from_height(1.72)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from measured import NAMES, moved, person
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.joint_angles import dof_errors, wrapped
 from shadowpuppet.measures import (

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import actor
-from shadowpuppet.anthropometry import shares_of
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.anthropometry import shares_of
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.whole_body import anatomical
+from shadowpuppet.body.whole_sizes import WHOLE, AnatomicalSizes
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.measuring import EXACT, SHOWN, measure, seen_height, spread_of
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.visual_hull import SurfacePoints
-from shadowpuppet.whole_body import anatomical
-from shadowpuppet.whole_sizes import WHOLE, AnatomicalSizes
 
 SETTINGS = MultiviewSettings(particles=8)
 NAMES = AnatomicalSizes.names()

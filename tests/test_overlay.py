@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet import overlay
-from shadowpuppet.bodies import make_body
-from shadowpuppet.body import BODIES, CardboxSizes
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.upper_body import BODIES, CardboxSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, VideoError
 from shadowpuppet.geometry import Array, rigid

@@ -7,12 +7,12 @@ import pytest
 
 import actor
 from shadowpuppet import postures
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.postures import HEADINGS, placed, search
 from shadowpuppet.proposals import GLOBAL
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.usual import usual_postures
-from shadowpuppet.whole_sizes import WHOLE
 
 
 @pytest.mark.parametrize("name", WHOLE)

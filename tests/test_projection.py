@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 import naive
 from people import LENSES, camera, picture, random_poses
-from shadowpuppet.body import BODIES
+from shadowpuppet.body.shapes import Body, Quads
+from shadowpuppet.body.skeleton import Joint, Skeleton
+from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.projection import DIRECTIONS, NEAR, make_lens
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.skeleton import Joint, Skeleton
 
 seeds = st.integers(0, 2**32 - 1)
 

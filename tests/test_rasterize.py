@@ -10,12 +10,12 @@ from hypothesis.extra.numpy import array_shapes, arrays
 
 import naive
 from people import SIZES, camera, picture, random_poses
-from shadowpuppet.body import BODIES, upper_body_skeleton
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.upper_body import BODIES, upper_body_skeleton
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
-from shadowpuppet.limbs import Body
 from shadowpuppet.rasterize import Picture, count, draw_polygon, pack, place, unpack
 from test_body import mirrored
 

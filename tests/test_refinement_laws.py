@@ -15,17 +15,17 @@ from scans import make_body as random_tree
 from scans import scan, some_pose
 from shadowpuppet import refinement
 from shadowpuppet.bench import naive_multi as naive
-from shadowpuppet.bodies import average_sizes
-from shadowpuppet.bodies import make_body as make_named
+from shadowpuppet.body.jacobian import place_one
+from shadowpuppet.body.models import average_sizes
+from shadowpuppet.body.models import make_body as make_named
+from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_about
 from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.part_sums import EQUATIONS, gather_down, sweep
 from shadowpuppet.refinement import Refiner
-from shadowpuppet.screws import place_one
-from shadowpuppet.skeleton import Dof, Joint, Skeleton
-from shadowpuppet.whole_sizes import WHOLE
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)
 

@@ -13,13 +13,13 @@ import actor
 import made
 import made_rig
 from shadowpuppet import rig_fitting
+from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
-from shadowpuppet.whole_body import anatomical
 
 FRAMES = 16
 QUICK = {"masks": True, "multiview": {"particles": 6}, "training": {"regions": 6, "starts": 1}}

@@ -10,7 +10,7 @@ import pytest
 
 import made
 import made_rig
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.evaluation import evaluate_run
 from shadowpuppet.io.calibration import read_calibration

@@ -9,7 +9,8 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from shadowpuppet.bodies import ALL
+from shadowpuppet.body.models import ALL
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings
 from shadowpuppet.multiview_settings import (
@@ -26,7 +27,6 @@ from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.resampling import SCHEMES
 from shadowpuppet.settings import validate
 from shadowpuppet.silhouette import SilhouetteSettings
-from shadowpuppet.whole_sizes import WHOLE
 
 OF_SEVERAL = (MultiviewSettings, SurfaceSettings, GaussNewtonSettings, ForceSettings, HullSettings, PriorSettings)
 KINDS = (PartSettings, MonocularSettings, InitializationSettings, SilhouetteSettings, Options, *OF_SEVERAL)

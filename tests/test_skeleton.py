@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 import naive
 from people import SIZES, random_poses
-from shadowpuppet.body import RISE, SIDES, upper_body_skeleton
+from shadowpuppet.body.forward_kinematics import sines
+from shadowpuppet.body.skeleton import AXES, Coupling, Dof, Joint, Skeleton
+from shadowpuppet.body.upper_body import RISE, SIDES, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
-from shadowpuppet.kinematics import sines
-from shadowpuppet.skeleton import AXES, Coupling, Dof, Joint, Skeleton
 
 UPPER = {"plain": upper_body_skeleton(SIZES), "clavicles": upper_body_skeleton(SIZES, clavicles=True)}
 ROOT = rigid(rotation_from_vector([0.3, -1.2, 0.5]), [0.1, -0.4, 2.5])

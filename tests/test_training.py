@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from motions import prior as made_prior
 from movers import walk
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.motion import JointTable
 from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.training import GLOBAL, matched, modelled, train_prior
 
 FEW = PriorSettings(regions=6, starts=1)
@@ -191,6 +191,6 @@ def test_a_prior_of_another_body_is_refused(learnt):
 
 
 def _skeleton(dofs: int) -> Skeleton:
-    from shadowpuppet.skeleton import Dof, Joint
+    from shadowpuppet.body.skeleton import Dof, Joint
 
     return Skeleton((Joint("a", None),), tuple(Dof(f"a_{n}", "a", "x") for n in range(dofs)))

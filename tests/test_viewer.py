@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 import made
 import made_rig
 from runs import body_of, make_run, smooth_poses
+from shadowpuppet.body.shapes import Quads
 from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.camera import Camera
 from shadowpuppet.cli import run as command
@@ -27,7 +28,6 @@ from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
-from shadowpuppet.limbs import Quads
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options
 from shadowpuppet.prior_settings import PriorSettings

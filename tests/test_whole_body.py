@@ -7,16 +7,16 @@ import pytest
 from scipy import ndimage
 
 from people import random_poses
-from shadowpuppet.anthropometry import ANATOMICAL, CYLINDERS, SOLE
-from shadowpuppet.bodies import ALL, average_sizes, make_body
+from shadowpuppet.body.anthropometry import ANATOMICAL, CYLINDERS, SOLE
+from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.shapes import Body, Hulls, Limbs
+from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.body.whole_sizes import KINDS, WHOLE, kind_of, sizes_kind
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.limbs import Body, Hulls, Limbs
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.whole_sizes import KINDS, WHOLE, kind_of, sizes_kind
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}
 

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from people import camera
-from shadowpuppet.anthropometry import sizes_from_height
-from shadowpuppet.bodies import average_sizes, make_body, whole_from_upper
+from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.models import average_sizes, make_body, whole_from_upper
+from shadowpuppet.body.segments import steady
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.hypotheses import Guess
 from shadowpuppet.initialization import Fit, as_whole, find_person
 from shadowpuppet.likelihood import Observation
-from shadowpuppet.members import steady
 from shadowpuppet.monocular_settings import InitializationSettings, make_settings
 from shadowpuppet.options import Options
 from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.tracking import MonocularTracker
 from shadowpuppet.whole_person import whole_person
-from shadowpuppet.whole_sizes import WHOLE
 
 CAMERA = camera((200, 240), focal=1.0)
 HEIGHT, FAR = 1.7, 2.1

@@ -10,11 +10,11 @@ import pytest
 
 import actor
 from people import SIZES, camera, picture
-from shadowpuppet.body import cardbox, rounded
+from shadowpuppet.body.shapes import Hulls, Quads
+from shadowpuppet.body.upper_body import cardbox, rounded
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.hypotheses import Bodies, Guess
 from shadowpuppet.initialization import find_person, fit_references
-from shadowpuppet.limbs import Hulls, Quads
 from shadowpuppet.monocular_settings import InitializationSettings, make_settings
 from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.multiview_tracker import MultiviewTracker

@@ -8,14 +8,14 @@ import numpy as np
 
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
-from shadowpuppet.anthropometry import sizes_from_height
-from shadowpuppet.body import BODIES
+from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.shapes import Body, Quads
+from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
+from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array, rigid, rotation_about
-from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.overlay import draw_model, write_text
 from shadowpuppet.rasterize import Picture, place
-from shadowpuppet.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.video import Image
 
 if TYPE_CHECKING:

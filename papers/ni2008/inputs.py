@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 
 import shadowpuppet
 from papers.common.experiment import Request
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.whole_sizes import sizes_kind
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration, write_calibration
-from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.synthetic import Spec, humaneva, synthesize
 from shadowpuppet.visual_hull import SurfacePoints
-from shadowpuppet.whole_sizes import sizes_kind
 
 BODY = "cylinders"
 """The paper's body (II)."""

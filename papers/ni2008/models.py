@@ -9,9 +9,9 @@ from papers.common.experiment import Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from papers.ni2008.inputs import BODY
 from shadowpuppet.bench import naive_multi as plain
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body, Limbs
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body, Limbs
 from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.overlay import draw_model
 from shadowpuppet.rasterize import Picture

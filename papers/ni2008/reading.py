@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from papers.ni2008.inputs import BODY, Source
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.models import make_body
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array

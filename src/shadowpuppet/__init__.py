@@ -9,6 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from shadowpuppet.body.sizes import CardboxSizes
+    from shadowpuppet.body.whole_sizes import AnatomicalSizes, CylinderSizes
     from shadowpuppet.camera import Camera
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
@@ -38,18 +40,16 @@ if TYPE_CHECKING:
     from shadowpuppet.rasterize import Picture
     from shadowpuppet.report.page import write_report
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
-    from shadowpuppet.sizes import CardboxSizes
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking import MonocularTracker
     from shadowpuppet.video import open_frames, write_frames
     from shadowpuppet.visual_hull import SurfacePoints, VisualHull
     from shadowpuppet.vqpca import choose_regions, fit_prior
-    from shadowpuppet.whole_sizes import AnatomicalSizes, CylinderSizes
 
     __version__: str
 
 _HOMES = {
-    "CardboxSizes": "sizes", "Camera": "camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
+    "CardboxSizes": "body.sizes", "Camera": "camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
     "find_person": "initialization", "fit_references": "initialization", "read_calibration": "io.calibration",
     "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints", "Person": "io.person",
     "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",
@@ -60,8 +60,8 @@ _HOMES = {
     "open_frames": "video", "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "prior_settings",
     "choose_regions": "vqpca", "fit_prior": "vqpca", "read_prior": "io.prior", "write_prior": "io.prior",
     "HullSettings": "multiview_settings", "SurfacePoints": "visual_hull", "VisualHull": "visual_hull",
-    "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics", "AnatomicalSizes": "whole_sizes",
-    "CylinderSizes": "whole_sizes", "read_humaneva": "io.humaneva", "read_motion": "io.motion_files",
+    "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics", "AnatomicalSizes": "body.whole_sizes",
+    "CylinderSizes": "body.whole_sizes", "read_humaneva": "io.humaneva", "read_motion": "io.motion_files",
     "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "multiview_settings", "make_multiview_settings": "multiview_settings",
     "export_run": "exporting", "convert_motion": "exporting", "Comparison": "evaluation", "Evaluation": "evaluation",
     "measure_run": "evaluation", "read_truth": "io.truth", "write_report": "report.page", "open_footage": "footage",

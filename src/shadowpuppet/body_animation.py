@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.animation import Animation
+from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.motion import Motion
 
 TO_REST = np.array([[0.0, 1, 0], [0, 0, 1.0], [1.0, 0, 0]])

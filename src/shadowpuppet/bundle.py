@@ -12,13 +12,13 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.jacobian import Chain, make_chain, place_one
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.closest import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.limbs import Body
 from shadowpuppet.multiview_settings import SurfaceSettings
-from shadowpuppet.screws import Chain, make_chain, place_one
-from shadowpuppet.sizes import Sizes
 
 Measured = TypeVar("Measured", bound=Sizes)
 NUDGE = 1e-3

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import part, summing
-from shadowpuppet.limbs import Limbs
 
 Single = NDArray[np.float32]
 LANES = 16

@@ -93,7 +93,7 @@ def _libraries() -> Iterator[Finding]:
 
 def _kernels() -> Iterator[Finding]:
     """A body's joints, by a kernel that is compiled for this processor."""
-    from shadowpuppet.bodies import average_sizes, make_body
+    from shadowpuppet.body.models import average_sizes, make_body
 
     body = make_body("rounded", average_sizes("rounded", 1.75))
     head = body.points(np.zeros((1, len(body.skeleton.dofs))), names=["head"])[0, 0]
@@ -104,7 +104,7 @@ def _kernels() -> Iterator[Finding]:
 
 
 def _cache() -> Iterator[Finding]:
-    from shadowpuppet.kinematics import place_all
+    from shadowpuppet.body.forward_kinematics import place_all
 
     told = getattr(getattr(place_all, "_cache", None), "cache_path", "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":

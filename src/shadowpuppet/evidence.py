@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.free_space import FreeSpace, free_space
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Cost, Observation, silhouette_costs
-from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask, may_be_person
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.visual_hull import SurfacePoints

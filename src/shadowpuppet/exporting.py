@@ -11,7 +11,8 @@ from warnings import warn
 import numpy as np
 
 from shadowpuppet.animation import Animation
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import BodyTree, motion_animation
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
@@ -31,7 +32,6 @@ from shadowpuppet.io.run import Run, motion_bytes, read_run
 from shadowpuppet.io.skeletons import ENDINGS as SKELETONS
 from shadowpuppet.io.skeletons import read_animation
 from shadowpuppet.io.trc import METRES, write_trc
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion import JointTable
 from shadowpuppet.opensim import coordinates, marker_names
 from shadowpuppet.puppet_mesh import Mesh, body_mesh, bone_mesh

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.segments import coarse_limbs, dofs_of, limbs_of, parts_of
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
-from shadowpuppet.members import coarse_limbs, dofs_of, limbs_of, parts_of
 from shadowpuppet.rasterize import Picture
 
 GOOD = 40

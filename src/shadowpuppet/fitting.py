@@ -8,7 +8,9 @@ from itertools import chain, islice
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
@@ -19,9 +21,7 @@ from shadowpuppet.io.recording import Reference
 from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette.outlines import disc
-from shadowpuppet.sizes import CardboxSizes
 from shadowpuppet.tracking import MonocularTracker
-from shadowpuppet.whole_sizes import WHOLE
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
 """Overlap (intersection over union) of the fitted body and a reference's silhouette under which it does not show its posture..."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from shadowpuppet.body.jacobian import STEP, TRANSLATION, place_one
 from shadowpuppet.jit import kernel, part
 from shadowpuppet.part_sums import gather_down, sweep
-from shadowpuppet.screws import STEP, TRANSLATION, place_one
 
 
 @part

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel, part
-from shadowpuppet.limbs import Limbs
 from shadowpuppet.masks import Mask
 from shadowpuppet.projection import NEAR, bend_within, make_lens
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from shadowpuppet.body.segments import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
-from shadowpuppet.members import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
 from shadowpuppet.monocular_settings import MonocularSettings, pixel_scale
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.rasterize import Picture

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.anthropometry import SizePrior
-from shadowpuppet.bodies import Make, make_body
-from shadowpuppet.body import BODIES
+from shadowpuppet.body.anthropometry import SizePrior
+from shadowpuppet.body.models import Make, make_body
+from shadowpuppet.body.sizes import CardboxSizes, Sizes
+from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
@@ -19,7 +20,6 @@ from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import Mask
 from shadowpuppet.monocular_settings import InitializationSettings, pixel_scale
 from shadowpuppet.rasterize import Picture, place
-from shadowpuppet.sizes import CardboxSizes, Sizes
 
 NAMES = CardboxSizes.names()
 MAY_BE_NEGATIVE = ("neck_gap", "shoulder_inset")

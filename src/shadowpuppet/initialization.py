@@ -8,8 +8,10 @@ from itertools import product
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
-from shadowpuppet.bodies import Make, make_body
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
+from shadowpuppet.body.models import Make, make_body
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.first_pose import beside, search
@@ -18,9 +20,7 @@ from shadowpuppet.hypotheses import Guess, Hypotheses
 from shadowpuppet.masks import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.monocular_settings import InitializationSettings
 from shadowpuppet.rasterize import place
-from shadowpuppet.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.whole_person import whole_person
-from shadowpuppet.whole_sizes import WHOLE, BoneSizes
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},

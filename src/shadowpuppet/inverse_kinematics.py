@@ -14,16 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.anthropometry import shares_of, stature_of, whole_sizes_from_bones
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.anthropometry import shares_of, stature_of, whole_sizes_from_bones
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import LEAST
+from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes, sizes_kind
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.joint_frames import guess
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import SIDES, check_person, of
-from shadowpuppet.sizes import LEAST
-from shadowpuppet.whole_sizes import WHOLE, BoneSizes, sizes_kind
 
 REACH = 0.1
 """A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.motion import JointTable, Motion
-from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.synchrony import match
 
 UNTOLD = ("head", "_ankle")

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.angles import _angles
+from shadowpuppet.body.angles import _angles
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rotation_about, unit
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion import JointTable
 from shadowpuppet.plausibility import SIDES, across, middle, of
 

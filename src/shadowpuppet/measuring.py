@@ -12,19 +12,19 @@ from typing import Generic
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, shares_of, stature_of
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, shares_of, stature_of
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import HEIGHTS
+from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.bundle import Measured, solve_bundle
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.sizes import HEIGHTS
 from shadowpuppet.visual_hull import SurfacePoints
-from shadowpuppet.whole_sizes import BoneSizes
 
 SHOWN = ("hip_distance", "hip_drop", "hip_forward", "shoulder_distance", "shoulder_drop", "shoulder_forward", "upper_arm_length",
          "forearm_length", "hand_point", "thigh_length", "shank_length", "trunk_height", "lumbar_height", "thorax_height")  # fmt: skip

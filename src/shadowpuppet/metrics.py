@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.body.segments import BONES
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.members import BONES
 from shadowpuppet.motion import JointTable, Motion
 from shadowpuppet.synchrony import in_step, match
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet import postures
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Cost
-from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import MultiviewSettings

@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
 
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
 from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
@@ -18,8 +20,6 @@ from shadowpuppet.multiview_settings import MULTIVIEW_PRESETS, MultiviewSettings
 from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.settings import checked, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
-from shadowpuppet.sizes import DISTANCES, HEIGHTS, expected_metres
-from shadowpuppet.whole_sizes import WHOLE
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.body.segments import BONES
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.members import BONES
 
 if TYPE_CHECKING:  # both bring much with them
     from shadowpuppet.rasterize import Picture
@@ -66,7 +66,7 @@ def draw_model(image: Image, picture: Picture, pose: Array) -> None:
     """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, nearer shapes over farther ones."""
     import cv2
 
-    from shadowpuppet.limbs import Quads
+    from shadowpuppet.body.shapes import Quads
 
     pieces = _of_quads(picture, pose) if isinstance(picture.body.shapes, Quads) else _of_hulls(picture, pose)
     width = max(1, round(image.shape[0] / 300))

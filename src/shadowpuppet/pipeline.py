@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.fitting import Found
 from shadowpuppet.footage import opened
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.limbs import Body
 from shadowpuppet.look import Look, Prepared, check, prepare
 from shadowpuppet.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options, plain_options

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import base_in_world
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.limbs import Body
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.live.stopping import Stop
 from shadowpuppet.motion import Motion, MotionFrame

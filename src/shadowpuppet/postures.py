@@ -10,13 +10,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.whole_skeleton import GLOBAL
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body
 from shadowpuppet.particle_filter import Particles, Weigh, evaluate
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.usual import usual_arms, usual_postures
-from shadowpuppet.whole_skeleton import GLOBAL
 
 HEADINGS = 16
 """Directions that are tried."""

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.inverse_kinematics import fit_poses
@@ -19,10 +21,8 @@ from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.options import Options
 from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.training import RATE, Trained, matched, train_prior
-from shadowpuppet.whole_sizes import BoneSizes
 
 CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)
 """Numbers of regions that are tried where one is to be chosen (Ni 2008, Figs. 4 and 8)."""

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.whole_skeleton import GLOBAL
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import MultiviewSettings
-from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.usual import usual_arms
-from shadowpuppet.whole_skeleton import GLOBAL
 
 REACH = (0.3, 1.0, 2.0)
 """What the noise of a defensive proposal is multiplied by, one of these each."""

@@ -14,12 +14,12 @@ from threading import Lock
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.body.forward_kinematics import load_joints, place_joints
+from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 from shadowpuppet.jit import BLOCK, kernel, part
-from shadowpuppet.kinematics import load_joints, place_joints
-from shadowpuppet.limbs import Body, Quads
 from shadowpuppet.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
 from shadowpuppet.spans import count_and_clear, draw_outline, find_edges, make_page
 

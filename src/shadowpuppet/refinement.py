@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.jacobian import STEP, TRANSLATION, make_chain, place_one
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.closest import LANES, Cloud, constants
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.forces import push
 from shadowpuppet.free_space import FreeSpace, free_space, push_inside, spheres_in
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.limbs import Body
 from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
 from shadowpuppet.part_sums import COST, EQUATIONS, FORCES, MODULATED, ROBUST, SUMS, gather_down, sweep
-from shadowpuppet.screws import STEP, TRANSLATION, make_chain, place_one
 
 
 class Pass(NamedTuple):

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.measuring import likely_height, measure, spread_of
@@ -21,7 +22,6 @@ from shadowpuppet.rig import Rig
 from shadowpuppet.rig_look import Opening
 from shadowpuppet.rig_run import Puppet
 from shadowpuppet.visual_hull import VisualHull
-from shadowpuppet.whole_sizes import WHOLE, BoneSizes
 
 
 def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options: Options, training: JointTable | None) -> Puppet:

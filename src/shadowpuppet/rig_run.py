@@ -12,13 +12,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask, may_be_person
 from shadowpuppet.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.options import Options, plain_options

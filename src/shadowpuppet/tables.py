@@ -11,13 +11,13 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from shadowpuppet.body.sizes import CardboxSizes, Sizes
 from shadowpuppet.fitting import Found
 from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
 from shadowpuppet.metrics import FAR, LOST
 from shadowpuppet.motion import JointTable
-from shadowpuppet.sizes import CardboxSizes, Sizes
 from shadowpuppet.synthetic.spec import Spec
 from shadowpuppet.training import Trained
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet import first_pose
+from shadowpuppet.body.segments import dofs_of, limbs_of
 from shadowpuppet.geometry import Array
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Cost, Observation
 from shadowpuppet.masks import Mask, check_mask
-from shadowpuppet.members import dofs_of, limbs_of
 from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.rasterize import Picture, count

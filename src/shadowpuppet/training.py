@@ -9,8 +9,10 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.whole_skeleton import GLOBAL
 from shadowpuppet.clips import mirrored, without_gaps
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
@@ -18,10 +20,8 @@ from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
 from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.skeleton import Skeleton
 from shadowpuppet.steady import resampled, resampled_table
 from shadowpuppet.vqpca import Choice, Fit, choose_regions, fit_prior
-from shadowpuppet.whole_skeleton import GLOBAL
 
 RATE = 60.0
 """Frames/s that are learnt where nothing else is wanted: HumanEva's, and the recordings' of the paper."""

@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
-from shadowpuppet.skeleton import Skeleton
 
 WIDER, LEAST = 1.5, 0.15
 """What training poses' deviations are multiplied by, and what they are at least (rad): others than those come."""

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from shadowpuppet.bodies import make_body, whole_from_upper
+from shadowpuppet.body.models import make_body, whole_from_upper
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.first_pose import search
 from shadowpuppet.geometry import Array, inverse, transform
@@ -15,8 +17,6 @@ from shadowpuppet.hypotheses import Guess
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.masks import Mask
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.sizes import CardboxSizes
-from shadowpuppet.whole_sizes import BoneSizes
 
 FEET = 2
 """A person whose silhouette reaches the picture's last rows is cut off there."""

@@ -12,7 +12,7 @@ import pytest
 
 import runs
 from damage import told_or_read
-from shadowpuppet.bodies import ALL
+from shadowpuppet.body.models import ALL
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.motion_table import LENGTHS, motion_columns, table_columns, write_columns_csv

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.bodies import average_sizes
+from shadowpuppet.body.models import average_sizes
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.person import Person, read_person, write_person
-from shadowpuppet.sizes import CardboxSizes
-from shadowpuppet.whole_sizes import WHOLE
 
 SIZES = CardboxSizes.from_array(np.linspace(0.05, 0.6, 18))
 text = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)

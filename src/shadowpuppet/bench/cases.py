@@ -10,8 +10,8 @@ from itertools import cycle
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.anthropometry import sizes_from_height
-from shadowpuppet.body import BODIES
+from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost

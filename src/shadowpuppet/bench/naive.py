@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.rasterize import Picture
-from shadowpuppet.skeleton import AXES, Skeleton
 
 Mask = NDArray[np.bool_]
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.shapes import Body, Limbs
+from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.geometry import Array, rotation_about, rotation_from_vector
-from shadowpuppet.limbs import Body, Limbs
 from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
-from shadowpuppet.skeleton import AXES, Skeleton
 
 FLAT = 1e-4
 """A dome lower than this (m) is a flat end."""

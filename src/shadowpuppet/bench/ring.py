@@ -9,11 +9,11 @@ from itertools import cycle
 
 import numpy as np
 
-from shadowpuppet.bodies import average_sizes, make_body
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera import Camera
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body
 from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior

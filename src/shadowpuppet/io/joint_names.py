@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shadowpuppet.body.segments import BONES
 from shadowpuppet.errors import FormatError
 from shadowpuppet.io._table import shorten
-from shadowpuppet.members import BONES
 from shadowpuppet.motion import JointTable
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))

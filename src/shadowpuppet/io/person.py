@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shadowpuppet.body.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.body.whole_sizes import KINDS, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
-from shadowpuppet.whole_sizes import KINDS, kind_of, sizes_kind
 
 KEYS = ("body", "height", "source", "notes", "sizes")
 UPPER = "rounded"

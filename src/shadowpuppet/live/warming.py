@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import average_sizes
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes
 from shadowpuppet.camera import Camera
 from shadowpuppet.initialization import Guess, find_person
 from shadowpuppet.options import Options

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT, whole_sizes_from_height
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, whole_sizes_from_height
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion import BLANK, MotionFrame
-from shadowpuppet.whole_sizes import AnatomicalSizes
 
 
 class Told(NamedTuple):

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.segments import BONES
 from shadowpuppet.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.footage import footage_of, opened
 from shadowpuppet.geometry import Array
-from shadowpuppet.members import BONES
 from shadowpuppet.metrics import LOST
 from shadowpuppet.motion import BLANK, JointTable
 from shadowpuppet.options import Options, make_options

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from shadowpuppet.animation import Animation
+from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body
-from shadowpuppet.members import BONES
 from shadowpuppet.motion import JointTable
 from shadowpuppet.puppet_mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.viewer.show import Figure

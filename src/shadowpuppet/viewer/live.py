@@ -8,12 +8,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.display.choice import FOOTERS
 from shadowpuppet.display.drawing import drawn
 from shadowpuppet.display.view import Display, View
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.limbs import Body
 from shadowpuppet.puppet_mesh import body_mesh
 from shadowpuppet.rasterize import Picture
 from shadowpuppet.viewer.pictures import Plain

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.bodies import ALL, average_sizes, make_body
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.prior import read_prior
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.figures import of_poses

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.bodies import make_body
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import motion_animation
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation, measure_run
@@ -19,7 +20,6 @@ from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.motion_table import dof_unit
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
-from shadowpuppet.limbs import Body
 from shadowpuppet.motion import Motion
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.puppet_mesh import body_mesh

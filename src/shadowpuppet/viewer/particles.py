@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import fitted
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body
-from shadowpuppet.members import BONES
 from shadowpuppet.motion import Motion
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.options import Options

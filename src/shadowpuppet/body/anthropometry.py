@@ -9,9 +9,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.whole_sizes import AnatomicalSizes, BoneSizes
 from shadowpuppet.geometry import Array
-from shadowpuppet.sizes import CardboxSizes
-from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes
 
 Whole = TypeVar("Whole", bound=BoneSizes)
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.skeleton import AXES, Skeleton
 
 TRANSLATION, ROTATION, VECTOR = 0, 1, 2
 KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.limbs import Body, Hulls, Limbs
-from shadowpuppet.skeleton import Skeleton
-from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
-from shadowpuppet.whole_skeleton import SIDES, anatomical_skeleton, cylinder_skeleton
+from shadowpuppet.body.shapes import Body, Hulls, Limbs
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
+from shadowpuppet.body.whole_skeleton import SIDES, anatomical_skeleton, cylinder_skeleton
 
 ALONG = {
     "up": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from shadowpuppet.body.sizes import CardboxSizes, Sizes
 from shadowpuppet.errors import ShadowPuppetError, choices
-from shadowpuppet.sizes import CardboxSizes, Sizes
 
 
 @dataclass(frozen=True)

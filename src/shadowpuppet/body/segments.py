@@ -9,11 +9,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.angles import angles_of
-from shadowpuppet.body import SIDES
+from shadowpuppet.body.angles import angles_of
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import Dof, Skeleton
+from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.geometry import Array, rotation_about
-from shadowpuppet.limbs import Body
-from shadowpuppet.skeleton import Dof, Skeleton
 
 
 def _both(torso: tuple[str, ...], arm: tuple[str, ...], leg: tuple[str, ...]) -> dict[str, tuple[str, ...]]:

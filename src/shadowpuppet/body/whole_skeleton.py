@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.skeleton import Dof, Joint, Skeleton
-from shadowpuppet.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
+from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.body.whole_sizes import AnatomicalSizes, BoneSizes, CylinderSizes
 
 SIDES = ("left", "right")
 Bounds = tuple[float, float]

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.skeleton import Skeleton
 
 
 @dataclass(frozen=True, eq=False)

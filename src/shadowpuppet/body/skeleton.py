@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.body.forward_kinematics import SHIFT, TURN, VECTOR, place_all, place_points
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import BLOCK
-from shadowpuppet.kinematics import SHIFT, TURN, VECTOR, place_all, place_points
 
 AXES = {"x": (0, 1.0), "y": (1, 1.0), "z": (2, 1.0), "-x": (0, -1.0), "-y": (1, -1.0), "-z": (2, -1.0)}
 

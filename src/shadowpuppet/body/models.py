@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from shadowpuppet.anthropometry import PROPORTIONS, SOLE, shares_of, sizes_from_height, whole_sizes_from_bones, whole_sizes_from_height
-from shadowpuppet.body import BODIES, HAND_SHARE, WRIST_SHARE
+from shadowpuppet.body.anthropometry import PROPORTIONS, SOLE, shares_of, sizes_from_height, whole_sizes_from_bones, whole_sizes_from_height
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import CardboxSizes, Sizes
+from shadowpuppet.body.upper_body import BODIES, HAND_SHARE, WRIST_SHARE
+from shadowpuppet.body.whole_body import anatomical, cylinders
+from shadowpuppet.body.whole_sizes import BoneSizes, sizes_kind
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.limbs import Body
-from shadowpuppet.sizes import CardboxSizes, Sizes
-from shadowpuppet.whole_body import anatomical, cylinders
-from shadowpuppet.whole_sizes import BoneSizes, sizes_kind
 
 Make = Callable[[Any], Body]
 """Sizes to a body."""

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shadowpuppet.body.shapes import Body, Hulls, Quads
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.skeleton import Coupling, Dof, Joint, Skeleton
 from shadowpuppet.geometry import Array
-from shadowpuppet.limbs import Body, Hulls, Quads
-from shadowpuppet.sizes import CardboxSizes
-from shadowpuppet.skeleton import Coupling, Dof, Joint, Skeleton
 
 SIDES = ("left", "right")
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import AXES, Dof
 from shadowpuppet.geometry import Array, branch, three_turns, unit
-from shadowpuppet.skeleton import AXES, Dof
 
 
 def angles_of(rotations: Array, dofs: Sequence[Dof]) -> Array:

@@ -1,0 +1,1 @@
+"""The jointed person: skeleton, sizes, shapes, models by name, kinematics."""
