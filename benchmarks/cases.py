@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.fitting import find
 from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes
 from shadowpuppet.geometry import Array

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from shadowpuppet import hierarchy
+from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.pipeline import track_recording
-from shadowpuppet.rasterize import unpack
 
 
 class DistanceCost(PartialCost):

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration import read_calibration
-from shadowpuppet.masks import Mask
 from shadowpuppet.multiview_settings import HullSettings
 from shadowpuppet.video import open_frames
 from shadowpuppet.visual_hull import VisualHull, _silhouette

@@ -18,12 +18,12 @@ from cases import Case
 from proving_ground import HERE, made
 
 from shadowpuppet.body.upper_body import SIDES
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.first_pose import arm_dofs
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.metrics import UPPER
 from shadowpuppet.options import Options
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.tracking import MonocularTracker
 
 LEVELS = (400.0, 200.0, 100.0, 60.0, 40.0)

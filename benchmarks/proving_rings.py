@@ -25,9 +25,9 @@ import numpy as np
 from multiview import BUILD, made, measures
 
 from shadowpuppet.bench.chain import ONE_EACH
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.joints import read_joints
-from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import make_options

@@ -19,15 +19,15 @@ import numpy as np
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.segments import BONES
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import draw_model, draw_skeleton, write_text
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.options import make_options
-from shadowpuppet.overlay import draw_model, draw_skeleton, write_text
 from shadowpuppet.pipeline import track_recording
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.video import open_frames

@@ -14,7 +14,9 @@ import numpy as np
 from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import draw_model
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.demo import run_demo
 from shadowpuppet.geometry import Array
@@ -23,8 +25,6 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.multiview_settings import ForceSettings
 from shadowpuppet.options import Options
-from shadowpuppet.overlay import draw_model
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Ring, Spec

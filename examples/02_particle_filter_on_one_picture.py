@@ -10,11 +10,11 @@ import numpy as np
 
 from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.body.upper_body import cardbox
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import matching
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.overlay import matching
 from shadowpuppet.particle_filter import diffuse, evaluate, step
-from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.resampling import make_scheme
 from shadowpuppet.video import write_image
 

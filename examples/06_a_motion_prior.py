@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import shadowpuppet as sp
-from shadowpuppet.overlay import draw_model
+from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.synthetic import Gesture, Ring, Spec
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform

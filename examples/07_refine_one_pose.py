@@ -10,9 +10,9 @@ import numpy as np
 
 import shadowpuppet as sp
 from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.multiview_settings import ForceSettings
-from shadowpuppet.overlay import draw_model
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.synthetic import Ring, Spec
 from shadowpuppet.video import write_image

@@ -13,11 +13,11 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Limbs
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.masks import Mask
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
 
 CAMERAS = 5

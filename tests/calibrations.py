@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from solids import ring
 
 SIZE = (640, 480)

@@ -9,9 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.masks import Mask
 from shadowpuppet.video import write_frames
 from solids import Ellipsoid, ring, seen_by
 

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.shapes import Hulls
 from shadowpuppet.body.skeleton import AXES, Skeleton
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, rotation_from_vector, transform
 from shadowpuppet.hidden_markov import Posterior
-from shadowpuppet.projection import DIRECTIONS, NEAR
-from shadowpuppet.rasterize import Picture
 
 Mask = NDArray[np.bool_]
 

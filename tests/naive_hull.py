@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.projection import NEAR
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.masks import Mask
-from shadowpuppet.projection import NEAR
 from shadowpuppet.viewing_edges import CONFIRMED, FAR, SHORTEST
 
 

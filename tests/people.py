@@ -8,9 +8,9 @@ from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.upper_body import BODIES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.geometry import Array
-from shadowpuppet.rasterize import Picture, place
 
 SIZES = sizes_from_height(1.75)
 LENSES = {

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.masks import Mask
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import pytest
 
 import made_rig
 from shadowpuppet.agreement import agreement
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import inverse, rigid
 
 STEP = 1 / made_rig.RATE

@@ -11,13 +11,14 @@ import pytest
 
 import made
 from people import random_poses
-from shadowpuppet import cli, rasterize
+from shadowpuppet import cli
 from shadowpuppet.bench import chain, curves, mono, multi, naive, ring_film, whole
 from shadowpuppet.bench.cases import Case, Follower
 from shadowpuppet.bench.files import check_plans, write_figures
 from shadowpuppet.bench.ring import Around
 from shadowpuppet.bench.rivals import OpenCV, one_thread
 from shadowpuppet.bench.timing import Contender, Times, in_turns
+from shadowpuppet.camera import rasterize
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation, silhouette_costs

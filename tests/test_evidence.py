@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import actor
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.evidence import Evidence, Stage, _thinned
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.visual_hull import SurfacePoints
 from solids import looking
 

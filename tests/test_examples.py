@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shadowpuppet.rasterize import count
+from shadowpuppet.camera.rasterize import count
 from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, Viewpoint, synthesize
 
 ROOT = Path(__file__).resolve().parents[1]

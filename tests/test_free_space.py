@@ -8,10 +8,10 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 
 import actor
 import made_rig
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import make_cloud
 from shadowpuppet.free_space import OTHERS, TAU, Spheres, free_space, push_inside, spheres_in
 from shadowpuppet.part_sums import SUMS
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.refinement import Pass, Refiner
 
 BENT = (-0.09, 0.05, 0.0, 0.0)

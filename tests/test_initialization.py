@@ -11,13 +11,13 @@ from people import camera, random_poses
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePrior, sizes_from_height
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.body.upper_body import BODIES
+from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.fitting import wrong_posture
 from shadowpuppet.hypotheses import Bodies, Guess, Hypotheses
 from shadowpuppet.initialization import POSTURES, Fit, find_person, fit_references, refine
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.monocular_settings import InitializationSettings
-from shadowpuppet.rasterize import Picture, place, unpack
 
 CAMERA = camera((320, 240))
 AVERAGE = sizes_from_height(1.78)

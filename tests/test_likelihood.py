@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 import naive
 from people import camera, picture, random_poses
-from shadowpuppet import projection, rasterize, spans
 from shadowpuppet.body import forward_kinematics
 from shadowpuppet.body.segments import parts_of
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Coupling, Dof, Joint, Skeleton
 from shadowpuppet.body.upper_body import BODIES
+from shadowpuppet.camera import projection, rasterize, scanline
+from shadowpuppet.camera.rasterize import Picture, pack, unpack
 from shadowpuppet.jit import BLOCK
 from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
-from shadowpuppet.rasterize import Picture, pack, unpack
 
 STAGES = {"torso": "torso_", "left arm": "left_", "right arm": "right_", "both arms": ("left_", "right_"), "elbow": "left_elbow", "all": ""}
 
@@ -211,7 +211,7 @@ def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
     for odd in (np.asfortranarray(poses), np.repeat(poses, 2, 0)[::2], poses.tolist()):
         silhouette_costs(view, observation, odd)
     np.testing.assert_array_equal(cost(np.asfortranarray(poses)), cost(poses))
-    for kernel in (forward_kinematics.place_all, forward_kinematics.place_points, projection.project_quads, rasterize._compare, spans.find_edges):
+    for kernel in (forward_kinematics.place_all, forward_kinematics.place_points, projection.project_quads, rasterize._compare, scanline.find_edges):
         for signature in getattr(kernel, "signatures", []):
             layouts = {kind.layout for kind in signature if hasattr(kind, "layout")}
             assert layouts <= {"C"}, (kernel, signature)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.live.background import in_background
 from shadowpuppet.live.learning import Learner, moved

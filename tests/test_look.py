@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import made
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.diagnostics import mask_quality
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.fitting import DEEP, wrong_posture

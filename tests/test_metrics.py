@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from shadowpuppet import metrics
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector, transform
 from shadowpuppet.io.joints import read_joints, write_joints
@@ -253,6 +253,6 @@ def test_an_evaluation_is_all_plain_numbers():
 
 def test_measuring_and_reading_need_no_compiler_codec_or_pictures():
     code = ("import sys, shadowpuppet.metrics, shadowpuppet.io.joints, shadowpuppet.io.run, shadowpuppet.io.person\n"
-            "import shadowpuppet.overlay\n"
+            "import shadowpuppet.camera.drawing\n"
             "print([name for name in ('numba', 'av', 'cv2', 'matplotlib') if name in sys.modules])")
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet import overlay
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.upper_body import BODIES, CardboxSizes
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera import drawing
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import draw_model, matching, overlay_frame
+from shadowpuppet.camera.rasterize import Picture, unpack
 from shadowpuppet.errors import ShadowPuppetError, VideoError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.overlay import draw_model, matching, overlay_frame
-from shadowpuppet.rasterize import Picture, unpack
 from shadowpuppet.rig_overlay import OverlayWriter
 from shadowpuppet.video import open_frames
 
@@ -56,8 +56,8 @@ def test_the_middle_row_is_the_cost_in_colours(rng):
     model = picture.mask(pose)
     middle = rows(overlay_frame(image, mask, picture, pose, status="tracked", time=1.0, ignore=ignore))[1][LABEL:]
     model, mask, ignore = model[LABEL:], mask[LABEL:], ignore[LABEL:]
-    for colour, where in {overlay.MODEL_ONLY: model & ~mask, overlay.SILHOUETTE_ONLY: ~model & mask, overlay.WHITE: model & mask,
-                          overlay.BLACK: ~model & ~mask}.items():
+    for colour, where in {drawing.MODEL_ONLY: model & ~mask, drawing.SILHOUETTE_ONLY: ~model & mask, drawing.WHITE: model & mask,
+                          drawing.BLACK: ~model & ~mask}.items():
         np.testing.assert_array_equal((middle == colour).all(2), where & ~ignore)
         assert where.any()
 
@@ -97,7 +97,7 @@ def test_what_is_nearer_hides_what_is_behind(body, behind):
     image = np.zeros((120, 160, 3), np.uint8)
     draw_model(image, picture, pose)
     both = image[arm & torso].astype(float)
-    hues = np.array([overlay.SIDES["left"], overlay.MIDDLE], float)
+    hues = np.array([drawing.SIDES["left"], drawing.MIDDLE], float)
     nearest = (both @ (hues / np.linalg.norm(hues, axis=1, keepdims=True)).T).argmax(1)
     assert len(nearest) > 40
     assert (nearest == behind).mean() > 0.85
@@ -111,9 +111,9 @@ def test_the_skeleton_is_drawn_over_the_raw_picture(rng):
     points = picture.body.points(pose[None], picture.T_camera_base)[0]
     near = np.zeros(mask.shape, bool)
     for name, point in zip(picture.body.landmark_names, points):
-        x, y = np.round(overlay._pixels(picture, point)).astype(int)
+        x, y = np.round(drawing._pixels(picture, point)).astype(int)
         if name.endswith(("elbow", "wrist")):
-            assert tuple(bottom[y, x]) == overlay.WHITE
+            assert tuple(bottom[y, x]) == drawing.WHITE
         near[max(y - 40, 0) : y + 41, max(x - 40, 0) : x + 41] = True
     near[:LABEL] = True
     np.testing.assert_array_equal(bottom[~near], image[~near])
@@ -159,11 +159,11 @@ def test_any_pose_at_any_distance_is_drawn(seed, distance, body):
     frame = overlay_frame(np.zeros((120, 160), np.uint8), np.zeros((120, 160), bool), picture, pose, status="tracked", time=0.0)
     assert frame.shape == (360, 160, 3)
     middle = rows(frame)[1][LABEL:]
-    np.testing.assert_array_equal((middle == overlay.MODEL_ONLY).all(2), picture.mask(pose)[LABEL:])
+    np.testing.assert_array_equal((middle == drawing.MODEL_ONLY).all(2), picture.mask(pose)[LABEL:])
 
 
 def test_pixels_far_outside_stay_far_outside_in_fixed_point_numbers():
-    found = overlay._fixed(np.array([1e12, -1e12, 100.25]))
+    found = drawing._fixed(np.array([1e12, -1e12, 100.25]))
     assert found[0] > 1 << 18
     assert found[1] < -(1 << 18)
     assert found[2] == 1604

@@ -12,10 +12,10 @@ from people import LENSES, camera, picture, random_poses
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Joint, Skeleton
 from shadowpuppet.body.upper_body import BODIES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR, make_lens
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.projection import DIRECTIONS, NEAR, make_lens
-from shadowpuppet.rasterize import Picture
 
 seeds = st.integers(0, 2**32 - 1)
 

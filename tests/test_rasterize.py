@@ -12,11 +12,11 @@ import naive
 from people import SIZES, camera, picture, random_poses
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.upper_body import BODIES, upper_body_skeleton
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.rasterize import Picture, count, draw_polygon, pack, place, unpack
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
-from shadowpuppet.rasterize import Picture, count, draw_polygon, pack, place, unpack
 from test_body import mirrored
 
 UNIT = 64

@@ -14,7 +14,7 @@ import pytest
 from made import write_film
 from measured import NAMES, moved, person, write_run
 from shadowpuppet import cli
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Comparison, measure_run
 from shadowpuppet.geometry import rigid

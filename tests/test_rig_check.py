@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import made_rig
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector

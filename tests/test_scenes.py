@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, motions, synthesize

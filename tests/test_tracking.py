@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from people import camera, picture
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, TrackingError
 from shadowpuppet.first_pose import search
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Observation, silhouette_costs
 from shadowpuppet.monocular_settings import MonocularSettings, make_settings
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import SCHEMES
 from shadowpuppet.tracking import MonocularTracker, State
 

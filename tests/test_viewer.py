@@ -19,7 +19,7 @@ import made_rig
 from runs import body_of, make_run, smooth_poses
 from shadowpuppet.body.shapes import Quads
 from shadowpuppet.body_animation import BodyTree
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run as command
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about

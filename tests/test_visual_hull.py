@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import naive_hull
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector, transform
 from shadowpuppet.io.calibration import read_calibration

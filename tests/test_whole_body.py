@@ -12,10 +12,10 @@ from shadowpuppet.body.models import ALL, average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.body.whole_sizes import KINDS, WHOLE, kind_of, sizes_kind
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.synthetic.mannequin import JOINTS
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}

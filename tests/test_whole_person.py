@@ -12,13 +12,13 @@ from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.body.models import average_sizes, make_body, whole_from_upper
 from shadowpuppet.body.segments import steady
 from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.hypotheses import Guess
 from shadowpuppet.initialization import Fit, as_whole, find_person
 from shadowpuppet.likelihood import Observation
 from shadowpuppet.monocular_settings import InitializationSettings, make_settings
 from shadowpuppet.options import Options
-from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.tracking import MonocularTracker
 from shadowpuppet.whole_person import whole_person

@@ -9,9 +9,9 @@ from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.liu2011.material import Case, Part, cases
 from papers.liu2011.repeats import Runs, repeat
 from papers.liu2011.shown import stem, told
+from shadowpuppet.camera.drawing import draw_model, in_colour, matching
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.overlay import draw_model, in_colour, matching
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.status import UNCERTAIN
 from shadowpuppet.video import Image
 

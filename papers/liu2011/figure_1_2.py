@@ -12,10 +12,10 @@ from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.body.upper_body import BODIES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import draw_model, write_text
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.geometry import Array, rigid, rotation_about
-from shadowpuppet.overlay import draw_model, write_text
-from shadowpuppet.rasterize import Picture, place
 from shadowpuppet.video import Image
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import stem, told
-from shadowpuppet.masks import Mask
-from shadowpuppet.overlay import in_colour, write_text
+from shadowpuppet.camera.drawing import in_colour, write_text
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.video import Image
 

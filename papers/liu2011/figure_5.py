@@ -10,8 +10,8 @@ from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from papers.liu2011.material import Case, cases
 from papers.liu2011.shown import stem, told
+from shadowpuppet.camera.drawing import in_colour
 from shadowpuppet.geometry import Array
-from shadowpuppet.overlay import in_colour
 from shadowpuppet.resampling import deterministic
 from shadowpuppet.tracking import MonocularTracker
 

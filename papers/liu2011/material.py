@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from papers.common.experiment import Request
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import Guess
@@ -26,7 +27,6 @@ from shadowpuppet.metrics import match
 from shadowpuppet.monocular_settings import MonocularSettings, make_settings
 from shadowpuppet.motion import JointTable
 from shadowpuppet.options import Options, make_options, plain_options
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.motions import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from

@@ -14,9 +14,9 @@ from papers.common.experiment import Outcome, Request, Table
 from papers.ni2008.inputs import Case, Source, load, sources
 from papers.ni2008.measures import Errors, errors
 from papers.ni2008.tracks import HYBRID, Track, of, tracks
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.video import open_frames
 
 GREEN, RED, GROUND, INK = (70, 160, 40), (60, 60, 220), 255, (40, 40, 40)

@@ -21,10 +21,10 @@ from papers.common.experiment import Request
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.whole_sizes import sizes_kind
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration, write_calibration
-from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.synthetic import Spec, humaneva, synthesize
 from shadowpuppet.visual_hull import SurfacePoints

@@ -11,10 +11,10 @@ from papers.ni2008.inputs import BODY
 from shadowpuppet.bench import naive_multi as plain
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Limbs
+from shadowpuppet.camera.drawing import draw_model
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.multiview_settings import make_multiview_settings
-from shadowpuppet.overlay import draw_model
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.synthetic import Viewpoint
 
 HEIGHT, LIFT = 1.75, 0.95

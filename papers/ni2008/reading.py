@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from papers.ni2008.inputs import BODY, Source
 from shadowpuppet.body.models import make_body
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.masks import Mask
 from shadowpuppet.measuring import measure, spread_of
 from shadowpuppet.motion import JointTable
 from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.options import make_options
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import follow, open_rig
 from shadowpuppet.rig_look import check_rig, look_at_rig
 from shadowpuppet.synthetic.mannequin import JOINTS

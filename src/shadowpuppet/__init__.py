@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from shadowpuppet.body.sizes import CardboxSizes
     from shadowpuppet.body.whole_sizes import AnatomicalSizes, CylinderSizes
-    from shadowpuppet.camera import Camera
+    from shadowpuppet.camera.camera import Camera
+    from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
     from shadowpuppet.exporting import convert_motion, export_run
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.prior_settings import PriorSettings
-    from shadowpuppet.rasterize import Picture
     from shadowpuppet.report.page import write_report
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
@@ -49,13 +49,13 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOMES = {
-    "CardboxSizes": "body.sizes", "Camera": "camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
+    "CardboxSizes": "body.sizes", "Camera": "camera.camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
     "find_person": "initialization", "fit_references": "initialization", "read_calibration": "io.calibration",
     "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints", "Person": "io.person",
     "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",
     "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "metrics", "JointTable": "motion", "Motion": "motion",
     "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
-    "Picture": "rasterize", "MonocularSettings": "monocular_settings", "make_settings": "monocular_settings",
+    "Picture": "camera.rasterize", "MonocularSettings": "monocular_settings", "make_settings": "monocular_settings",
     "SilhouetteSettings": "silhouette", "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking",
     "open_frames": "video", "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "prior_settings",
     "choose_regions": "vqpca", "fit_prior": "vqpca", "read_prior": "io.prior", "write_prior": "io.prior",

@@ -8,10 +8,10 @@ from itertools import combinations
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.coverage import Coverage, meeting_place
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.masks import Mask
 from shadowpuppet.tangency import Outline, Outlines, tangent_distances
 
 DISAGREES = 0.01

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.jit import compiled
-from shadowpuppet.masks import Mask
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
-from shadowpuppet.masks import Mask, may_be_person
 from shadowpuppet.tangency import Outline
 
 PIXELS, DEPTHS = 24, 32

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import NEARLY_ALL, Mask
 from shadowpuppet.errors import SilhouetteError
-from shadowpuppet.masks import NEARLY_ALL, Mask
 
 TINY = 0.003
 """Share of the picture below which limbs are too few pixels wide (15 pixels high of 240)."""

@@ -11,7 +11,7 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.intervals import coverage
 from shadowpuppet.io._files import write_whole

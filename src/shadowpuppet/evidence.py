@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.free_space import FreeSpace, free_space
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Cost, Observation, silhouette_costs
-from shadowpuppet.masks import Mask, may_be_person
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.visual_hull import SurfacePoints
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.whole_sizes import WHOLE
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
 from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import POSTURES, Fit, Guess, as_whole, find_person, fit_references
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
-from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette.outlines import disc
 from shadowpuppet.tracking import MonocularTracker

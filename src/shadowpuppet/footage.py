@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.options import Options

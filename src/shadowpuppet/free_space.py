@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.projection import NEAR, bend_within, make_lens
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel, part
-from shadowpuppet.masks import Mask
-from shadowpuppet.projection import NEAR, bend_within, make_lens
 
 APART = 0.07
 """Spheres on a limb's axis are about this far apart, metres."""

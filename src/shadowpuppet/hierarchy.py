@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.body.segments import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.monocular_settings import MonocularSettings, pixel_scale
 from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
 
 WANDER, AROUND = 0.3, 0.2

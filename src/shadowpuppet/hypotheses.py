@@ -13,13 +13,13 @@ from shadowpuppet.body.anthropometry import SizePrior
 from shadowpuppet.body.models import Make, make_body
 from shadowpuppet.body.sizes import CardboxSizes, Sizes
 from shadowpuppet.body.upper_body import BODIES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation
-from shadowpuppet.masks import Mask
 from shadowpuppet.monocular_settings import InitializationSettings, pixel_scale
-from shadowpuppet.rasterize import Picture, place
 
 NAMES = CardboxSizes.names()
 MAY_BE_NEGATIVE = ("neck_gap", "shoulder_inset")

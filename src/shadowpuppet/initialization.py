@@ -12,14 +12,14 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, siz
 from shadowpuppet.body.models import Make, make_body
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
+from shadowpuppet.camera.rasterize import place
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.first_pose import beside, search
 from shadowpuppet.geometry import Array
 from shadowpuppet.hypotheses import Guess, Hypotheses
-from shadowpuppet.masks import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.monocular_settings import InitializationSettings
-from shadowpuppet.rasterize import place
 from shadowpuppet.whole_person import whole_person
 
 POSTURES: Mapping[str, Mapping[str, float]] = {

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.camera.rasterize import Bits, Picture, count, pack
 from shadowpuppet.geometry import Array
-from shadowpuppet.rasterize import Bits, Picture, count, pack
 
 Cost = Callable[[Array], Array]
 """Poses (N, D) to costs (N,), the lower the better."""

@@ -17,11 +17,11 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import HEIGHTS
 from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.bundle import Measured, solve_bundle
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.masks import Mask
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.visual_hull import SurfacePoints

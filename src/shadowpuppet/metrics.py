@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.segments import BONES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion import JointTable, Motion

@@ -11,11 +11,11 @@ import numpy as np
 
 from shadowpuppet import postures
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Cost
-from shadowpuppet.masks import Mask
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.particle_filter import Particles, Refine, Weigh, step

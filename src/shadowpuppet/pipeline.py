@@ -13,6 +13,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.fitting import Found
 from shadowpuppet.footage import opened
 from shadowpuppet.io._files import write_whole
@@ -22,7 +23,6 @@ from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.look import Look, Prepared, check, prepare
 from shadowpuppet.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options, plain_options
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.repeats import Repeats
 from shadowpuppet.rig import chosen_views, open_rig
 from shadowpuppet.rig_fitting import prepare_puppet

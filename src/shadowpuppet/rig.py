@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError, VideoError, choices
 from shadowpuppet.footage import Footage, Mask, Shot, footage_of, opened
 from shadowpuppet.io.recording import Recording, View

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.agreement import DISAGREES, Agreement, agreement
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
 from shadowpuppet.lateness import Lateness, lateness
-from shadowpuppet.masks import may_be_person
 from shadowpuppet.options import Options
 from shadowpuppet.rig import Rig, follow, usable_cores
 from shadowpuppet.running import Listener

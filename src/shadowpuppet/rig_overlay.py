@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shadowpuppet.camera.drawing import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, overlay_frame, write_text
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion import MotionFrame
-from shadowpuppet.overlay import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, overlay_frame, write_text
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import FrameSet
 from shadowpuppet.video import FrameWriter, Image
 
 if TYPE_CHECKING:  # both bring much with them
-    from shadowpuppet.masks import Mask
-    from shadowpuppet.rasterize import Picture
+    from shadowpuppet.camera.mask import Mask
+    from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import FrameWriter, Image
 
 WIDEST, TALLEST = 1600, 1000

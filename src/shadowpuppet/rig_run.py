@@ -13,16 +13,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.masks import Mask, may_be_person
 from shadowpuppet.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.options import Options, plain_options
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.rig import FrameSet, Rig, follow, open_rig
 from shadowpuppet.rig_look import Opening, PreparedRig, RigLook, check_rig, look_at_rig
 from shadowpuppet.rig_overlay import RigOverlayWriter

@@ -13,7 +13,7 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io._plain import for_json, plain
 from shadowpuppet.io.recording import Recording

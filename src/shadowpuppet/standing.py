@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import UPS, Calibration, look_into
 

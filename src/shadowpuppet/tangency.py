@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
-from shadowpuppet.masks import Mask, may_be_person
 
 WIDE = 2.6
 """Radians that a silhouette may cover around the line from camera to camera: beyond, that line runs through or along it."""

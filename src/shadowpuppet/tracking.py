@@ -10,13 +10,13 @@ import numpy as np
 
 from shadowpuppet import first_pose
 from shadowpuppet.body.segments import dofs_of, limbs_of
+from shadowpuppet.camera.mask import Mask, check_mask
+from shadowpuppet.camera.rasterize import Picture, count
 from shadowpuppet.geometry import Array
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.likelihood import Cost, Observation
-from shadowpuppet.masks import Mask, check_mask
 from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
-from shadowpuppet.rasterize import Picture, count
 from shadowpuppet.resampling import Scheme
 from shadowpuppet.status import ABSENT, status_of
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector
-from shadowpuppet.masks import Mask
 from shadowpuppet.tangency import Outline, Outlines, tangent_angles
 
 WORST = 1.0

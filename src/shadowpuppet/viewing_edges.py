@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.projection import NEAR, bend_within
 from shadowpuppet.contours import ARM
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import compiled, kernel
-from shadowpuppet.projection import NEAR, bend_within
 
 Indices = NDArray[np.int64]
 

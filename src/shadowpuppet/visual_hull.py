@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, check_mask, may_be_person
+from shadowpuppet.camera.projection import make_lens
 from shadowpuppet.contours import trace
 from shadowpuppet.errors import CalibrationError, TrackingError
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.masks import Mask, check_mask, may_be_person
 from shadowpuppet.multiview_settings import HullSettings
-from shadowpuppet.projection import make_lens
 from shadowpuppet.viewing_edges import circles, cut, length, spread, straighten
 
 GRID = 4

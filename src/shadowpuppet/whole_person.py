@@ -10,13 +10,13 @@ import numpy as np
 from shadowpuppet.body.models import make_body, whole_from_upper
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.whole_sizes import BoneSizes
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.first_pose import search
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.hypotheses import Guess
 from shadowpuppet.likelihood import Observation
-from shadowpuppet.masks import Mask
-from shadowpuppet.rasterize import Picture
 
 FEET = 2
 """A person whose silhouette reaches the picture's last rows is cut off there."""

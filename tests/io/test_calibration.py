@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration import read_calibration, write_calibration

@@ -6,7 +6,7 @@ import av
 import numpy as np
 import pytest
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run
 from shadowpuppet.errors import CalibrationError, FormatError, RecordingError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_from_vector

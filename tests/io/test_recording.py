@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, VideoError
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.recording import POSTURES, Subject, read_recording

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import calibrations
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration import UPS, find_calibration, is_calibration, look_into, read_calibration, stood_up, write_calibration

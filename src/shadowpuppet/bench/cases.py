@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.body.upper_body import BODIES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.monocular_settings import make_settings
-from shadowpuppet.rasterize import Picture, place, unpack
 from shadowpuppet.tracking import MonocularTracker
 
 SIZE = (320, 240)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import AXES, Skeleton
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.hierarchy import FilterStage
 from shadowpuppet.monocular_settings import MonocularSettings
-from shadowpuppet.rasterize import Picture
 
 Mask = NDArray[np.bool_]
 

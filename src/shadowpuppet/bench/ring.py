@@ -11,15 +11,15 @@ import numpy as np
 
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.masks import Mask
 from shadowpuppet.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import ForceSettings, MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewTracker
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.synthetic import Ring
 from shadowpuppet.training import RATE, train_prior

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shadowpuppet.camera.drawing import SILHOUETTE_ONLY, draw_skeleton
 from shadowpuppet.display.view import View
-from shadowpuppet.overlay import SILHOUETTE_ONLY, draw_skeleton
 
 if TYPE_CHECKING:
-    from shadowpuppet.rasterize import Picture
+    from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image, Size
 
 LEAST, MOST = 640, 960

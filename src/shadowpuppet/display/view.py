@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:  # they bring a compiler with them
     from numpy.typing import NDArray
 
-    from shadowpuppet.rasterize import Picture
+    from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image
 
 PHASES = ("learning", "waiting", "measuring", "tracking")

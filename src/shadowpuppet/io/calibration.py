@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io._files import reason, write_whole

@@ -10,7 +10,7 @@ from typing import Any
 from warnings import warn
 
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
 from shadowpuppet.io.calibration import UNITS, UPS, find_calibration, read_calibration, read_toml
 from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.video import FrameWriter, Image, write_frames

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.display.view import Angle, View
 from shadowpuppet.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
 from shadowpuppet.initialization import Fit, find_person

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
 from shadowpuppet.footage import worked_size
 from shadowpuppet.io.calibration import read_calibration

@@ -8,7 +8,7 @@ import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.initialization import Guess, find_person
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette import learn_background

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import BONES
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.footage import footage_of, opened
@@ -19,7 +20,6 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.metrics import LOST
 from shadowpuppet.motion import BLANK, JointTable
 from shadowpuppet.options import Options, make_options
-from shadowpuppet.overlay import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.rig import chosen_views
 from shadowpuppet.rig_overlay import grid_of
 from shadowpuppet.synchrony import at_times, match, step_of

@@ -10,7 +10,7 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import motions

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.kinematics import Figure

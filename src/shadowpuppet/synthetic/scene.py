@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.synthetic import walls
 from shadowpuppet.synthetic.furniture import Furniture

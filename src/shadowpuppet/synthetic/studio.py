@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.furniture import Furniture

@@ -10,6 +10,7 @@ import numpy as np
 from shadowpuppet.body.segments import BONES
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body_animation import fitted
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
@@ -17,7 +18,6 @@ from shadowpuppet.motion import Motion
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate
-from shadowpuppet.rasterize import Picture
 from shadowpuppet.resampling import normalise
 from shadowpuppet.tracking import MonocularTracker, State
 from shadowpuppet.viewer.show import Cloud, Eye, Spread

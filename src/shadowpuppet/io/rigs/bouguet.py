@@ -7,7 +7,7 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.rigs.draft import Draft, Found, text_of

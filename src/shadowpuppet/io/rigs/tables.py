@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 from shadowpuppet.io._toml import read_toml

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.forward_kinematics import load_joints, place_joints
 from shadowpuppet.body.shapes import Body, Quads
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
+from shadowpuppet.camera.scanline import count_and_clear, draw_outline, find_edges, make_page
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 from shadowpuppet.jit import BLOCK, kernel, part
-from shadowpuppet.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
-from shadowpuppet.spans import count_and_clear, draw_outline, find_edges, make_page
 
 Bits = NDArray[np.uint64]
 Shapes = tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]

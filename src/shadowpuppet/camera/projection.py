@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.camera import Camera
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel, part
 

@@ -12,7 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, transform
 
 if TYPE_CHECKING:  # both bring much with them
-    from shadowpuppet.rasterize import Picture
+    from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image
 
 # Colours (blue, green, red) that people who see colours differently tell apart: Okabe & Ito 2008.

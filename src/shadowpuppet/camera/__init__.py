@@ -1,0 +1,1 @@
+"""How a camera sees a body: projection, rasterised silhouettes, masks, drawing."""
