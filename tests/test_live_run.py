@@ -34,7 +34,7 @@ from shadowpuppet.live.run import LiveListener, run_live
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.options import make_options
 from shadowpuppet.video import write_image
-from shadowpuppet.video.feed import Feed, Snapshot
+from shadowpuppet.video.live_source import Feed, Snapshot
 
 SHORT = ["--learn", "0.8", "--still", "0.3"]
 OPTIONS = make_options(QUICK | {"height": HEIGHT, "distance": 2.0, "fov": FOV})

@@ -21,7 +21,7 @@ from shadowpuppet.live.vigil import FIRST_PATIENCE, Vigil
 from shadowpuppet.live.waiting import Waiter, unfit
 from shadowpuppet.options import make_options
 from shadowpuppet.settings import validate
-from shadowpuppet.video.feed import Snapshot
+from shadowpuppet.video.live_source import Snapshot
 
 SIZE = (160, 120)
 OPTIONS = make_options(QUICK | {"height": HEIGHT, "distance": 2.0})

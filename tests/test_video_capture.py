@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 import made
 from live_film import Clock
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
-from shadowpuppet.video import FrameSource, open_frames, stream, write_image
+from shadowpuppet.video import FrameSource, network_stream, open_frames, write_image
 from shadowpuppet.video.capture import FIRST_WAIT, LONGEST_WAIT, Capture, Newest
-from shadowpuppet.video.feed import Feed, Snapshot, film_feed, open_feed
 from shadowpuppet.video.frames import Frame
-from shadowpuppet.video.stream import without_secrets
+from shadowpuppet.video.live_source import Feed, Snapshot, film_feed, open_feed
+from shadowpuppet.video.network_stream import without_secrets
 
 GREY = np.full((12, 16, 3), 90, np.uint8)
 
@@ -352,7 +352,7 @@ def test_a_network_camera_is_read_as_it_comes_and_taken_up_again(camera_server):
 
 
 def test_a_stream_that_stalls_is_said_and_not_waited_for_forever(camera_server, monkeypatch):
-    monkeypatch.setattr(stream, "READ_SECONDS", 0.4)
+    monkeypatch.setattr(network_stream, "READ_SECONDS", 0.4)
     _, handler, address = camera_server
     handler.stall = 30.0
     with Capture(open_feed(address)) as capture:
@@ -361,7 +361,7 @@ def test_a_stream_that_stalls_is_said_and_not_waited_for_forever(camera_server, 
 
 
 def test_an_address_that_does_not_answer_is_given_up(monkeypatch):
-    monkeypatch.setattr(stream, "OPEN_SECONDS", 0.3)
+    monkeypatch.setattr(network_stream, "OPEN_SECONDS", 0.3)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()

@@ -32,8 +32,8 @@ from shadowpuppet.outlets.outlet import Outlets, Subject
 from shadowpuppet.pipeline import Listener, named_body
 from shadowpuppet.settings import validate
 from shadowpuppet.video.capture import Capture
-from shadowpuppet.video.feed import Feed, open_feed
-from shadowpuppet.video.stream import without_secrets
+from shadowpuppet.video.live_source import Feed, open_feed
+from shadowpuppet.video.network_stream import without_secrets
 
 IDLE = 0.05
 """Seconds that a new picture is waited for before the display is served."""

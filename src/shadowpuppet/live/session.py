@@ -27,7 +27,7 @@ from shadowpuppet.silhouette import learn_background
 from shadowpuppet.status import LOST
 from shadowpuppet.tracking import MonocularTracker, State
 from shadowpuppet.video import Image
-from shadowpuppet.video.feed import Snapshot
+from shadowpuppet.video.live_source import Snapshot
 
 GONE = 2.0
 """Seconds for which a person is lost, after which a new measurement is advised."""

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import VideoError
+from shadowpuppet.video.camera_device import camera_number, open_camera
 from shadowpuppet.video.film import open_film
 from shadowpuppet.video.frames import Frame, FrameSource, Image, Size
-from shadowpuppet.video.live import camera_number, open_camera
-from shadowpuppet.video.pictures import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
+from shadowpuppet.video.images import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames
 
 __all__ = ["IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "open_frames", "read_image",

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Generic, Self, TypeVar
 
 from shadowpuppet.errors import VideoError
-from shadowpuppet.video.feed import Feed, Snapshot
+from shadowpuppet.video.live_source import Feed, Snapshot
 
 Item = TypeVar("Item")
 FIRST_WAIT, LONGEST_WAIT = 0.5, 8.0

@@ -14,7 +14,7 @@ import numpy as np
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.film import Break, converter, decoded, opened
 from shadowpuppet.video.frames import ASSUMED_RATE, Image, Size
-from shadowpuppet.video.pictures import IMAGE_SUFFIXES, in_folder, read_image
+from shadowpuppet.video.images import IMAGE_SUFFIXES, in_folder, read_image
 
 if TYPE_CHECKING:
     from av import VideoFrame

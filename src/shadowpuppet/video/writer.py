@@ -13,7 +13,7 @@ import numpy as np
 
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.frames import Image, Size, reason, size_of
-from shadowpuppet.video.pictures import check_image
+from shadowpuppet.video.images import check_image
 
 if TYPE_CHECKING:
     from av import VideoFrame

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
 from shadowpuppet.video import IMAGE_SUFFIXES, FrameSource, Image, Size, camera_number, open_frames
+from shadowpuppet.video.camera_device import open_device, pictures
 from shadowpuppet.video.film import tells_times
 from shadowpuppet.video.frames import size_of
-from shadowpuppet.video.live import open_device, pictures
-from shadowpuppet.video.stream import SCHEMES, open_stream, without_secrets
+from shadowpuppet.video.network_stream import SCHEMES, open_stream, without_secrets
 
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 """How a network address begins."""
