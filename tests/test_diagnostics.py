@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.diagnostics import mask_quality
 from shadowpuppet.errors import SilhouetteError
+from shadowpuppet.silhouette.quality import mask_quality
 
 SIZE = (60, 80)
 

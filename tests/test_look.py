@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import made
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.diagnostics import mask_quality
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.fitting import DEEP, wrong_posture
 from shadowpuppet.footage import (
@@ -29,6 +28,7 @@ from shadowpuppet.initialization import POSTURES, Fit, Guess, sizes_from_height
 from shadowpuppet.look import prepare, quality_of
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.pipeline import json_text, look_at, track_recording
+from shadowpuppet.silhouette.quality import mask_quality
 
 QUICK = {"rounds": 20, "patience": 5, "sweeps": 2}
 

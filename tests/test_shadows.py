@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
-from shadowpuppet.silhouette.rules import KeyRule
+from shadowpuppet.silhouette.classifiers import KeyRule
 from shadowpuppet.silhouette.shadows import ASKED, INWARD, OUTWARD, SHADED, _sums, resolve
 from silhouette_scenes import SIZE, empty_shots, overlap, scene, shot
 

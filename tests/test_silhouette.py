@@ -13,10 +13,10 @@ import pytest
 from shadowpuppet.errors import SettingsError, SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background, ready_mask
 from shadowpuppet.silhouette.background import to_planes
+from shadowpuppet.silhouette.boundary import SHARP, Outline
+from shadowpuppet.silhouette.channels import wardrobe_share
+from shadowpuppet.silhouette.classifiers import KeyRule
 from shadowpuppet.silhouette.cleanup import clean, person, without_holes
-from shadowpuppet.silhouette.keys import wardrobe_share
-from shadowpuppet.silhouette.outlines import SHARP, Outline
-from shadowpuppet.silhouette.rules import KeyRule
 from silhouette_scenes import CLEANED, METHODS, SIZE, dressed, empty_shots, figure, grey, overlap, scene, shot
 
 # ---------------------------------------------------------------- silhouettes

@@ -14,8 +14,8 @@ from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background
 from shadowpuppet.silhouette._kernels import classify, contrast, far_from_samples
 from shadowpuppet.silhouette.background import Spread, film_noise, learn_statistics, smoothed, to_planes
-from shadowpuppet.silhouette.outlines import SHARP, THIN, Outline, at_half_contrast, outline_width
-from shadowpuppet.silhouette.rules import PlainRule
+from shadowpuppet.silhouette.boundary import SHARP, THIN, Outline, at_half_contrast, outline_width
+from shadowpuppet.silhouette.classifiers import PlainRule
 from silhouette_scenes import CLEANED, SIZE, dressed, empty_shots, figure, grey, scene, shot
 
 # ---------------------------------------------------------------- eq. 1
@@ -214,7 +214,7 @@ def test_the_outline_lies_at_half_contrast_however_far_the_first_mask_reaches(bl
 @pytest.fixture
 def thick(monkeypatch):
     """Whoever is blurred has no thin limbs."""
-    monkeypatch.setattr("shadowpuppet.silhouette.outlines.THIN", 1.0)
+    monkeypatch.setattr("shadowpuppet.silhouette.boundary.THIN", 1.0)
 
 
 def test_blurred_films_have_wide_outlines(thick):

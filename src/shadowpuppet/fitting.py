@@ -20,7 +20,7 @@ from shadowpuppet.initialization import POSTURES, Fit, Guess, as_whole, find_per
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.options import Options
-from shadowpuppet.silhouette.outlines import disc
+from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.tracking import MonocularTracker
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}

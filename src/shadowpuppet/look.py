@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.diagnostics import MaskQuality, mask_quality
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.fitting import Found, find, told_scale
 from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes, clear_silhouettes, open_footage, silhouettes, take_sample
 from shadowpuppet.metrics import overlap
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 
 UNEVEN = 0.1
 """Jitter of the times over the time from frame to frame from which on the film's rate varies."""

@@ -14,13 +14,13 @@ import numpy as np
 from shadowpuppet.agreement import Agreement, agreement
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
-from shadowpuppet.diagnostics import MaskQuality
 from shadowpuppet.errors import ShadowPuppetWarning, TrackingError
 from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
 from shadowpuppet.look import GOOD, mean_overlap, quality_of
 from shadowpuppet.options import Options
 from shadowpuppet.rig import Rig, follow
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.quality import MaskQuality
 from shadowpuppet.threads import usable_cores
 
 OPENING, OPENED = 2.0, 40

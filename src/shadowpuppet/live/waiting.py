@@ -6,8 +6,8 @@ from collections import deque
 
 import numpy as np
 
-from shadowpuppet.diagnostics import CONTACT, NEARLY_ALL
 from shadowpuppet.footage import Mask
+from shadowpuppet.silhouette.quality import CONTACT, NEARLY_ALL
 
 NOBODY, TOO_NEAR = 0.015, 0.6
 """Share of the picture under which a silhouette is nobody, and from which on a person is too near."""

@@ -5,7 +5,7 @@
 
 from shadowpuppet.silhouette.background import background_from_film
 from shadowpuppet.silhouette.learning import learn_background
-from shadowpuppet.silhouette.ready import ready_mask
+from shadowpuppet.silhouette.ready_mask import ready_mask
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.silhouette.outlines import REACH, Contrast, Mask, Outline, at_half_contrast, disc
+from shadowpuppet.silhouette.boundary import REACH, Contrast, Mask, Outline, at_half_contrast, disc
 
 Window = tuple[slice, slice]
 """Rows and columns."""

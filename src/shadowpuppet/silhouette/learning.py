@@ -10,10 +10,10 @@ import numpy as np
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
 from shadowpuppet.silhouette.background import Background, Image
+from shadowpuppet.silhouette.boundary import SHARP, Outline, disc, outline_width
+from shadowpuppet.silhouette.channels import Choice, choose_key
+from shadowpuppet.silhouette.classifiers import SAMPLES, KeyRule, MixtureRule, NeighbourRule, PlainRule
 from shadowpuppet.silhouette.cleanup import coarse_person
-from shadowpuppet.silhouette.keys import Choice, choose_key
-from shadowpuppet.silhouette.outlines import SHARP, Outline, disc, outline_width
-from shadowpuppet.silhouette.rules import SAMPLES, KeyRule, MixtureRule, NeighbourRule, PlainRule
 from shadowpuppet.silhouette.segmenter import Segmenter, plain_rule
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 

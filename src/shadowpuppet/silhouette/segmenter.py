@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
+from shadowpuppet.silhouette.boundary import Contrast, Mask, Outline
+from shadowpuppet.silhouette.classifiers import KEYED, PlainRule
 from shadowpuppet.silhouette.cleanup import Window, clean
-from shadowpuppet.silhouette.outlines import Contrast, Mask, Outline
-from shadowpuppet.silhouette.rules import KEYED, PlainRule
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 EVERYTHING: Window = (slice(None), slice(None))

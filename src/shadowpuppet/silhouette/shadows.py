@@ -15,7 +15,7 @@ from shadowpuppet.jit import compiled
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image
-    from shadowpuppet.silhouette.outlines import Mask
+    from shadowpuppet.silhouette.boundary import Mask
 
 SHADED = 3
 """The label of pixels that may be either."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Floats, Image, smoothed, to_brightness, to_planes
-from shadowpuppet.silhouette.outlines import Mask
+from shadowpuppet.silhouette.boundary import Mask
 
 KEYED = {"brightness": (1, 0, 0), "colour": (0, 1, 1), "both": (1, 1, 1)}
 """Channels of Y, Cr, Cb that each key compares."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.silhouette.background import to_planes
-from shadowpuppet.silhouette.rules import CERTAIN, KEYED, KeyRule
+from shadowpuppet.silhouette.classifiers import CERTAIN, KEYED, KeyRule
 
 WARDROBE = (
     (20, 20, 22), (55, 55, 58), (120, 120, 122), (185, 185, 185), (230, 230, 228), (30, 35, 65), (55, 80, 150), (130, 165, 205),
