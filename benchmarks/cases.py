@@ -16,9 +16,9 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.initialization import Guess
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import prepare
-from shadowpuppet.metrics import UPPER, joint_errors
 from shadowpuppet.monocular_settings import MonocularSettings
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.metrics import UPPER, joint_errors
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.tracking import MonocularTracker
 

@@ -34,8 +34,8 @@ from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
-from shadowpuppet.metrics import LIMBS, joint_errors
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
 from shadowpuppet.priors import prior_from_files

@@ -22,7 +22,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.first_pose import arm_dofs
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Observation, PartialCost
-from shadowpuppet.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER
 from shadowpuppet.options import Options
 from shadowpuppet.tracking import MonocularTracker
 

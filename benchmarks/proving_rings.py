@@ -28,7 +28,7 @@ from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.joints import read_joints
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig

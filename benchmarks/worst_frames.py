@@ -18,13 +18,13 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import LIMBS, joint_errors
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.video import open_frames, write_image
 
 FOUND, TRUE, EXACT, TILE, MARGIN = (0, 0, 255), (0, 255, 0), (255, 255, 255), 400, 20

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 
 def told_or_read(read: Callable[[], JointTable], name: str) -> bool:

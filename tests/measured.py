@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.io.run import RunWriter
-from shadowpuppet.metrics import GROUPS
-from shadowpuppet.motion import JointTable, MotionFrame
+from shadowpuppet.motion.metrics import GROUPS
+from shadowpuppet.motion.motion import JointTable, MotionFrame
 
 NAMES = (*GROUPS["humaneva"], "left_hand", "right_hand")
 BODY = {"pelvis": (0, 0, 0.95), "neck": (0, 0, 1.5), "head": (0.02, 0, 1.6)}

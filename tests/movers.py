@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 SWINGS = {"left_hip_y": (-30, 0), "right_hip_y": (-30, np.pi), "left_knee_flexion": (25, 1), "right_knee_flexion": (25, 1 + np.pi),
           "left_shoulder_y": (25, np.pi), "right_shoulder_y": (25, 0), "left_elbow_flexion": (20, 2),

@@ -11,7 +11,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter
-from shadowpuppet.motion import MotionFrame
+from shadowpuppet.motion.motion import MotionFrame
 
 BODIES = tuple(ALL)
 ROOT = rigid(rotation_about([0, 0, 1], 2.0), [0.3, -1.2, 1.05])

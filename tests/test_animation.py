@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import runs
-from shadowpuppet.animation import Animation
-from shadowpuppet.body_animation import BodyTree, motion_animation
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.body_animation import BodyTree, motion_animation
 
 
 def animated(name: str, rng, frames: int = 30) -> tuple[Animation, np.ndarray]:

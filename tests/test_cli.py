@@ -19,7 +19,7 @@ import pytest
 import made
 from shadowpuppet import cli
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER
 from shadowpuppet.options import Options, make_options, options_text
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",

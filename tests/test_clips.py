@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from shadowpuppet.clips import mirrored, without_gaps
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion import JointTable
-from shadowpuppet.steady import resampled, resampled_table
+from shadowpuppet.motion.interpolation import resampled, resampled_table
+from shadowpuppet.motion.motion import JointTable
 
 NAMES = ("pelvis", "left_hip", "left_knee", "right_hip", "right_knee")
 

@@ -15,11 +15,11 @@ from shadowpuppet import cli
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.demo import contact_sheet
 from shadowpuppet.evaluation import angle_errors
-from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import LIMBS
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.metrics import LIMBS
 from shadowpuppet.synthetic import demo_ring_spec
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",

@@ -17,7 +17,7 @@ from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.run import read_run
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from vicon import c3d
 
 TRUTH = person(6)

@@ -11,7 +11,6 @@ import pytest
 import acclaim
 import biovision
 import runs
-from shadowpuppet.animation import Y_UP
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.exporting import CONVERSIONS, EXPORTS, export_run
 from shadowpuppet.io.bvh import read_bvh
@@ -20,6 +19,7 @@ from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.mot import read_mot
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.animation import Y_UP
 
 LOST = (0, 6, 7)
 

@@ -15,10 +15,10 @@ from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.clips import mirrored
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about, three_turns
-from shadowpuppet.inverse_kinematics import _along, _Linear, _solved, fit_poses
 from shadowpuppet.io.joints import read_joints
-from shadowpuppet.motion import JointTable
-from shadowpuppet.plausibility import NEEDED
+from shadowpuppet.motion.inverse_kinematics import _along, _Linear, _solved, fit_poses
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.plausibility import NEEDED
 from shadowpuppet.synthetic.mannequin import JOINTS
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]

@@ -25,8 +25,8 @@ from shadowpuppet.measures import (
     motion_errors,
     worlds,
 )
-from shadowpuppet.metrics import LIMBS, joint_errors
-from shadowpuppet.motion import JointTable, Motion
+from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.motion import JointTable, Motion
 
 TRUTH = person(2)
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion import BLANK, SERIES, STATUSES, JointTable, Motion, MotionBuilder, MotionFrame
+from shadowpuppet.motion.motion import BLANK, SERIES, STATUSES, JointTable, Motion, MotionBuilder, MotionFrame
 
 DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand", "right_hand")
 

@@ -30,7 +30,7 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import inverse, transform
 from shadowpuppet.io.run import read_run
 from shadowpuppet.live.run import LiveListener
-from shadowpuppet.motion import MotionFrame
+from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.network import host_and_port
 from shadowpuppet.outlets import websocket
 from shadowpuppet.outlets.avatar import Avatar

@@ -13,7 +13,7 @@ from shadowpuppet.footage import RUN, RUNS, Shot, open_footage, read_masks, silh
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.metrics import overlap
+from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.options import Options, make_options, plain_options, read_options
 from shadowpuppet.pipeline import Listener, Watch, fit_person, track_recording
 from shadowpuppet.video import open_frames

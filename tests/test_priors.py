@@ -11,7 +11,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.prior import read_prior, write_prior
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import make_options, plain_options, read_options
 from shadowpuppet.priors import familiar
 from vicon import c3d

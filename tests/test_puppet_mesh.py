@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import runs
-from shadowpuppet.body_animation import TO_REST, BodyTree
 from shadowpuppet.geometry import rigid
-from shadowpuppet.puppet_mesh import Mesh, body_mesh, bone_mesh
+from shadowpuppet.motion.body_animation import TO_REST, BodyTree
+from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 
 WHOLE = ("anatomical", "cylinders")
 

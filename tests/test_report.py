@@ -20,7 +20,7 @@ from shadowpuppet.evaluation import Comparison, measure_run
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import write_joints
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.report.charts import by_joint_and_time
 from shadowpuppet.report.page import page, write_report
 from shadowpuppet.report.pictures import chosen_frames, draw_bones, pictures

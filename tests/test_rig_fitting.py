@@ -17,7 +17,7 @@ from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.steady import steady
+from shadowpuppet.motion.interpolation import steady
 
 
 @pytest.mark.parametrize("rate", [23.976, 25, 29.97, 60, 119.88, 1000])

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from measured import moved, person
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_from_vector
-from shadowpuppet.motion import JointTable
-from shadowpuppet.synchrony import at_times, find_offset, in_step, step_of
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.synchronization import at_times, find_offset, in_step, step_of
 
 steps = st.lists(st.floats(0.8, 1.2), min_size=3, max_size=20)
 

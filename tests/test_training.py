@@ -14,7 +14,7 @@ from movers import walk
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.training import GLOBAL, matched, modelled, train_prior
 

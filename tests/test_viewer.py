@@ -18,7 +18,6 @@ import made
 import made_rig
 from runs import body_of, make_run, smooth_poses
 from shadowpuppet.body.shapes import Quads
-from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run as command
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
@@ -28,7 +27,8 @@ from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import Options
 from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.viewer.curves import AROUND, data_around, limits
@@ -367,9 +367,9 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
 
 def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
     from shadowpuppet.footage import opened
-    from shadowpuppet.inverse_kinematics import fit_poses
     from shadowpuppet.io.truth import read_truth
-    from shadowpuppet.motion import MotionBuilder, MotionFrame
+    from shadowpuppet.motion.inverse_kinematics import fit_poses
+    from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.viewer.of_recording import eyes_of
     from shadowpuppet.viewer.particles import Rerun

@@ -23,9 +23,9 @@ from shadowpuppet.io._plain import plain
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import Prepared, check, prepare
 from shadowpuppet.making import make_recording
-from shadowpuppet.metrics import match
 from shadowpuppet.monocular_settings import MonocularSettings, make_settings
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.metrics import match
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import Options, make_options, plain_options
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.motions import LEAD

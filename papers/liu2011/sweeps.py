@@ -10,7 +10,7 @@ import numpy as np
 from papers.common.plotting import COLOURS, label
 from papers.liu2011.repeats import FAR, LOST, Runs
 from shadowpuppet.geometry import Array
-from shadowpuppet.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,7 +25,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration, write_calibration
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.synthetic import Spec, humaneva, synthesize
 from shadowpuppet.visual_hull import SurfacePoints
 

@@ -11,8 +11,8 @@ from papers.ni2008.inputs import Case
 from papers.ni2008.tracks import Track
 from shadowpuppet.body.whole_skeleton import SIDES
 from shadowpuppet.geometry import Array
-from shadowpuppet.metrics import LIMBS, joint_errors
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.motion import JointTable
 
 FAR, OFTEN = 0.2, 0.1
 """The person is lost in a frame whose joints are this far off on average (m); a sequence is lost with such a share of its frames."""

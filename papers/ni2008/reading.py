@@ -17,12 +17,12 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.measuring import measure, spread_of
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig

@@ -20,7 +20,7 @@ from papers.common.many import run_all
 from papers.ni2008.inputs import BODY, Case, key_of, opened
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.prior_settings import PriorSettings

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from shadowpuppet.exporting import convert_motion, export_run
     from shadowpuppet.footage import open_footage, read_masks
     from shadowpuppet.initialization import find_person, fit_references
-    from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.io.calibration import read_calibration, write_calibration
     from shadowpuppet.io.humaneva import read_humaneva
     from shadowpuppet.io.joints import read_joints, write_joints
@@ -29,9 +28,10 @@ if TYPE_CHECKING:
     from shadowpuppet.io.run import Run, read_run
     from shadowpuppet.io.truth import read_truth
     from shadowpuppet.look import Look
-    from shadowpuppet.metrics import evaluate
     from shadowpuppet.monocular_settings import MonocularSettings, make_settings
-    from shadowpuppet.motion import JointTable, Motion
+    from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
+    from shadowpuppet.motion.metrics import evaluate
+    from shadowpuppet.motion.motion import JointTable, Motion
     from shadowpuppet.motion_prior import MotionPrior
     from shadowpuppet.multiview_settings import HullSettings, MultiviewSettings, make_multiview_settings
     from shadowpuppet.multiview_tracker import MultiviewTracker
@@ -53,19 +53,19 @@ _HOMES = {
     "find_person": "initialization", "fit_references": "initialization", "read_calibration": "io.calibration",
     "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints", "Person": "io.person",
     "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",
-    "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "metrics", "JointTable": "motion", "Motion": "motion",
-    "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
-    "Picture": "camera.rasterize", "MonocularSettings": "monocular_settings", "make_settings": "monocular_settings",
-    "SilhouetteSettings": "silhouette", "learn_background": "silhouette", "synthesize": "synthetic", "MonocularTracker": "tracking",
-    "open_frames": "video", "write_frames": "video", "MotionPrior": "motion_prior", "PriorSettings": "prior_settings",
-    "choose_regions": "vqpca", "fit_prior": "vqpca", "read_prior": "io.prior", "write_prior": "io.prior",
-    "HullSettings": "multiview_settings", "SurfacePoints": "visual_hull", "VisualHull": "visual_hull",
-    "FittedPoses": "inverse_kinematics", "fit_poses": "inverse_kinematics", "AnatomicalSizes": "body.whole_sizes",
-    "CylinderSizes": "body.whole_sizes", "read_humaneva": "io.humaneva", "read_motion": "io.motion_files",
-    "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "multiview_settings", "make_multiview_settings": "multiview_settings",
-    "export_run": "exporting", "convert_motion": "exporting", "Comparison": "evaluation", "Evaluation": "evaluation",
-    "measure_run": "evaluation", "read_truth": "io.truth", "write_report": "report.page", "open_footage": "footage",
-    "read_masks": "footage",
+    "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "motion.metrics", "JointTable": "motion.motion",
+    "Motion": "motion.motion", "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline",
+    "track_recording": "pipeline", "Picture": "camera.rasterize", "MonocularSettings": "monocular_settings",
+    "make_settings": "monocular_settings", "SilhouetteSettings": "silhouette", "learn_background": "silhouette",
+    "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video", "write_frames": "video",
+    "MotionPrior": "motion_prior", "PriorSettings": "prior_settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
+    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "multiview_settings", "SurfacePoints": "visual_hull",
+    "VisualHull": "visual_hull", "FittedPoses": "motion.inverse_kinematics", "fit_poses": "motion.inverse_kinematics",
+    "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes", "read_humaneva": "io.humaneva",
+    "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "multiview_settings",
+    "make_multiview_settings": "multiview_settings", "export_run": "exporting", "convert_motion": "exporting",
+    "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation", "read_truth": "io.truth",
+    "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",
 }  # fmt: skip
 """Where each public name lives."""
 

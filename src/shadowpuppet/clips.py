@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
-from shadowpuppet.steady import _runs
+from shadowpuppet.motion.interpolation import _runs
+from shadowpuppet.motion.motion import JointTable
 
 SIDES = {"left_": "right_", "right_": "left_"}
 

@@ -31,9 +31,9 @@ from shadowpuppet.measures import (
     whole_alignment,
     worlds,
 )
-from shadowpuppet.metrics import GROUPS, JointErrors, evaluate, joint_errors
-from shadowpuppet.motion import JointTable
-from shadowpuppet.synchrony import at_times, find_offset, in_step, step_of
+from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.synchronization import at_times, find_offset, in_step, step_of
 
 __all__ = ["Comparison", "Evaluation", "angle_errors", "evaluate_run", "measure_run", "update_metrics", "write_evaluation"]
 

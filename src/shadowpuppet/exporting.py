@@ -10,13 +10,10 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.animation import Animation
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body_animation import BodyTree, motion_animation
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io._files import reason, write_whole
 from shadowpuppet.io.bvh_writing import write_bvh
 from shadowpuppet.io.c3d_writing import write_c3d
@@ -32,9 +29,12 @@ from shadowpuppet.io.run import Run, motion_bytes, read_run
 from shadowpuppet.io.skeletons import ENDINGS as SKELETONS
 from shadowpuppet.io.skeletons import read_animation
 from shadowpuppet.io.trc import METRES, write_trc
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.body_animation import BodyTree, motion_animation
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.opensim import coordinates, marker_names
-from shadowpuppet.puppet_mesh import Mesh, body_mesh, bone_mesh
 
 STRAY = 1e-3
 """Metres by which a written skeleton's joints may lie off the run's before that is said."""

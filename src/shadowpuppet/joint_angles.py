@@ -7,9 +7,9 @@ import numpy as np
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import fit_poses
-from shadowpuppet.motion import JointTable, Motion
-from shadowpuppet.synchrony import match
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.motion import JointTable, Motion
+from shadowpuppet.motion.synchronization import match
 
 UNTOLD = ("head", "_ankle")
 """Joints of whose turns the places of joints tell little or nothing."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Alignment, Array, align, vector_from_rotation
-from shadowpuppet.metrics import GROUPS, LOST, JointErrors, accelerations, bone_lengths, joint_errors
-from shadowpuppet.motion import BLANK, JointTable, Motion
+from shadowpuppet.motion.metrics import GROUPS, LOST, JointErrors, accelerations, bone_lengths, joint_errors
+from shadowpuppet.motion.motion import BLANK, JointTable, Motion
 
 ROOTS = (("pelvis",), ("left_hip", "right_hip"), ("neck",), ("left_shoulder", "right_shoulder"))
 """What joints are told from in root-relative errors: the first that run and truth have, or the middle of two. The pelvis of a run without

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, continuous_angles
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.motion import JointTable
 
 MARKERS = {
     "pelvis": "CHip", "neck": "Neck", "head": "HeadBase",

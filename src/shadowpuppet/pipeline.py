@@ -21,7 +21,7 @@ from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.look import Look, Prepared, check, prepare
-from shadowpuppet.motion import BLANK, MotionFrame
+from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.repeats import Repeats
 from shadowpuppet.rig import chosen_views, open_rig

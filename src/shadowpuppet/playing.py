@@ -12,14 +12,14 @@ import numpy as np
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body_animation import base_in_world
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.live.stopping import Stop
-from shadowpuppet.motion import Motion, MotionFrame
+from shadowpuppet.motion.body_animation import base_in_world
+from shadowpuppet.motion.motion import Motion, MotionFrame
 from shadowpuppet.outlets.outlet import Outlets, Subject
 
 NAP = 0.05

@@ -14,10 +14,10 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import fit_poses
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.prior import read_prior, write_prior
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.options import Options
 from shadowpuppet.prior_settings import PriorSettings

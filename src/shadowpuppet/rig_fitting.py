@@ -14,7 +14,7 @@ from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.measuring import likely_height, measure, spread_of
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.priors import familiar

@@ -21,7 +21,7 @@ from shadowpuppet.io.calibration import write_calibration
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.motion import BLANK, JointTable, MotionFrame
+from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.rig import FrameSet, Rig, follow, open_rig
 from shadowpuppet.rig_look import Opening, PreparedRig, RigLook, check_rig, look_at_rig

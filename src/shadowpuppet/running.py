@@ -19,8 +19,8 @@ from shadowpuppet.io._plain import for_json, plain
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.io.truth import read_truth
 from shadowpuppet.look import Look
-from shadowpuppet.metrics import evaluate
-from shadowpuppet.motion import Motion
+from shadowpuppet.motion.metrics import evaluate
+from shadowpuppet.motion.motion import Motion
 from shadowpuppet.options import Options
 from shadowpuppet.rig_look import RigLook
 

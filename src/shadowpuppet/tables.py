@@ -16,8 +16,8 @@ from shadowpuppet.fitting import Found
 from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
-from shadowpuppet.metrics import FAR, LOST
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.metrics import FAR, LOST
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.synthetic.spec import Spec
 from shadowpuppet.training import Trained
 

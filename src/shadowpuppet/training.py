@@ -16,11 +16,11 @@ from shadowpuppet.body.whole_skeleton import GLOBAL
 from shadowpuppet.clips import mirrored, without_gaps
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.inverse_kinematics import FittedPoses, fit_poses
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.interpolation import resampled, resampled_table
+from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.steady import resampled, resampled_table
 from shadowpuppet.vqpca import Choice, Fit, choose_regions, fit_prior
 
 RATE = 60.0

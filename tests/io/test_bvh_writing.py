@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import runs
-from shadowpuppet.animation import Y_UP, Animation
-from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.bvh import read_bvh
 from shadowpuppet.io.bvh_writing import write_bvh
+from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.body_animation import BodyTree
 
 FRAMES = 30
 

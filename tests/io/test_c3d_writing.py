@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.c3d import read_c3d, read_header
 from shadowpuppet.io.c3d_writing import write_c3d
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 
 def table(rng, frames: int = 20, names=("pelvis", "left_hand", "neck"), rate: float = 30.0) -> JointTable:

@@ -14,11 +14,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import runs
-from shadowpuppet.animation import Y_UP, Animation
-from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.glb import write_glb
-from shadowpuppet.puppet_mesh import body_mesh, bone_mesh
+from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.mesh import body_mesh, bone_mesh
 
 KINDS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}

@@ -13,7 +13,7 @@ from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.humaneva import PARTS, Sync, read_cal, read_humaneva, read_sync, timing_of, write_humaneva
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.metrics import GROUPS
+from shadowpuppet.motion.metrics import GROUPS
 from shadowpuppet.video import open_frames
 from vicon import c3d
 

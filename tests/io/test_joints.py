@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.joints import read_joints, write_joints
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 HEAD = "time,neck_x,neck_y,neck_z\n"
 metres = st.floats(-50, 50) | st.just(np.nan)

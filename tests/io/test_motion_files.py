@@ -16,8 +16,8 @@ from shadowpuppet.io.bvh import read_bvh
 from shadowpuppet.io.joint_names import JOINTS, columns_of, renamed
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.motion_files import TURNS, leg_length, read_motion, up_axis
-from shadowpuppet.metrics import LIMBS
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.metrics import LIMBS
+from shadowpuppet.motion.motion import JointTable
 from vicon import c3d
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",

@@ -19,7 +19,7 @@ from shadowpuppet.io.motion_table import LENGTHS, motion_columns, table_columns,
 from shadowpuppet.io.npz import read_npz, write_npz
 from shadowpuppet.io.parquet import read_parquet, write_parquet
 from shadowpuppet.io.run import read_run
-from shadowpuppet.motion import JointTable, Motion
+from shadowpuppet.motion.motion import JointTable, Motion
 
 ENDINGS = ("parquet", "npz")
 

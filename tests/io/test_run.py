@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.motion import STATUSES, Motion, MotionFrame
+from shadowpuppet.motion.motion import STATUSES, Motion, MotionFrame
 
 DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand")
 INFO = {"recording": Path("recordings/demo"), "method": "monocular", "preset": None, "seed": 3,

@@ -7,7 +7,7 @@ import pytest
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.trc import read_trc, write_trc
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 TEXT = """PathFileType\t4\t(X/Y/Z)\ttruth.trc
 DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames

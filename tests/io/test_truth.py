@@ -15,7 +15,7 @@ from measured import moved, person
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.truth import names_in, read_truth
-from shadowpuppet.metrics import LIMBS
+from shadowpuppet.motion.metrics import LIMBS
 from vicon import c3d
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",

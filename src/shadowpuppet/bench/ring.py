@@ -16,7 +16,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import ForceSettings, MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewTracker

@@ -18,7 +18,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import read_text
 from shadowpuppet.io._table import shorten
 from shadowpuppet.io.asf import Skeleton, euler, read_asf
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
 """From the file's world (y up, a person at rest faces z) to ours (z up, facing -y)."""

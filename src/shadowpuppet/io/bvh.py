@@ -13,7 +13,7 @@ from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarn
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.io._files import read_text
 from shadowpuppet.io._table import shorten
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 """What a channel can be; in any order, any number of them a joint."""

@@ -9,13 +9,13 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array, clear_order, continuous_angles
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._table import shorten
 from shadowpuppet.io.trc import METRES
-from shadowpuppet.steady import steady
+from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.interpolation import steady
 
 PLACES = "Xposition Yposition Zposition"
 LEAST_END = (0.0, 0.0, 0.0)

@@ -20,7 +20,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import reason
 from shadowpuppet.io._table import shorten
 from shadowpuppet.io.trc import METRES
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 BYTES = 512
 """Of a block."""

@@ -15,8 +15,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._table import shorten
 from shadowpuppet.io.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
-from shadowpuppet.motion import JointTable
-from shadowpuppet.steady import resampled, steady
+from shadowpuppet.motion.interpolation import resampled, steady
+from shadowpuppet.motion.motion import JointTable
 
 MM = 1000.0
 """The file's unit: millimetres of a metre."""

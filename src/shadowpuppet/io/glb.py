@@ -11,11 +11,11 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
-from shadowpuppet.puppet_mesh import Mesh
+from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.mesh import Mesh
 
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 """Kinds of numbers in buffers."""

@@ -24,7 +24,7 @@ from shadowpuppet.io.joint_names import renamed
 from shadowpuppet.io.joints import write_joints
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.io.rigs.bouguet import read_cal
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.video import open_frames
 
 RATE = 60.0

@@ -17,7 +17,7 @@ from shadowpuppet.io.joint_names import renamed
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.npz import read_npz
 from shadowpuppet.io.parquet import read_parquet
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 ENDINGS = (".amc", ".bvh", ".c3d", ".csv", ".npz", ".parquet", ".trc")
 """Of the files that are read."""

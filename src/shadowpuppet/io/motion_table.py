@@ -11,7 +11,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._table import cells, csv_line
 from shadowpuppet.io.joints import joint_columns
-from shadowpuppet.motion import JointTable, Motion
+from shadowpuppet.motion.motion import JointTable, Motion
 
 LENGTHS = ("torso_y", "root_x", "root_y", "root_z")
 """Degrees of freedom that are places, metres; all others are angles."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io._files import write_whole
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 ARRAYS = ("times", "joint_names", "joints")
 """Seconds (T,), names (J,), and places (T, J, 3) in the world, metres, not a number where unknown."""

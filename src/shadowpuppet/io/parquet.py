@@ -15,7 +15,7 @@ from shadowpuppet.io._files import write_whole
 from shadowpuppet.io._table import Table, shorten
 from shadowpuppet.io.joints import joint_columns, joint_names
 from shadowpuppet.io.motion_table import Columns
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 TOLD = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up; radians"}
 """Metadata of a file."""

@@ -31,7 +31,7 @@ from shadowpuppet.io._table import Table, cells, csv_line, read_table, shorten
 from shadowpuppet.io.calibration import read_toml
 from shadowpuppet.io.joints import joint_columns, joint_names
 from shadowpuppet.io.npz import BROKEN
-from shadowpuppet.motion import STATUSES, Motion, MotionBuilder, MotionFrame
+from shadowpuppet.motion.motion import STATUSES, Motion, MotionBuilder, MotionFrame
 
 FILES = ("joints.csv", "angles.csv", "motion.npz", "metrics.json", "overlay.mp4")
 """What a new run in an earlier one's folder replaces or removes; run.toml, which makes a folder a run's, always stays."""

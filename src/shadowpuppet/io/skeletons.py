@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.animation import Y_UP, Animation
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.amc import Z_UP, Capture, read_mocap
 from shadowpuppet.io.bvh import END, Bvh, different, read_bvh
 from shadowpuppet.io.joint_names import columns_of
 from shadowpuppet.io.motion_files import AMC_RATE, turn_of, unit_of
+from shadowpuppet.motion.animation import Y_UP, Animation
 
 ENDINGS = (".amc", ".bvh")
 CMU = {"root": "Hips", "lowerback": "LowerBack", "upperback": "Spine", "thorax": "Spine1", "lowerneck": "Neck", "upperneck": "Neck1",

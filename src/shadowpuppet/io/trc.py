@@ -11,7 +11,7 @@ import numpy as np
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.io._files import read_text, write_whole
 from shadowpuppet.io._table import cells, check_times, number, shorten
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units of length that a file can have, in metres."""

@@ -13,7 +13,7 @@ from shadowpuppet.io.c3d import read_c3d
 from shadowpuppet.io.joint_names import JOINTS, columns_of, pairs_of, renamed
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.motion_files import ENDINGS, read_motion
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 
 def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:

@@ -26,7 +26,7 @@ from shadowpuppet.live.stopping import Stop
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.vigil import Vigil
 from shadowpuppet.live.warming import warm_up
-from shadowpuppet.metrics import evaluate
+from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.outlets.outlet import Outlets, Subject
 from shadowpuppet.pipeline import Listener, named_body

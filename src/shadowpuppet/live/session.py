@@ -20,7 +20,7 @@ from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.vigil import Vigil
 from shadowpuppet.live.waiting import Waiter, unfit
-from shadowpuppet.motion import BLANK, MotionFrame
+from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options
 from shadowpuppet.pipeline import motion_frame, named_body, next_state
 from shadowpuppet.silhouette import learn_background

@@ -13,9 +13,9 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, whole_sizes_from_height
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
-from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import BLANK, MotionFrame
+from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.motion import BLANK, MotionFrame
 
 
 class Told(NamedTuple):

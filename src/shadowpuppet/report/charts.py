@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.geometry import Array
 from shadowpuppet.measures import runs_of
-from shadowpuppet.metrics import accelerations
+from shadowpuppet.motion.metrics import accelerations
 
 # Colours that people who see colours differently tell apart: Okabe & Ito 2008.
 BLUE, ORANGE, GREEN, PINK, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8a8f98"

@@ -17,12 +17,12 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.footage import footage_of, opened
 from shadowpuppet.geometry import Array
-from shadowpuppet.metrics import LOST
-from shadowpuppet.motion import BLANK, JointTable
+from shadowpuppet.motion.metrics import LOST
+from shadowpuppet.motion.motion import BLANK, JointTable
+from shadowpuppet.motion.synchronization import at_times, match, step_of
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.rig import chosen_views
 from shadowpuppet.rig_overlay import grid_of
-from shadowpuppet.synchrony import at_times, match, step_of
 
 if TYPE_CHECKING:
     from shadowpuppet.video import Image

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from shadowpuppet.evaluation import Evaluation
 from shadowpuppet.evaluation_words import WAYS, bones_words, clock_words, losses_words, said_root, world_words
-from shadowpuppet.metrics import FAR, LOST
+from shadowpuppet.motion.metrics import FAR, LOST
 from shadowpuppet.report.html import definitions, plain, rows, table
 
 

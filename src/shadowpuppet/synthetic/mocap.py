@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.synthetic.kinematics import SIDES, Figure, assembled, fingers, turns
 from shadowpuppet.synthetic.mannequin import Mannequin
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shadowpuppet.animation import Animation
 from shadowpuppet.body.segments import BONES
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
-from shadowpuppet.puppet_mesh import Mesh, body_mesh, bone_mesh
+from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
+from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.viewer.show import Figure
 
 DOT = 0.06

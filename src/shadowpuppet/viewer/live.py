@@ -9,13 +9,13 @@ from typing import Any, Self
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body_animation import BodyTree
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.display.choice import FOOTERS
 from shadowpuppet.display.drawing import drawn
 from shadowpuppet.display.view import Display, View
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.puppet_mesh import body_mesh
+from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.viewer.pictures import Plain
 from shadowpuppet.viewer.server import address_of, close_server, open_server
 from shadowpuppet.viewer.show import Eye, Figure, Show

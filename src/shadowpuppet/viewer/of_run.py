@@ -11,7 +11,6 @@ import numpy as np
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body_animation import motion_animation
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation, measure_run
 from shadowpuppet.footage import opened
@@ -20,9 +19,10 @@ from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.motion_table import dof_unit
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
-from shadowpuppet.motion import Motion
+from shadowpuppet.motion.body_animation import motion_animation
+from shadowpuppet.motion.mesh import body_mesh
+from shadowpuppet.motion.motion import Motion
 from shadowpuppet.options import Options, make_options
-from shadowpuppet.puppet_mesh import body_mesh
 from shadowpuppet.viewer.figures import of_animation, of_table
 from shadowpuppet.viewer.of_recording import eyes_of
 from shadowpuppet.viewer.particles import Rerun

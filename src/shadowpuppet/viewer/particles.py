@@ -9,12 +9,12 @@ import numpy as np
 
 from shadowpuppet.body.segments import BONES
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body_animation import fitted
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import Motion
+from shadowpuppet.motion.body_animation import fitted
+from shadowpuppet.motion.motion import Motion
 from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.particle_filter import Particles, diffuse, evaluate

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.puppet_mesh import Mesh
-from shadowpuppet.synchrony import step_of
+from shadowpuppet.motion.mesh import Mesh
+from shadowpuppet.motion.synchronization import step_of
 from shadowpuppet.video import Image
 
 REACH = 0.75

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.animation import Animation
 from shadowpuppet.body.shapes import Body, Hulls, Limbs, Quads
-from shadowpuppet.body_animation import TO_REST, BodyTree
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.body_animation import TO_REST, BodyTree
 
 AROUND, ALONG, DOME = 24, 6, 5
 """Points around a limb; rings along it; rings of a dome."""

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.animation import Animation
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.motion import Motion
+from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.motion import Motion
 
 TO_REST = np.array([[0.0, 1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From a body's axes (forward, left, up) to those of skeletons at rest (left, up, forward)."""

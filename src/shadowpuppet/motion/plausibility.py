@@ -8,7 +8,7 @@ import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array, unit
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 SIDES = ("left", "right")
 NEEDED = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "knee") for side in SIDES)

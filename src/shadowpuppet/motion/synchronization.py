@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 REACH = 1.5
 """Steps that two frames may be apart to be interpolated between; over longer gaps nothing is known."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from shadowpuppet.body.angles import _angles
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rotation_about, unit
-from shadowpuppet.motion import JointTable
-from shadowpuppet.plausibility import SIDES, across, middle, of
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.plausibility import SIDES, across, middle, of
 
 STRAIGHT = 0.15
 """Where the sine of a bend is under this, a limb's turn about itself is rather what it would be without any."""

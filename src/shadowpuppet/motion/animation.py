@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 """From our world (Z up) to that of files with Y up: (x, z, -y), which Blender and OpenSim undo. Who looks along X does so there, too."""

@@ -21,9 +21,9 @@ from shadowpuppet.body.sizes import LEAST
 from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes, sizes_kind
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.joint_frames import guess
-from shadowpuppet.motion import JointTable
-from shadowpuppet.plausibility import SIDES, check_person, of
+from shadowpuppet.motion.ik_initial_guess import guess
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.plausibility import SIDES, check_person, of
 
 REACH = 0.1
 """A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""

@@ -13,8 +13,8 @@ from shadowpuppet.body.segments import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable, Motion
-from shadowpuppet.synchrony import in_step, match
+from shadowpuppet.motion.motion import JointTable, Motion
+from shadowpuppet.motion.synchronization import in_step, match
 
 UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 """What is compared where one camera saw the upper body."""

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion import JointTable
+from shadowpuppet.motion.motion import JointTable
 
 NEAR = 0.2
 """Share of a step by which a frame may lie off its place: films' times are rounded to milliseconds, cameras' tremble."""

@@ -1,0 +1,1 @@
+"""Poses and joints over time: tables, clocks, inverse kinematics, basic metrics."""
