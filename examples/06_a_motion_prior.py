@@ -11,10 +11,10 @@ import numpy as np
 
 import shadowpuppet as sp
 from shadowpuppet.camera.drawing import draw_model
+from shadowpuppet.motion.prior.training import train_prior
 from shadowpuppet.synthetic import Gesture, Ring, Spec
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.training import train_prior
 from shadowpuppet.video import write_image
 
 SHOWN, EVERY = 8, 6

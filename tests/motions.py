@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.subspaces import Subspaces
+from shadowpuppet.motion.prior.local_pca import Subspaces
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
 
 
 def gait(frames: int, width: int = 25, rate: float = 60.0, phase: float = 0.0) -> np.ndarray:

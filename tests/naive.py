@@ -14,7 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.projection import DIRECTIONS, NEAR
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, rotation_from_vector, transform
-from shadowpuppet.hidden_markov import Posterior
+from shadowpuppet.motion.prior.hmm import Posterior
 
 Mask = NDArray[np.bool_]
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import naive
-from shadowpuppet.hidden_markov import posterior
+from shadowpuppet.motion.prior.hmm import posterior
 
 pytestmark = pytest.mark.kernels
 

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.whole_sizes import WHOLE
-from shadowpuppet.clips import mirrored
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about, three_turns
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.motion.inverse_kinematics import _along, _Linear, _solved, fit_poses
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.plausibility import NEEDED
+from shadowpuppet.motion.prior.clips import mirrored
 from shadowpuppet.synthetic.mannequin import JOINTS
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]

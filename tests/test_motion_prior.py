@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from motions import prior, ring, subspaces
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion_prior import Codes, MotionPrior
+from shadowpuppet.motion.prior.motion_prior import Codes, MotionPrior
 
 NUMBER = 40_000
 

@@ -9,10 +9,10 @@ import pytest
 
 import actor
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.local_pca import Subspaces
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
-from shadowpuppet.subspaces import Subspaces
 from shadowpuppet.usual import usual_arms
 
 SKELETON = actor.body().skeleton

@@ -13,6 +13,7 @@ from shadowpuppet.body.models import ALL
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings
+from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.multiview_settings import (
     MULTIVIEW_PRESETS,
     ForceSettings,
@@ -23,7 +24,6 @@ from shadowpuppet.multiview_settings import (
     make_multiview_settings,
 )
 from shadowpuppet.options import Options, make_options
-from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.resampling import SCHEMES
 from shadowpuppet.settings import validate
 from shadowpuppet.silhouette import SilhouetteSettings

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from motions import subspaces
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.subspaces import Subspaces, principal_subspaces
+from shadowpuppet.motion.prior.local_pca import Subspaces, principal_subspaces
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -15,8 +15,8 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.training import GLOBAL, matched, modelled, train_prior
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.training import GLOBAL, matched, modelled, train_prior
 
 FEW = PriorSettings(regions=6, starts=1)
 

@@ -29,8 +29,9 @@ from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.options import Options
-from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.viewer.curves import AROUND, data_around, limits
 from shadowpuppet.viewer.figures import of_animation, of_poses, of_table
 from shadowpuppet.viewer.of_prior import body_of as body_of_prior
@@ -42,7 +43,6 @@ from shadowpuppet.viewer.pictures import Look, Plain, shown
 from shadowpuppet.viewer.seen import hull_of
 from shadowpuppet.viewer.show import Chart, Eye, Figure, Show
 from shadowpuppet.viewer.timeline import Timeline
-from shadowpuppet.vqpca import fit_prior
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from scipy.special import xlogy
 
 from motions import gait, prior, walk
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.vqpca import Fit, _fill, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.vqpca import Fit, _fill, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
 
 seeds = st.integers(0, 2**32 - 1)
 

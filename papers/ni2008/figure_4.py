@@ -13,7 +13,7 @@ from papers.common.plotting import COLOURS, label, new_figure
 from papers.ni2008.inputs import Case, cases
 from papers.ni2008.tracks import DIMENSIONS, REGIONS, learn, most_regions
 from shadowpuppet.geometry import Array
-from shadowpuppet.vqpca import reconstruction_error
+from shadowpuppet.motion.prior.vqpca import reconstruction_error
 
 TRIED = (5, 10, 15, 20, 30, 40, 60, 80)
 """M of Figs. 4 and 8."""

@@ -21,11 +21,11 @@ from papers.ni2008.inputs import BODY, Case, key_of, opened
 from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.training import modelled
+from shadowpuppet.motion.prior.vqpca import Fit, fit_prior
 from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.multiview_tracker import MultiviewTracker
-from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.training import modelled
-from shadowpuppet.vqpca import Fit, fit_prior
 
 REGIONS, DIMENSIONS = 20, 3
 """M and m of Table II's hybrid."""

@@ -32,19 +32,19 @@ if TYPE_CHECKING:
     from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.motion.metrics import evaluate
     from shadowpuppet.motion.motion import JointTable, Motion
-    from shadowpuppet.motion_prior import MotionPrior
+    from shadowpuppet.motion.prior.motion_prior import MotionPrior
+    from shadowpuppet.motion.prior.settings import PriorSettings
+    from shadowpuppet.motion.prior.vqpca import choose_regions, fit_prior
     from shadowpuppet.multiview_settings import HullSettings, MultiviewSettings, make_multiview_settings
     from shadowpuppet.multiview_tracker import MultiviewTracker
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
-    from shadowpuppet.prior_settings import PriorSettings
     from shadowpuppet.report.page import write_report
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking import MonocularTracker
     from shadowpuppet.video import open_frames, write_frames
     from shadowpuppet.visual_hull import SurfacePoints, VisualHull
-    from shadowpuppet.vqpca import choose_regions, fit_prior
 
     __version__: str
 
@@ -58,14 +58,14 @@ _HOMES = {
     "track_recording": "pipeline", "Picture": "camera.rasterize", "MonocularSettings": "monocular_settings",
     "make_settings": "monocular_settings", "SilhouetteSettings": "silhouette", "learn_background": "silhouette",
     "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video", "write_frames": "video",
-    "MotionPrior": "motion_prior", "PriorSettings": "prior_settings", "choose_regions": "vqpca", "fit_prior": "vqpca",
-    "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "multiview_settings", "SurfacePoints": "visual_hull",
-    "VisualHull": "visual_hull", "FittedPoses": "motion.inverse_kinematics", "fit_poses": "motion.inverse_kinematics",
-    "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes", "read_humaneva": "io.humaneva",
-    "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker", "MultiviewSettings": "multiview_settings",
-    "make_multiview_settings": "multiview_settings", "export_run": "exporting", "convert_motion": "exporting",
-    "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation", "read_truth": "io.truth",
-    "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",
+    "MotionPrior": "motion.prior.motion_prior", "PriorSettings": "motion.prior.settings", "choose_regions": "motion.prior.vqpca",
+    "fit_prior": "motion.prior.vqpca", "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "multiview_settings",
+    "SurfacePoints": "visual_hull", "VisualHull": "visual_hull", "FittedPoses": "motion.inverse_kinematics",
+    "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker",
+    "MultiviewSettings": "multiview_settings", "make_multiview_settings": "multiview_settings", "export_run": "exporting",
+    "convert_motion": "exporting", "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation",
+    "read_truth": "io.truth", "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",
 }  # fmt: skip
 """Where each public name lives."""
 

@@ -32,7 +32,7 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .c
         Seed of all chance.
     """
     from shadowpuppet.errors import SettingsError
-    from shadowpuppet.prior_settings import PriorSettings
+    from shadowpuppet.motion.prior.settings import PriorSettings
     from shadowpuppet.priors import prior_from_files
     from shadowpuppet.settings import validate
     from shadowpuppet.tables import prior_tables

@@ -16,7 +16,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.geometry import Array
 from shadowpuppet.likelihood import Cost
-from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.particle_filter import Particles, Refine, Weigh, step
 from shadowpuppet.proposals import Proposals

@@ -16,8 +16,8 @@ from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
 from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
+from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.multiview_settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
-from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.settings import checked, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 

@@ -18,11 +18,11 @@ from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.training import RATE, Trained, matched, train_prior
 from shadowpuppet.options import Options
-from shadowpuppet.prior_settings import PriorSettings
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.training import RATE, Trained, matched, train_prior
 
 CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)
 """Numbers of regions that are tried where one is to be chosen (Ni 2008, Figs. 4 and 8)."""

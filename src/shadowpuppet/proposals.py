@@ -10,7 +10,7 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_skeleton import GLOBAL
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.multiview_settings import MultiviewSettings
 from shadowpuppet.usual import usual_arms
 

@@ -18,8 +18,8 @@ from shadowpuppet.io.recording import Recording
 from shadowpuppet.look import Look
 from shadowpuppet.motion.metrics import FAR, LOST
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.prior.training import Trained
 from shadowpuppet.synthetic.spec import Spec
-from shadowpuppet.training import Trained
 
 BARS = "▁▂▃▄▅▆▇█"
 

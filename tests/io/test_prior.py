@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from motions import gait, prior
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.prior import read_prior, write_prior
-from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.vqpca import fit_prior
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.vqpca import fit_prior
 
 
 def fields(of) -> list[np.ndarray]:

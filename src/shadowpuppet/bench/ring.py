@@ -17,12 +17,12 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.training import RATE, train_prior
 from shadowpuppet.multiview_settings import ForceSettings, MultiviewSettings
 from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.refinement import Refiner
 from shadowpuppet.synthetic import Ring
-from shadowpuppet.training import RATE, train_prior
 from shadowpuppet.visual_hull import SurfacePoints, VisualHull
 
 HEIGHT = 1.75

@@ -11,8 +11,8 @@ import numpy as np
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io._files import reason, write_whole
 from shadowpuppet.io.npz import BROKEN
-from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.subspaces import Subspaces
+from shadowpuppet.motion.prior.local_pca import Subspaces
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
 
 FORMAT, VERSION = "shadowpuppet motion prior", 1
 NUMBERS = ("centres", "bases", "variances", "noise", "transitions", "initial", "rate")

@@ -12,7 +12,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.prior import read_prior
-from shadowpuppet.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.figures import of_poses
 from shadowpuppet.viewer.show import Figure, Show

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.subspaces import Regions, Subspaces
+from shadowpuppet.motion.prior.local_pca import Regions, Subspaces
 
 SUM = 1e-6
 """How far the sum of probabilities may be from one."""

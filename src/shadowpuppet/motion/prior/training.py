@@ -13,15 +13,15 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_skeleton import GLOBAL
-from shadowpuppet.clips import mirrored, without_gaps
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import resampled, resampled_table
 from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.vqpca import Choice, Fit, choose_regions, fit_prior
+from shadowpuppet.motion.prior.clips import mirrored, without_gaps
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.vqpca import Choice, Fit, choose_regions, fit_prior
 
 RATE = 60.0
 """Frames/s that are learnt where nothing else is wanted: HumanEva's, and the recordings' of the paper."""

@@ -17,10 +17,10 @@ from scipy.spatial.distance import cdist
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.hidden_markov import posterior
-from shadowpuppet.motion_prior import MotionPrior
-from shadowpuppet.prior_settings import PriorSettings
-from shadowpuppet.subspaces import Regions, Subspaces, principal_subspaces
+from shadowpuppet.motion.prior.hmm import posterior
+from shadowpuppet.motion.prior.local_pca import Regions, Subspaces, principal_subspaces
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.settings import PriorSettings
 
 GREATEST = 1e9
 """Numbers of poses are less than this: squares of greater ones have too few digits."""

@@ -1,0 +1,1 @@
+"""The learnt motion prior (Ni 2008, IV): local PCA, hidden Markov model, VQPCA, training."""
