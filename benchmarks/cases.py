@@ -13,14 +13,14 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.fitting import find
 from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes
 from shadowpuppet.geometry import Array
-from shadowpuppet.initialization import Guess
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import prepare
-from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.motion.metrics import UPPER, joint_errors
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import Options, make_options
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.initialization import Guess
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 ALIGNED = [name.replace("hand", "wrist") for name in UPPER]
 COLUMNS = ("mean", "sd", "plane", "depth", "far", "aligned", "shoulder", "elbow", "hand", "cost", "jitter", "ms")

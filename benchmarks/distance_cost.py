@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from shadowpuppet import hierarchy
 from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.pipeline import track_recording
+from shadowpuppet.tracking.monocular import stages
+from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
 
 class DistanceCost(PartialCost):
@@ -31,7 +31,7 @@ class DistanceCost(PartialCost):
 
 def by_distance(recording: str, folder: Path, *more: Any) -> None:
     """`track_recording` with `DistanceCost`."""
-    with patch.object(hierarchy, "PartialCost", DistanceCost):
+    with patch.object(stages, "PartialCost", DistanceCost):
         track_recording(recording, folder, *more)
 
 

@@ -19,9 +19,9 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration import read_calibration
-from shadowpuppet.multiview_settings import HullSettings
+from shadowpuppet.tracking.multiview.settings import HullSettings
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull, _silhouette
 from shadowpuppet.video import open_frames
-from shadowpuppet.visual_hull import VisualHull, _silhouette
 
 PERSON = [((0, 0, 0.15), (0.2, 0.13, 0.35)), ((0, 0, 0.65), (0.1, 0.1, 0.14)), ((0, 0.12, -0.5), (0.08, 0.08, 0.45)),
           ((0, -0.12, -0.5), (0.08, 0.08, 0.45)), ((0.1, 0.35, 0.2), (0.05, 0.05, 0.35)), ((-0.1, -0.35, 0.2), (0.05, 0.05, 0.35))]

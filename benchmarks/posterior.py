@@ -19,12 +19,12 @@ from proving_ground import HERE, made
 
 from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.first_pose import arm_dofs
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, PartialCost
 from shadowpuppet.motion.metrics import UPPER
 from shadowpuppet.options import Options
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.pose_search import arm_dofs
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
 LEVELS = (400.0, 200.0, 100.0, 60.0, 40.0)
 """Temperatures before the last, pixels."""

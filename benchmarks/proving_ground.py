@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from cases import Case
 
-from shadowpuppet.initialization import Guess
 from shadowpuppet.options import make_options
 from shadowpuppet.synthetic import proving_ground, synthesize
+from shadowpuppet.tracking.monocular.initialization import Guess
 
 HERE = Path(__file__).resolve().parent.parent / "build" / "proving_ground"
 SHOWN = ("mean", "plane", "depth", "far", "aligned", "cost", "jitter", "ms")

@@ -29,13 +29,13 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig
 from shadowpuppet.rig_fitting import prepare_puppet
 from shadowpuppet.rig_look import look_at_rig
 from shadowpuppet.rig_run import Puppet, training_of
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 ROWS: dict[str, dict[str, Any]] = {
     "default": {},

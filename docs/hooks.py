@@ -23,11 +23,11 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import tomli_w
 
-from shadowpuppet.monocular_settings import PRESETS
-from shadowpuppet.multiview_settings import MULTIVIEW_PRESETS
 from shadowpuppet.options import Options
 from shadowpuppet.settings import default_of, settings_of
 from shadowpuppet.synthetic.spec import TABLES, Spec
+from shadowpuppet.tracking.monocular.settings import PRESETS
+from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS
 
 MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
 QUOTES = '"""'

@@ -30,8 +30,8 @@ from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import track_recording
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import open_frames
-from shadowpuppet.visual_hull import VisualHull
 
 TARGET, LARGEST = Path(__file__).parent / "assets" / "puppet.webp", 1_000_000
 """The picture, and its bytes at most."""

@@ -17,19 +17,19 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.closest import make_cloud
 from shadowpuppet.demo import run_demo
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.multiview_settings import ForceSettings
 from shadowpuppet.options import Options
-from shadowpuppet.refinement import Refiner
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Ring, Spec
+from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.multiview.settings import ForceSettings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.video import open_frames, write_image
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull
 
 ASSETS = Path(__file__).parent / "assets"
 FRAME, TIMES = 34, (0.3, 0.55)

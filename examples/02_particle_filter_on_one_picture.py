@@ -13,9 +13,9 @@ from shadowpuppet.body.upper_body import cardbox
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import matching
 from shadowpuppet.camera.rasterize import Picture, place
-from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.particle_filter import diffuse, evaluate, step
-from shadowpuppet.resampling import make_scheme
+from shadowpuppet.tracking.particle_filter import diffuse, evaluate, step
+from shadowpuppet.tracking.resampling import make_scheme
+from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 from shadowpuppet.video import write_image
 
 SIGMA_COST = 8000.0  # sigma_gamma of eq. 6, pixels

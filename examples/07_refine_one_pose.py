@@ -11,10 +11,10 @@ import numpy as np
 import shadowpuppet as sp
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.camera.drawing import draw_model
-from shadowpuppet.closest import make_cloud
-from shadowpuppet.multiview_settings import ForceSettings
-from shadowpuppet.refinement import Refiner
 from shadowpuppet.synthetic import Ring, Spec
+from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.multiview.settings import ForceSettings
 from shadowpuppet.video import write_image
 
 ITERATIONS = (0, 1, 2, 5, 10, 20, 40)

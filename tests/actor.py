@@ -16,9 +16,9 @@ from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 CAMERAS = 5
 """Of four in a ring, two and two face each other."""

@@ -10,7 +10,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.projection import NEAR
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.viewing_edges import CONFIRMED, FAR, SHORTEST
+from shadowpuppet.tracking.multiview.surface.viewing_edges import CONFIRMED, FAR, SHORTEST
 
 
 def sides(mask: Mask, seen: Mask | None = None) -> dict[tuple[float, float], tuple[tuple[int, int], bool]]:

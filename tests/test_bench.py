@@ -20,10 +20,10 @@ from shadowpuppet.bench.rivals import OpenCV, one_thread
 from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.camera import rasterize
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.hierarchy import FilterStage
-from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.monocular_settings import make_settings
 from shadowpuppet.plots import plot_curves
+from shadowpuppet.tracking.monocular.settings import make_settings
+from shadowpuppet.tracking.monocular.stages import FilterStage
+from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 
 ISSUED = ("particle_us", "arm_us", "ratio_opencv_full", "ratio_opencv_arm", "ratio_naive_frame", "ratio_boxes", "step_fps", "default_fps",
           "chain_fps", "peak_mb", "growth_mb")

@@ -11,12 +11,12 @@ import made
 from shadowpuppet.bench import multi, naive_multi, ring_film
 from shadowpuppet.bench.ring import Around, RingFollower
 from shadowpuppet.bench.timing import Times, in_turns
-from shadowpuppet.forces import push
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.multiview_settings import ForceSettings, make_multiview_settings
 from shadowpuppet.plots import plot_curves
 from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.tracking.multiview.refinement.forces import push
+from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings
 from shadowpuppet.video import open_frames
 
 compiled = pytest.mark.skipif(not hasattr(push, "signatures"), reason="kernels are not compiled")

@@ -10,15 +10,15 @@ import pytest
 import actor
 from scans import make_body as random_tree
 from scans import scan, some_pose
-from shadowpuppet import bundle
 from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.anthropometry import shares_of
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
-from shadowpuppet.bundle import solve_bundle
-from shadowpuppet.closest import LANES, Cloud, make_cloud
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.multiview_settings import SurfaceSettings
+from shadowpuppet.tracking.multiview import bundle_adjustment
+from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud
+from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 MEAN = actor.sizes()
 NAMES = AnatomicalSizes.names()
@@ -34,7 +34,7 @@ def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsil
     pose = some_pose(body, rng)
     points, normals, weights = scan(body, pose, rng, 15)
     points = points + rng.normal(0, 0.02, points.shape)
-    frame = bundle._equations(bundle._model(body), [], pose, make_cloud(points, normals, weights), surface)
+    frame = bundle_adjustment._equations(bundle_adjustment._model(body), [], pose, make_cloud(points, normals, weights), surface)
     H, g = naive.normal_equations(body, pose, points, normals, weights, surface)
     np.testing.assert_allclose(frame.rows, H, atol=2e-4 * np.abs(H).max())
     np.testing.assert_allclose(frame.gradient, g, atol=2e-4 * np.abs(g).max())
@@ -43,16 +43,16 @@ def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsil
 
 def test_what_sizes_do_to_distances_is_their_derivative(rng):
     """Of a longer loin: what hangs on the chest rises, so that the points there are less far out along their normals."""
-    body, settings, step = actor.body(), SurfaceSettings(), bundle.NUDGE
+    body, settings, step = actor.body(), SurfaceSettings(), bundle_adjustment.NUDGE
     pose, k = actor.stance(body.skeleton), NAMES.index("lumbar_height")
     seen = actor.surface(body, pose, rng, 20)
     cloud = make_cloud(seen.points + 0.005 * seen.normals, seen.normals, seen.weights)
-    nudged = bundle._nudged(anatomical, AnatomicalSizes, MEAN.to_array(), np.array([k]))
-    frame = bundle._equations(bundle._model(body), nudged, pose, cloud, settings)
+    nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, MEAN.to_array(), np.array([k]))
+    frame = bundle_adjustment._equations(bundle_adjustment._model(body), nudged, pose, cloud, settings)
     near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
-    _, here = bundle._measured(bundle._model(body), pose, cloud, settings, near, True)
+    _, here = bundle_adjustment._measured(bundle_adjustment._model(body), pose, cloud, settings, near, True)
     taller = anatomical(MEAN.with_values(lumbar_height=MEAN.lumbar_height + step))
-    grows = (here[0] - bundle._measured(bundle._model(taller), pose, cloud, settings, near, False)[1][0]) / step
+    grows = (here[0] - bundle_adjustment._measured(bundle_adjustment._model(taller), pose, cloud, settings, near, False)[1][0]) / step
     arms = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("arm", "hand"))])
     legs = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("thigh", "shank", "foot"))])
     assert np.quantile(np.abs(grows - here[7])[arms], 0.75) < 0.05  # all but points of edges
@@ -69,13 +69,13 @@ def test_a_step_is_that_of_all_equations_at_once(damping, rng):
     frames = []
     for _ in range(F):
         rows = rng.normal(size=(60, D + K))
-        frames.append(bundle._Frame(0.0, 0.0, rows.T @ rows / 60, 1e-3 * rng.normal(size=D + K)))
+        frames.append(bundle_adjustment._Frame(0.0, 0.0, rows.T @ rows / 60, 1e-3 * rng.normal(size=D + K)))
     poses = np.stack([some_pose(body, rng) for _ in range(F)])
     poses[:, body.skeleton.dof_names.index("flexion")] = 1.0
     start, pull, sizes = poses + 0.01 * rng.normal(size=poses.shape), rng.uniform(0, 0.1, poses.shape), rng.normal(size=6)
     free, tight, strain, scale = np.array([0, 2, 3, 5]), rng.uniform(0.1, 1, K), rng.normal(size=K), 1e3
-    solution = bundle._Solution((sizes, poses), 0.0, frames, strain, body)
-    found = bundle._moved(solution, free, tight, scale, start, pull, damping)
+    solution = bundle_adjustment._Solution((sizes, poses), 0.0, frames, strain, body)
+    found = bundle_adjustment._moved(solution, free, tight, scale, start, pull, damping)
     A, b = np.zeros((F * D + K, F * D + K)), np.zeros(F * D + K)
     last = F * D + np.arange(K)
     for f, frame in enumerate(frames):
@@ -96,14 +96,14 @@ def test_a_step_is_that_of_all_equations_at_once(damping, rng):
 def test_a_step_that_makes_it_worse_is_not_taken(monkeypatch):
     """Whatever the equations say: here, the contrary."""
     near, clouds = shown()[2:]
-    kept = bundle._moved
+    kept = bundle_adjustment._moved
     at_first = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, rounds=0)
 
     def contrary(best, *rest):
         sizes, poses = kept(best, *rest)
         return 2 * best.at[0] - sizes, 2 * best.at[1] - poses
 
-    monkeypatch.setattr(bundle, "_moved", contrary)
+    monkeypatch.setattr(bundle_adjustment, "_moved", contrary)
     found = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, rounds=4)
     assert found.sizes == at_first.sizes
     np.testing.assert_array_equal(found.poses, near)
@@ -168,10 +168,10 @@ def test_nothing_is_ever_made_worse_and_more_rounds_do_more():
     assert residuals[0].sizes == MEAN
 
     def cost(found) -> float:
-        of = bundle._model(anatomical(found.sizes))
-        frames = [bundle._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
+        of = bundle_adjustment._model(anatomical(found.sizes))
+        frames = [bundle_adjustment._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
         strain = (found.sizes.to_array() - MEAN.to_array()) / SPREAD
-        return bundle.WORTH / bundle.NOISE**2 * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
+        return bundle_adjustment.WORTH / bundle_adjustment.NOISE**2 * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
 
     costs = [cost(found) for found in residuals]
     assert costs[3] <= costs[2] <= costs[1] <= costs[0]

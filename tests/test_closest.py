@@ -11,7 +11,17 @@ from scipy.spatial.transform import Rotation
 import naive_limbs
 from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.shapes import Limbs
-from shadowpuppet.closest import FAR, LANES, NUMBERS, Cloud, constants, make_cloud, measure, nearest, place_parts
+from shadowpuppet.tracking.multiview.refinement.correspondence import (
+    FAR,
+    LANES,
+    NUMBERS,
+    Cloud,
+    constants,
+    make_cloud,
+    measure,
+    nearest,
+    place_parts,
+)
 
 pytestmark = pytest.mark.kernels
 seeds = st.integers(0, 2**31)

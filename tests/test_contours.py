@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 import naive_hull
-from shadowpuppet.contours import FIRM, INSIDE, UNKNOWN, _cells, _follow, trace
+from shadowpuppet.tracking.multiview.surface.contours import FIRM, INSIDE, UNKNOWN, _cells, _follow, trace
 
 shapes = array_shapes(min_dims=2, max_dims=2, max_side=20)
 masks = arrays(bool, shapes)

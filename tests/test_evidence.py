@@ -7,8 +7,8 @@ import pytest
 
 import actor
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.evidence import Evidence, Stage, _thinned
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.observation import Evidence, Stage, _thinned
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from solids import looking
 
 NOTHING = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from people import camera, picture
 from shadowpuppet.body.segments import coarse_arms, parts_of
 from shadowpuppet.body.upper_body import BODIES, SIDES
-from shadowpuppet.first_pose import search
-from shadowpuppet.likelihood import Observation
+from shadowpuppet.tracking.monocular.pose_search import search
+from shadowpuppet.tracking.silhouette_cost import Observation
 
 LIBRARY = coarse_arms()
 VIEW = picture("rounded")

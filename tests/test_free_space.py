@@ -9,10 +9,10 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 import actor
 import made_rig
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.closest import make_cloud
-from shadowpuppet.free_space import OTHERS, TAU, Spheres, free_space, push_inside, spheres_in
-from shadowpuppet.part_sums import SUMS
-from shadowpuppet.refinement import Pass, Refiner
+from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
+from shadowpuppet.tracking.multiview.refinement.free_space import OTHERS, TAU, Spheres, free_space, push_inside, spheres_in
+from shadowpuppet.tracking.multiview.refinement.normal_equations import SUMS
+from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 
 BENT = (-0.09, 0.05, 0.0, 0.0)
 

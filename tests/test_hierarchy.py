@@ -7,10 +7,10 @@ import pytest
 
 from people import camera, picture, random_poses
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.hierarchy import FilterStage
-from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.monocular_settings import make_settings
-from shadowpuppet.particle_filter import Particles, evaluate
+from shadowpuppet.tracking.monocular.settings import make_settings
+from shadowpuppet.tracking.monocular.stages import FilterStage
+from shadowpuppet.tracking.particle_filter import Particles, evaluate
+from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 
 PLAIN = {"motion_weight": 0.0, "posture_weight": 0.0}
 FLAT = "torso+left_arm+right_arm"

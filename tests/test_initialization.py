@@ -14,10 +14,10 @@ from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.fitting import wrong_posture
-from shadowpuppet.hypotheses import Bodies, Guess, Hypotheses
-from shadowpuppet.initialization import POSTURES, Fit, find_person, fit_references, refine
-from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.monocular_settings import InitializationSettings
+from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, find_person, fit_references, refine
+from shadowpuppet.tracking.monocular.settings import InitializationSettings
+from shadowpuppet.tracking.monocular.size_search import Bodies, Guess, Hypotheses
+from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 
 CAMERA = camera((320, 240))
 AVERAGE = sizes_from_height(1.78)

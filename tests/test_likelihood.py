@@ -17,7 +17,7 @@ from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import projection, rasterize, scanline
 from shadowpuppet.camera.rasterize import Picture, pack, unpack
 from shadowpuppet.jit import BLOCK
-from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
+from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost, silhouette_costs
 
 STAGES = {"torso": "torso_", "left arm": "left_", "right arm": "right_", "both arms": ("left_", "right_"), "elbow": "left_elbow", "all": ""}
 

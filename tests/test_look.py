@@ -24,11 +24,11 @@ from shadowpuppet.footage import (
     silhouettes,
     take_sample,
 )
-from shadowpuppet.initialization import POSTURES, Fit, Guess, sizes_from_height
 from shadowpuppet.look import prepare, quality_of
 from shadowpuppet.options import Options, make_options
 from shadowpuppet.pipeline import json_text, look_at, track_recording
 from shadowpuppet.silhouette.quality import mask_quality
+from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, Guess, sizes_from_height
 
 QUICK = {"rounds": 20, "patience": 5, "sweeps": 2}
 

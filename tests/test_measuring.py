@@ -14,9 +14,9 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.body.whole_sizes import WHOLE, AnatomicalSizes
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.measuring import EXACT, SHOWN, measure, seen_height, spread_of
-from shadowpuppet.multiview_settings import MultiviewSettings
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.size_estimation import EXACT, SHOWN, measure, seen_height, spread_of
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 SETTINGS = MultiviewSettings(particles=8)
 NAMES = AnatomicalSizes.names()

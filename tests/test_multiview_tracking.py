@@ -12,15 +12,15 @@ import pytest
 
 import actor
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evidence import Evidence
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
-from shadowpuppet.multiview_settings import MultiviewSettings, make_multiview_settings
-from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.particle_filter import evaluate
-from shadowpuppet.resampling import normalise
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import evaluate
+from shadowpuppet.tracking.resampling import normalise
 
 FEW = {"particles": 8}
 NAMES = actor.body().skeleton.dof_names

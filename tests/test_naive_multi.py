@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import naive_limbs
 from scans import make_body, scan, some_pose
 from shadowpuppet.bench import naive_multi as naive
-from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
+from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)
 seeds = st.integers(0, 2**32 - 1)

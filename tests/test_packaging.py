@@ -45,7 +45,7 @@ def test_help_and_reading_files_load_no_compiler_codec_or_plots():
 
 
 def test_tracking_loads_no_files_films_or_terminal():
-    loaded = loaded_after("import shadowpuppet.tracking, shadowpuppet.initialization")
+    loaded = loaded_after("import shadowpuppet.tracking.monocular.tracker, shadowpuppet.tracking.monocular.initialization")
     assert not loaded & {"cv2", "av", "matplotlib", "rich", "cyclopts", "shadowpuppet.io", "shadowpuppet.video", "shadowpuppet.cli"}
 
 

@@ -34,7 +34,7 @@ from papers.liu2011 import (
 from papers.liu2011.__main__ import EXPERIMENTS, run
 from papers.liu2011.sweeps import Measured
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.monocular_settings import make_settings
+from shadowpuppet.tracking.monocular.settings import make_settings
 
 SEED = 5
 """Of all runs here: not the default."""

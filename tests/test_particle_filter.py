@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
-from shadowpuppet.resampling import SCHEMES, deterministic, make_scheme, normalise, stratified
+from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
+from shadowpuppet.tracking.resampling import SCHEMES, deterministic, make_scheme, normalise, stratified
 
 
 def weigh(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import actor
-from shadowpuppet import postures
 from shadowpuppet.body.whole_sizes import WHOLE
-from shadowpuppet.evidence import Evidence, Stage
-from shadowpuppet.postures import HEADINGS, placed, search
-from shadowpuppet.proposals import GLOBAL
-from shadowpuppet.refinement import Refiner
-from shadowpuppet.usual import usual_postures
+from shadowpuppet.tracking.multiview import pose_search
+from shadowpuppet.tracking.multiview.observation import Evidence, Stage
+from shadowpuppet.tracking.multiview.pose_search import HEADINGS, placed, search
+from shadowpuppet.tracking.multiview.posture_prior import usual_postures
+from shadowpuppet.tracking.multiview.proposals import GLOBAL
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -76,8 +76,8 @@ def test_a_library_s_postures_are_tried_in_any_place_and_direction(rng):
 
 def test_of_a_long_library_some_are_tried(monkeypatch, rng):
     tried = []
-    monkeypatch.setattr(postures, "placed", lambda of, some, middle: tried.append(some) or placed(of, some, middle))
-    monkeypatch.setattr(postures, "MOST", 7)
+    monkeypatch.setattr(pose_search, "placed", lambda of, some, middle: tried.append(some) or placed(of, some, middle))
+    monkeypatch.setattr(pose_search, "MOST", 7)
     poses = actor.walk(actor.body().skeleton, 30)
     found_in(poses[3], rng, library=poses)
     usual = usual_postures(actor.body().skeleton)

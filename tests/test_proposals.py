@@ -11,9 +11,9 @@ import actor
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.local_pca import Subspaces
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
-from shadowpuppet.multiview_settings import MultiviewSettings
-from shadowpuppet.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
-from shadowpuppet.usual import usual_arms
+from shadowpuppet.tracking.multiview.posture_prior import usual_arms
+from shadowpuppet.tracking.multiview.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 SKELETON = actor.body().skeleton
 PLAIN = MultiviewSettings(method="particle_filter", velocity=0.0, defensive=0.25, keep=0.0)

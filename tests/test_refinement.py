@@ -9,9 +9,9 @@ import pytest
 
 from scans import make_body, scan, some_pose
 from shadowpuppet.bench import naive_multi as naive
-from shadowpuppet.closest import LANES, make_cloud
-from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
-from shadowpuppet.refinement import Refiner
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, make_cloud
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)
 pytestmark = pytest.mark.kernels

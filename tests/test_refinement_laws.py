@@ -13,19 +13,19 @@ import actor
 import naive_limbs
 from scans import make_body as random_tree
 from scans import scan, some_pose
-from shadowpuppet import refinement
 from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.jacobian import place_one
 from shadowpuppet.body.models import average_sizes
 from shadowpuppet.body.models import make_body as make_named
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.body.whole_sizes import WHOLE
-from shadowpuppet.closest import make_cloud
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_about
-from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
-from shadowpuppet.part_sums import EQUATIONS, gather_down, sweep
-from shadowpuppet.refinement import Refiner
+from shadowpuppet.tracking.multiview.refinement import refiner
+from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
+from shadowpuppet.tracking.multiview.refinement.normal_equations import EQUATIONS, gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)
 
@@ -55,7 +55,7 @@ def test_normal_equations_are_those_of_the_plain_version(seen):
     points = made.rows, made.spheres, made.origin
     sweep(EQUATIONS, room[1], of._limbs, *points, numbers, of._which(made), room)
     gather_down(of._chain, room[6])
-    refinement._normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
+    refiner._normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
     plain = naive.normal_equations(body, pose, *cloud, SURFACE)
     np.testing.assert_allclose(H, plain[0], atol=2e-4 * np.abs(plain[0]).max())
     np.testing.assert_allclose(g, plain[1], atol=2e-4 * np.abs(plain[1]).max())
@@ -71,7 +71,7 @@ def test_equations_are_solved(seed, size):
     root, b = rng.normal(size=(size, size)), rng.normal(size=size)
     A = root @ root.T + np.eye(size)
     x = b.copy()
-    refinement._solve(A.copy(), x)
+    refiner._solve(A.copy(), x)
     np.testing.assert_allclose(A @ x, b, atol=1e-8)
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.resampling import (
+from shadowpuppet.tracking.resampling import (
     SCHEMES,
     deterministic,
     make_scheme,

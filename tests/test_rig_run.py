@@ -20,8 +20,8 @@ from shadowpuppet.pipeline import look_at
 from shadowpuppet.rig_overlay import TALLEST, WIDEST, grid_of
 from shadowpuppet.rig_run import Puppet, track_rig
 from shadowpuppet.running import RIG_STAGES, Listener
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import open_frames
-from shadowpuppet.visual_hull import VisualHull
 
 
 class Standing(NamedTuple):

@@ -12,9 +12,12 @@ import pytest
 from shadowpuppet.body.models import ALL
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.multiview_settings import (
+from shadowpuppet.options import Options, make_options
+from shadowpuppet.settings import validate
+from shadowpuppet.silhouette import SilhouetteSettings
+from shadowpuppet.tracking.monocular.settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings
+from shadowpuppet.tracking.multiview.settings import (
     MULTIVIEW_PRESETS,
     ForceSettings,
     GaussNewtonSettings,
@@ -23,10 +26,7 @@ from shadowpuppet.multiview_settings import (
     SurfaceSettings,
     make_multiview_settings,
 )
-from shadowpuppet.options import Options, make_options
-from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.settings import validate
-from shadowpuppet.silhouette import SilhouetteSettings
+from shadowpuppet.tracking.resampling import SCHEMES
 
 OF_SEVERAL = (MultiviewSettings, SurfaceSettings, GaussNewtonSettings, ForceSettings, HullSettings, PriorSettings)
 KINDS = (PartSettings, MonocularSettings, InitializationSettings, SilhouetteSettings, Options, *OF_SEVERAL)

@@ -12,12 +12,12 @@ import pytest
 from people import camera, picture
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, TrackingError
-from shadowpuppet.first_pose import search
-from shadowpuppet.hierarchy import FilterStage
-from shadowpuppet.likelihood import Observation, silhouette_costs
-from shadowpuppet.monocular_settings import MonocularSettings, make_settings
-from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.tracking import MonocularTracker, State
+from shadowpuppet.tracking.monocular.pose_search import search
+from shadowpuppet.tracking.monocular.settings import MonocularSettings, make_settings
+from shadowpuppet.tracking.monocular.stages import FilterStage
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.resampling import SCHEMES
+from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 
 FLAT = ("torso+left_arm+right_arm",)
 ARMS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")

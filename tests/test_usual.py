@@ -9,8 +9,8 @@ import pytest
 
 import actor
 from shadowpuppet.body.whole_sizes import WHOLE
-from shadowpuppet.proposals import GLOBAL
-from shadowpuppet.usual import ARMS, BOUND, LEAST, LEGS, SEEN, WIDER, Usual, usual_arms, usual_postures
+from shadowpuppet.tracking.multiview.posture_prior import ARMS, BOUND, LEAST, LEGS, SEEN, WIDER, Usual, usual_arms, usual_postures
+from shadowpuppet.tracking.multiview.proposals import GLOBAL
 
 
 @pytest.mark.parametrize("name", WHOLE)

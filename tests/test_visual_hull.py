@@ -17,9 +17,9 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector, transform
 from shadowpuppet.io.calibration import read_calibration
-from shadowpuppet.multiview_settings import HullSettings
+from shadowpuppet.tracking.multiview.settings import HullSettings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull, _silhouette
 from shadowpuppet.video import open_frames
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull, _silhouette
 from solids import Box, Ellipsoid, looking, masks_of, ring
 
 BALL = Ellipsoid((0.05, -0.1, 0.02), (0.3, 0.3, 0.3))

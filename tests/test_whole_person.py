@@ -14,14 +14,14 @@ from shadowpuppet.body.segments import steady
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.hypotheses import Guess
-from shadowpuppet.initialization import Fit, as_whole, find_person
-from shadowpuppet.likelihood import Observation
-from shadowpuppet.monocular_settings import InitializationSettings, make_settings
 from shadowpuppet.options import Options
 from shadowpuppet.rig_fitting import prepare_puppet
-from shadowpuppet.tracking import MonocularTracker
-from shadowpuppet.whole_person import whole_person
+from shadowpuppet.tracking.monocular.initialization import Fit, as_whole, find_person
+from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
+from shadowpuppet.tracking.monocular.size_search import Guess
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.monocular.whole_body import whole_person
+from shadowpuppet.tracking.silhouette_cost import Observation
 
 CAMERA = camera((200, 240), focal=1.0)
 HEIGHT, FAR = 1.7, 2.1

@@ -13,13 +13,13 @@ from people import SIZES, camera, picture
 from shadowpuppet.body.shapes import Hulls, Quads
 from shadowpuppet.body.upper_body import cardbox, rounded
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.hypotheses import Bodies, Guess
-from shadowpuppet.initialization import find_person, fit_references
-from shadowpuppet.monocular_settings import InitializationSettings, make_settings
-from shadowpuppet.multiview_settings import make_multiview_settings
-from shadowpuppet.multiview_tracker import MultiviewTracker
-from shadowpuppet.resampling import SCHEMES
-from shadowpuppet.tracking import MonocularTracker, State
+from shadowpuppet.tracking.monocular.initialization import find_person, fit_references
+from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
+from shadowpuppet.tracking.monocular.size_search import Bodies, Guess
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.multiview.settings import make_multiview_settings
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.resampling import SCHEMES
 
 BRIEF = InitializationSettings(rounds=3, sweeps=1)
 HAND = "left_hand"

@@ -12,7 +12,7 @@ from papers.liu2011.shown import stem, told
 from shadowpuppet.camera.drawing import draw_model, in_colour, matching
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.status import UNCERTAIN
+from shadowpuppet.tracking.status import UNCERTAIN
 from shadowpuppet.video import Image
 
 COLUMNS, WIDTH, GREYS = 6, 1200, 6

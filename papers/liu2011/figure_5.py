@@ -12,8 +12,8 @@ from papers.liu2011.material import Case, cases
 from papers.liu2011.shown import stem, told
 from shadowpuppet.camera.drawing import in_colour
 from shadowpuppet.geometry import Array
-from shadowpuppet.resampling import deterministic
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.resampling import deterministic
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

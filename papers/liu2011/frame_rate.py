@@ -17,7 +17,7 @@ from shadowpuppet.bench.rivals import one_thread
 from shadowpuppet.bench.timing import Contender
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.video import Image
 
 PAPER = 15.0

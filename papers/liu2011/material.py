@@ -18,12 +18,10 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.initialization import Guess
 from shadowpuppet.io._plain import plain
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.look import Prepared, check, prepare
 from shadowpuppet.making import make_recording
-from shadowpuppet.monocular_settings import MonocularSettings, make_settings
 from shadowpuppet.motion.metrics import match
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import Options, make_options, plain_options
@@ -32,6 +30,8 @@ from shadowpuppet.synthetic.motions import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from
 from shadowpuppet.synthetic.specfile import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.tracking.monocular.initialization import Guess
+from shadowpuppet.tracking.monocular.settings import MonocularSettings, make_settings
 from shadowpuppet.video import Image
 
 MADE = {

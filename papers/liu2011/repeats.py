@@ -19,11 +19,11 @@ from shadowpuppet.batch import BatchListener, make_grid, run_batch
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.run import write_metrics
-from shadowpuppet.monocular_settings import MonocularSettings
 from shadowpuppet.options import Options, plain_options
 from shadowpuppet.running import Listener
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 METHODS = {"DRS": "deterministic", "SRS": "stratified"}
 """The two ways to resample that the paper compares."""

@@ -13,9 +13,9 @@ from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import METHODS, repeat, with_method
 from papers.liu2011.shown import stem, told
 from papers.liu2011.sweeps import COLUMNS, Measured, cells, finish, measured, plot
-from shadowpuppet.monocular_settings import MonocularSettings
-from shadowpuppet.resampling import normalise
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.resampling import normalise
 
 SHARES, FEW = (1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125), (1.0, 0.0625)
 """Of Table I's sigma_gamma, 8000 and 4000 pixels."""

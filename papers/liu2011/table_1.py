@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from papers.common.claims import Verdict
 from papers.common.experiment import Experiment, Outcome, Request, Table
-from shadowpuppet.monocular_settings import make_settings
+from shadowpuppet.tracking.monocular.settings import make_settings
 
 PAPER = {
     "N": (200, 200, 200),

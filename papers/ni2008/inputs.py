@@ -27,7 +27,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration import read_calibration, write_calibration
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.synthetic import Spec, humaneva, synthesize
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 BODY = "cylinders"
 """The paper's body (II)."""

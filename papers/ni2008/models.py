@@ -14,8 +14,8 @@ from shadowpuppet.body.shapes import Body, Limbs
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.synthetic import Viewpoint
+from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
 HEIGHT, LIFT = 1.75, 0.95
 """Of the person who is drawn, and of their pelvis, metres."""

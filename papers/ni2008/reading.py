@@ -20,16 +20,16 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.joints import read_joints
 from shadowpuppet.io.motion_files import read_motion
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.measuring import measure, spread_of
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.multiview_settings import make_multiview_settings
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig
 from shadowpuppet.rig_look import check_rig, look_at_rig
 from shadowpuppet.synthetic.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.settings import make_multiview_settings
+from shadowpuppet.tracking.multiview.size_estimation import measure, spread_of
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 OPENING, OPENED, FEW = 2.0, 24, 5
 """The first seconds in which the person is measured; how many frames of them are taken; and of small pictures."""

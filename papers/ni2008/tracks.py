@@ -18,14 +18,14 @@ import numpy as np
 from papers.common.experiment import Request
 from papers.common.many import run_all
 from papers.ni2008.inputs import BODY, Case, key_of, opened
-from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.training import modelled
 from shadowpuppet.motion.prior.vqpca import Fit, fit_prior
-from shadowpuppet.multiview_settings import make_multiview_settings
-from shadowpuppet.multiview_tracker import MultiviewTracker
+from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.settings import make_multiview_settings
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 REGIONS, DIMENSIONS = 20, 3
 """M and m of Table II's hybrid."""

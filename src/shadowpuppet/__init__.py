@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
     from shadowpuppet.exporting import convert_motion, export_run
     from shadowpuppet.footage import open_footage, read_masks
-    from shadowpuppet.initialization import find_person, fit_references
     from shadowpuppet.io.calibration import read_calibration, write_calibration
     from shadowpuppet.io.humaneva import read_humaneva
     from shadowpuppet.io.joints import read_joints, write_joints
@@ -28,44 +27,48 @@ if TYPE_CHECKING:
     from shadowpuppet.io.run import Run, read_run
     from shadowpuppet.io.truth import read_truth
     from shadowpuppet.look import Look
-    from shadowpuppet.monocular_settings import MonocularSettings, make_settings
     from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.motion.metrics import evaluate
     from shadowpuppet.motion.motion import JointTable, Motion
     from shadowpuppet.motion.prior.motion_prior import MotionPrior
     from shadowpuppet.motion.prior.settings import PriorSettings
     from shadowpuppet.motion.prior.vqpca import choose_regions, fit_prior
-    from shadowpuppet.multiview_settings import HullSettings, MultiviewSettings, make_multiview_settings
-    from shadowpuppet.multiview_tracker import MultiviewTracker
     from shadowpuppet.options import Options, make_options
     from shadowpuppet.pipeline import Listener, look_at, track_recording
     from shadowpuppet.report.page import write_report
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
-    from shadowpuppet.tracking import MonocularTracker
+    from shadowpuppet.tracking.monocular.initialization import find_person, fit_references
+    from shadowpuppet.tracking.monocular.settings import MonocularSettings, make_settings
+    from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+    from shadowpuppet.tracking.multiview.settings import HullSettings, MultiviewSettings, make_multiview_settings
+    from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
+    from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
     from shadowpuppet.video import open_frames, write_frames
-    from shadowpuppet.visual_hull import SurfacePoints, VisualHull
 
     __version__: str
 
 _HOMES = {
     "CardboxSizes": "body.sizes", "Camera": "camera.camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
-    "find_person": "initialization", "fit_references": "initialization", "read_calibration": "io.calibration",
-    "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints", "Person": "io.person",
-    "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording",
-    "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "motion.metrics", "JointTable": "motion.motion",
-    "Motion": "motion.motion", "Options": "options", "make_options": "options", "Listener": "pipeline", "look_at": "pipeline",
-    "track_recording": "pipeline", "Picture": "camera.rasterize", "MonocularSettings": "monocular_settings",
-    "make_settings": "monocular_settings", "SilhouetteSettings": "silhouette", "learn_background": "silhouette",
-    "synthesize": "synthetic", "MonocularTracker": "tracking", "open_frames": "video", "write_frames": "video",
+    "find_person": "tracking.monocular.initialization", "fit_references": "tracking.monocular.initialization",
+    "read_calibration": "io.calibration", "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints",
+    "Person": "io.person", "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording",
+    "read_recording": "io.recording", "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "motion.metrics",
+    "JointTable": "motion.motion", "Motion": "motion.motion", "Options": "options", "make_options": "options", "Listener": "pipeline",
+    "look_at": "pipeline", "track_recording": "pipeline", "Picture": "camera.rasterize",
+    "MonocularSettings": "tracking.monocular.settings", "make_settings": "tracking.monocular.settings",
+    "SilhouetteSettings": "silhouette", "learn_background": "silhouette", "synthesize": "synthetic",
+    "MonocularTracker": "tracking.monocular.tracker", "open_frames": "video", "write_frames": "video",
     "MotionPrior": "motion.prior.motion_prior", "PriorSettings": "motion.prior.settings", "choose_regions": "motion.prior.vqpca",
-    "fit_prior": "motion.prior.vqpca", "read_prior": "io.prior", "write_prior": "io.prior", "HullSettings": "multiview_settings",
-    "SurfacePoints": "visual_hull", "VisualHull": "visual_hull", "FittedPoses": "motion.inverse_kinematics",
+    "fit_prior": "motion.prior.vqpca", "read_prior": "io.prior", "write_prior": "io.prior",
+    "HullSettings": "tracking.multiview.settings", "SurfacePoints": "tracking.multiview.surface.visual_hull",
+    "VisualHull": "tracking.multiview.surface.visual_hull", "FittedPoses": "motion.inverse_kinematics",
     "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes",
-    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "multiview_tracker",
-    "MultiviewSettings": "multiview_settings", "make_multiview_settings": "multiview_settings", "export_run": "exporting",
-    "convert_motion": "exporting", "Comparison": "evaluation", "Evaluation": "evaluation", "measure_run": "evaluation",
-    "read_truth": "io.truth", "write_report": "report.page", "open_footage": "footage", "read_masks": "footage",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
+    "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
+    "export_run": "exporting", "convert_motion": "exporting", "Comparison": "evaluation", "Evaluation": "evaluation",
+    "measure_run": "evaluation", "read_truth": "io.truth", "write_report": "report.page", "open_footage": "footage",
+    "read_masks": "footage",
 }  # fmt: skip
 """Where each public name lives."""
 

@@ -16,12 +16,12 @@ from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
 from shadowpuppet.geometry import Array
-from shadowpuppet.initialization import POSTURES, Fit, Guess, as_whole, find_person, fit_references
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette.boundary import disc
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, Guess, as_whole, find_person, fit_references
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
 """Overlap (intersection over union) of the fitted body and a reference's silhouette under which it does not show its posture..."""

@@ -15,11 +15,11 @@ from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration import read_toml
-from shadowpuppet.monocular_settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.multiview_settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
 from shadowpuppet.settings import checked, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
+from shadowpuppet.tracking.monocular.settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
+from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""

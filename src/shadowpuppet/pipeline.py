@@ -42,7 +42,7 @@ from shadowpuppet.running import (
     warn_of_losses,
 )
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking import MonocularTracker, State
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
 __all__ = ["Listener", "Summary", "Watch", "fit_person", "json_text", "look_at", "motion_frame", "named_body", "next_state",
            "track_recording"]

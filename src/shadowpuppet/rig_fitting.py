@@ -13,15 +13,15 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.measuring import likely_height, measure, spread_of
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.multiview_tracker import MultiviewTracker
 from shadowpuppet.options import Options
 from shadowpuppet.priors import familiar
 from shadowpuppet.rig import Rig
 from shadowpuppet.rig_look import Opening
 from shadowpuppet.rig_run import Puppet
-from shadowpuppet.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.size_estimation import likely_height, measure, spread_of
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 
 def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options: Options, training: JointTable | None) -> Puppet:

@@ -27,7 +27,7 @@ from shadowpuppet.rig import FrameSet, Rig, follow, open_rig
 from shadowpuppet.rig_look import Opening, PreparedRig, RigLook, check_rig, look_at_rig
 from shadowpuppet.rig_overlay import RigOverlayWriter
 from shadowpuppet.running import RIG_STAGES, Listener, Summary, Watch, evaluated, generators, json_text, timings, tracked, warn_of_losses
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 
 class RigState(Protocol):

@@ -15,9 +15,9 @@ from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, PartialCost
-from shadowpuppet.monocular_settings import make_settings
-from shadowpuppet.tracking import MonocularTracker
+from shadowpuppet.tracking.monocular.settings import make_settings
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
 SIZE = (320, 240)
 """Liu 2011's pictures, pixels."""

@@ -15,8 +15,8 @@ from shadowpuppet.bench.ring import Around, RingFollower
 from shadowpuppet.bench.ring_film import ring_recording
 from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.geometry import Array
-from shadowpuppet.multiview_settings import ForceSettings, make_multiview_settings
 from shadowpuppet.pipeline import Listener
+from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings
 
 ROUNDS, FEW = 21, 3
 """How often each thing is timed, and how often with `quick`."""

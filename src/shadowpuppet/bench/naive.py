@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, rigid, rotation_about
-from shadowpuppet.hierarchy import FilterStage
-from shadowpuppet.monocular_settings import MonocularSettings
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.stages import FilterStage
 
 Mask = NDArray[np.bool_]
 

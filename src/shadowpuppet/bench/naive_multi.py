@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Body, Limbs
 from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.geometry import Array, rotation_about, rotation_from_vector
-from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
+from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 FLAT = 1e-4
 """A dome lower than this (m) is a flat end."""

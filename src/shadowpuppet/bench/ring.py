@@ -14,16 +14,16 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.closest import Cloud, make_cloud
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.training import RATE, train_prior
-from shadowpuppet.multiview_settings import ForceSettings, MultiviewSettings
-from shadowpuppet.multiview_tracker import MultiviewTracker
-from shadowpuppet.refinement import Refiner
 from shadowpuppet.synthetic import Ring
-from shadowpuppet.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.multiview.settings import ForceSettings, MultiviewSettings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 HEIGHT = 1.75
 """Of the person, metres."""

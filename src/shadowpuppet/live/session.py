@@ -13,7 +13,6 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.display.view import Angle, View
 from shadowpuppet.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
-from shadowpuppet.initialization import Fit, find_person
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.learning import Learner
 from shadowpuppet.live.settings import LiveSettings
@@ -24,8 +23,9 @@ from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.options import Options
 from shadowpuppet.pipeline import motion_frame, named_body, next_state
 from shadowpuppet.silhouette import learn_background
-from shadowpuppet.status import LOST
-from shadowpuppet.tracking import MonocularTracker, State
+from shadowpuppet.tracking.monocular.initialization import Fit, find_person
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.status import LOST
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
 

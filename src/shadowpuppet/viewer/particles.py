@@ -11,17 +11,17 @@ from shadowpuppet.body.segments import BONES
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.body_animation import fitted
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.options import Options
-from shadowpuppet.particle_filter import Particles, diffuse, evaluate
-from shadowpuppet.resampling import normalise
-from shadowpuppet.tracking import MonocularTracker, State
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate
+from shadowpuppet.tracking.resampling import normalise
 from shadowpuppet.viewer.show import Cloud, Eye, Spread
-from shadowpuppet.visual_hull import VisualHull
 
 SEED = 0
 """The same frame has the same particles whenever it is looked at."""

@@ -13,10 +13,10 @@ from shadowpuppet.errors import ShadowPuppetWarning, SilhouetteError, VideoError
 from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Shot, Silhouettes, silhouettes, take_sample
 from shadowpuppet.options import Options
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image
 from shadowpuppet.video.seeking import Seeker
 from shadowpuppet.viewer.show import Eye, Surface
-from shadowpuppet.visual_hull import VisualHull
 
 SAMPLED = 40
 """Frames that are looked at before silhouettes are made, where the empty scene is known by a film of its own."""

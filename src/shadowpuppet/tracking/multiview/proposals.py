@@ -11,8 +11,8 @@ from shadowpuppet.body.whole_skeleton import GLOBAL
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
-from shadowpuppet.multiview_settings import MultiviewSettings
-from shadowpuppet.usual import usual_arms
+from shadowpuppet.tracking.multiview.posture_prior import usual_arms
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 REACH = (0.3, 1.0, 2.0)
 """What the noise of a defensive proposal is multiplied by, one of these each."""

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.jacobian import STEP, TRANSLATION, make_chain, place_one
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.closest import LANES, Cloud, constants
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.forces import push
-from shadowpuppet.free_space import FreeSpace, free_space, push_inside, spheres_in
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.multiview_settings import ForceSettings, SurfaceSettings
-from shadowpuppet.part_sums import COST, EQUATIONS, FORCES, MODULATED, ROBUST, SUMS, gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, constants
+from shadowpuppet.tracking.multiview.refinement.forces import push
+from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, push_inside, spheres_in
+from shadowpuppet.tracking.multiview.refinement.normal_equations import COST, EQUATIONS, FORCES, MODULATED, ROBUST, SUMS, gather_down, sweep
+from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 
 class Pass(NamedTuple):

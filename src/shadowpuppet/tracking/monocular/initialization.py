@@ -16,11 +16,11 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.camera.rasterize import place
 from shadowpuppet.errors import TrackingError, choices, shown
-from shadowpuppet.first_pose import beside, search
 from shadowpuppet.geometry import Array
-from shadowpuppet.hypotheses import Guess, Hypotheses
-from shadowpuppet.monocular_settings import InitializationSettings
-from shadowpuppet.whole_person import whole_person
+from shadowpuppet.tracking.monocular.pose_search import beside, search
+from shadowpuppet.tracking.monocular.settings import InitializationSettings
+from shadowpuppet.tracking.monocular.size_search import Guess, Hypotheses
+from shadowpuppet.tracking.monocular.whole_body import whole_person
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},

@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet import first_pose
 from shadowpuppet.body.segments import dofs_of, limbs_of
 from shadowpuppet.camera.mask import Mask, check_mask
 from shadowpuppet.camera.rasterize import Picture, count
 from shadowpuppet.geometry import Array
-from shadowpuppet.hierarchy import FilterStage
-from shadowpuppet.likelihood import Cost, Observation
-from shadowpuppet.monocular_settings import MonocularSettings
-from shadowpuppet.particle_filter import Particles, diffuse, evaluate, step
-from shadowpuppet.resampling import Scheme
-from shadowpuppet.status import ABSENT, status_of
+from shadowpuppet.tracking.monocular import pose_search
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.stages import FilterStage
+from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
+from shadowpuppet.tracking.resampling import Scheme
+from shadowpuppet.tracking.silhouette_cost import Cost, Observation
+from shadowpuppet.tracking.status import ABSENT, status_of
 
 SETTLE = 10
 """Frames' worth of cycles on the first frame, after the search."""
@@ -85,13 +85,13 @@ class MonocularTracker:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` where nobody is
         there. `also`, and what is raised: as `step`."""
         mask = check_mask(mask, self.picture.camera.size)
-        found = first_pose.search(self.picture, mask)
+        found = pose_search.search(self.picture, mask)
         observation, particles = self.observe(mask, found.pose, also), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
             for limb, tried in found.limbs.items():
                 if limb in stage.parts:
-                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = tried[np.arange(stage.number) % first_pose.GOOD]
+                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = tried[np.arange(stage.number) % pose_search.GOOD]
             values = stage.clamp(diffuse(rng, poses[:, stage.dofs], stage.sigma))
             particles.append(evaluate(values, stage.weigh(observation, found.pose, found.pose)))
         state = self.judge(found.pose, particles, observation)

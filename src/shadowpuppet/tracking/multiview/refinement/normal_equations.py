@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.closest import LANES, foot, measure, nearest, place_parts
 from shadowpuppet.jit import kernel, part, summing
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, foot, measure, nearest, place_parts
 
 SUMS = 29
 """Sums of a part: of the normal equations 21 + 6, of the forces 3 + 3 + 1 + 3 + 6, at most."""

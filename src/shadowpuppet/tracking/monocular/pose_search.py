@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.segments import coarse_limbs, dofs_of, limbs_of, parts_of
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, PartialCost, silhouette_costs
+from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost, silhouette_costs
 
 GOOD = 40
 """So many of the coarse postures of a limb that were tried, the best, are worth beginning a filter's particles around."""

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, check_mask, may_be_person
 from shadowpuppet.camera.projection import make_lens
-from shadowpuppet.contours import trace
 from shadowpuppet.errors import CalibrationError, TrackingError
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.multiview_settings import HullSettings
-from shadowpuppet.viewing_edges import circles, cut, length, spread, straighten
+from shadowpuppet.tracking.multiview.settings import HullSettings
+from shadowpuppet.tracking.multiview.surface.contours import trace
+from shadowpuppet.tracking.multiview.surface.viewing_edges import circles, cut, length, spread, straighten
 
 GRID = 4
 """The lens is undone exactly at points this far apart (pixels), and linearly between."""

@@ -12,11 +12,11 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.closest import Cloud, make_cloud
-from shadowpuppet.free_space import FreeSpace, free_space
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Cost, Observation, silhouette_costs
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
+from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.silhouette_cost import Cost, Observation, silhouette_costs
 
 
 class Stage:

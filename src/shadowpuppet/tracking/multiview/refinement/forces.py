@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shadowpuppet.body.jacobian import STEP, TRANSLATION, place_one
 from shadowpuppet.jit import kernel, part
-from shadowpuppet.part_sums import gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.normal_equations import gather_down, sweep
 
 
 @part

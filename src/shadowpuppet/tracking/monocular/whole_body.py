@@ -13,10 +13,10 @@ from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.first_pose import search
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.hypotheses import Guess
-from shadowpuppet.likelihood import Observation
+from shadowpuppet.tracking.monocular.pose_search import search
+from shadowpuppet.tracking.monocular.size_search import Guess
+from shadowpuppet.tracking.silhouette_cost import Observation
 
 FEET = 2
 """A person whose silhouette reaches the picture's last rows is cut off there."""

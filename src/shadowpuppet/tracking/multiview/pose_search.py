@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.whole_skeleton import GLOBAL
-from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.particle_filter import Particles, Weigh, evaluate
-from shadowpuppet.refinement import Refiner
-from shadowpuppet.usual import usual_arms, usual_postures
+from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.particle_filter import Particles, Weigh, evaluate
 
 HEADINGS = 16
 """Directions that are tried."""

@@ -18,8 +18,8 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation
-from shadowpuppet.monocular_settings import InitializationSettings, pixel_scale
+from shadowpuppet.tracking.monocular.settings import InitializationSettings, pixel_scale
+from shadowpuppet.tracking.silhouette_cost import Observation
 
 NAMES = CardboxSizes.names()
 MAY_BE_NEGATIVE = ("neck_gap", "shoulder_inset")

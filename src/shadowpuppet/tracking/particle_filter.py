@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.resampling import Scheme
+from shadowpuppet.tracking.resampling import Scheme
 
 
 class Particles(NamedTuple):

@@ -16,15 +16,15 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, shares_of, stature_o
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import HEIGHTS
 from shadowpuppet.body.whole_sizes import BoneSizes
-from shadowpuppet.bundle import Measured, solve_bundle
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.evidence import Evidence
 from shadowpuppet.geometry import Array
-from shadowpuppet.multiview_settings import MultiviewSettings
-from shadowpuppet.multiview_tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
+from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 
 SHOWN = ("hip_distance", "hip_drop", "hip_forward", "shoulder_distance", "shoulder_drop", "shoulder_forward", "upper_arm_length",
          "forearm_length", "hand_point", "thigh_length", "shank_length", "trunk_height", "lumbar_height", "thorax_height")  # fmt: skip

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from shadowpuppet.body.jacobian import Chain, make_chain, place_one
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
-from shadowpuppet.closest import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.multiview_settings import SurfaceSettings
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
+from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 Measured = TypeVar("Measured", bound=Sizes)
 NUDGE = 1e-3

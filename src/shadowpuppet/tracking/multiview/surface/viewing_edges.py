@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.projection import NEAR, bend_within
-from shadowpuppet.contours import ARM
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import compiled, kernel
+from shadowpuppet.tracking.multiview.surface.contours import ARM
 
 Indices = NDArray[np.int64]
 

@@ -8,10 +8,10 @@ from shadowpuppet.body.segments import HELD, coarse_limbs, dofs_of, limbs_of, me
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Observation, PartialCost
-from shadowpuppet.monocular_settings import MonocularSettings, pixel_scale
-from shadowpuppet.particle_filter import Particles, Propose, Weigh, diffuse
-from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
+from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
+from shadowpuppet.tracking.particle_filter import Particles, Propose, Weigh, diffuse
+from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
+from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
 WANDER, AROUND = 0.3, 0.2
 """Where a stage explores: deviation of the torso's angles from upright, and of a limb's from a coarse one, rad."""

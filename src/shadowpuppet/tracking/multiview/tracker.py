@@ -9,23 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet import postures
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.evidence import Evidence, Stage
 from shadowpuppet.geometry import Array
-from shadowpuppet.likelihood import Cost
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
-from shadowpuppet.multiview_settings import MultiviewSettings
-from shadowpuppet.particle_filter import Particles, Refine, Weigh, step
-from shadowpuppet.proposals import Proposals
-from shadowpuppet.refinement import Pass, Refiner
-from shadowpuppet.resampling import Scheme, make_scheme, normalise, with_best
-from shadowpuppet.status import status_of
-from shadowpuppet.tracking import SETTLE
-from shadowpuppet.usual import Usual
-from shadowpuppet.visual_hull import SurfacePoints
+from shadowpuppet.tracking.monocular.tracker import SETTLE
+from shadowpuppet.tracking.multiview import pose_search
+from shadowpuppet.tracking.multiview.observation import Evidence, Stage
+from shadowpuppet.tracking.multiview.posture_prior import Usual
+from shadowpuppet.tracking.multiview.proposals import Proposals
+from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.particle_filter import Particles, Refine, Weigh, step
+from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
+from shadowpuppet.tracking.silhouette_cost import Cost
+from shadowpuppet.tracking.status import status_of
 
 FEW, SMALLEST = 50, 0.5
 """Surface points, and their extent (m), from which on somebody may be there."""
@@ -105,7 +105,7 @@ class MultiviewTracker:
     def search(self, rng: np.random.Generator, evidence: Evidence) -> MultiviewState:
         """A state from nothing but this frame."""
         weigh = self.weigh(evidence)
-        found = postures.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
+        found = pose_search.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
         state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
         for _ in range(SETTLE):
             state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)

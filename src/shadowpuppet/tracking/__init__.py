@@ -1,0 +1,1 @@
+"""What both papers share: particle filter, resampling, silhouette cost, status."""

@@ -1,0 +1,1 @@
+"""Liu, Lee, Sepp 2011: one camera, a hierarchical particle filter."""

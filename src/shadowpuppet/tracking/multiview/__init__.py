@@ -1,0 +1,1 @@
+"""Ni, Kassim, Winkler 2008: several cameras, a motion prior, refined particles."""

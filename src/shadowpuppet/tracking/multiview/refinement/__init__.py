@@ -1,0 +1,1 @@
+"""Poses refined by surface points: simulated forces (Ni 2008, V-B), Gauss-Newton."""

@@ -1,0 +1,1 @@
+"""Surface points of the visual hull (Ni 2008, III)."""
