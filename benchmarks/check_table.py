@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shadowpuppet.calibration.epipolar_tangency import Outlines
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.options import Options
 from shadowpuppet.rig import Rig, open_rig
 from shadowpuppet.rig_check import RigCheck, Seen, gather, judge
 from shadowpuppet.running import Listener
-from shadowpuppet.tangency import Outlines
 
 MARGIN = 12
 """Sets at both ends that films are shifted into."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import made_rig
-from shadowpuppet.agreement import agreement
+from shadowpuppet.calibration.agreement import agreement
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import inverse, rigid
 

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 import made_rig
+from shadowpuppet.calibration.epipolar_tangency import Outlines
+from shadowpuppet.calibration.rotation_error import turning
+from shadowpuppet.calibration.time_offset import lateness
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.lateness import lateness
 from shadowpuppet.options import Options
 from shadowpuppet.rig import open_rig
 from shadowpuppet.rig_check import check_rig
-from shadowpuppet.tangency import Outlines
-from shadowpuppet.turning import turning
 
 FRAMES = 70
 MASKS = Options(masks=True)

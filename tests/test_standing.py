@@ -11,10 +11,10 @@ import pytest
 
 import calibrations
 import made_rig
+from shadowpuppet.calibration.overview import SIDE, cells, look_at_calibration, meeting_point
 from shadowpuppet.cli import run
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration import read_calibration, stood_up, write_calibration
-from shadowpuppet.standing import SIDE, cells, look_at_calibration, meeting_point
 
 
 @pytest.fixture(scope="module")

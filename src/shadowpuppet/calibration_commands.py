@@ -46,9 +46,9 @@ def is_explained(path: Path) -> bool:
 
 def explain(path: Path, to: Path | None, unit: str | None, up: str | None, as_json: bool) -> None:
     """Tell what a calibration says, and write it as another file where that is asked for."""
+    from shadowpuppet.calibration.overview import look_at_calibration
     from shadowpuppet.calibration_tables import calibration_table
     from shadowpuppet.io.calibration import find_calibration, is_calibration, write_calibration
-    from shadowpuppet.standing import look_at_calibration
     from shadowpuppet.terminal import show, show_json, terminal
 
     with terminal(quiet=as_json) as shown:

@@ -8,8 +8,8 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from shadowpuppet.calibration.overview import SIDE, CalibrationLook, Standpoint
 from shadowpuppet.rig_check import RigCheck
-from shadowpuppet.standing import SIDE, CalibrationLook, Standpoint
 from shadowpuppet.tables import pairs, plain_table
 
 ARROWS = "→↗↑↖←↙↓↘"

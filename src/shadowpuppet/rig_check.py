@@ -11,17 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.agreement import DISAGREES, Agreement, agreement
+from shadowpuppet.calibration.agreement import DISAGREES, Agreement, agreement
+from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines
+from shadowpuppet.calibration.rotation_error import Turn, turned_outline, turning
+from shadowpuppet.calibration.time_offset import Lateness, lateness
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
-from shadowpuppet.lateness import Lateness, lateness
 from shadowpuppet.options import Options
 from shadowpuppet.rig import Rig, follow, usable_cores
 from shadowpuppet.running import Listener
-from shadowpuppet.tangency import Outline, Outlines
-from shadowpuppet.turning import Turn, turned_outline, turning
 
 SETS, FEWEST, LONGEST = 240, 120, 3000
 """Sets of silhouettes that are compared, so many at least where the films are long enough, and among how many they are looked for."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shadowpuppet.agreement import Agreement, agreement
+from shadowpuppet.calibration.agreement import Agreement, agreement
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import ShadowPuppetWarning, TrackingError

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.calibration.epipolar_tangency import Outline
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
-from shadowpuppet.tangency import Outline
 
 PIXELS, DEPTHS = 24, 32
 """Pixels of each outline that are looked at, and places along the ray of each."""

@@ -14,9 +14,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.calibration.epipolar_tangency import Outline, tangent_angles
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.tangency import Outline, tangent_angles
 
 LEAST = 24
 """Sets that two signals must have in common."""

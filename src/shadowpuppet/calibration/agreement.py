@@ -8,11 +8,11 @@ from itertools import combinations
 
 import numpy as np
 
+from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines, tangent_distances
+from shadowpuppet.calibration.silhouette_coverage import Coverage, meeting_place
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.coverage import Coverage, meeting_place
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.tangency import Outline, Outlines, tangent_distances
 
 DISAGREES = 0.01
 """Pixels, over the picture's longer side, from which on cameras are in doubt (6 of 640); good ones are apart by one."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines, tangent_angles
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector
-from shadowpuppet.tangency import Outline, Outlines, tangent_angles
 
 WORST = 1.0
 """Pixels from which on a difference counts less than in proportion (soft L1): some tangents are those of a limb that is missing."""
