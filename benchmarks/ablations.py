@@ -30,7 +30,7 @@ from spoiled import SPOILS, spoiled
 from shadowpuppet.batch import make_grid, run_batch
 from shadowpuppet.batch.summary import BatchRun
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person, write_person
 from shadowpuppet.options import make_options
 from shadowpuppet.pipeline import fit_person

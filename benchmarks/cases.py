@@ -13,7 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.fitting import find
 from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.look import prepare
 from shadowpuppet.motion.metrics import UPPER, joint_errors
 from shadowpuppet.motion.motion import JointTable

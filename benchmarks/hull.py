@@ -18,7 +18,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse, rigid
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.tracking.multiview.settings import HullSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull, _silhouette
 from shadowpuppet.video import open_frames

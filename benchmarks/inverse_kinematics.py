@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet import JointTable, fit_poses, read_joints
-from shadowpuppet.io.amc import read_mocap
+from shadowpuppet.io.motion.amc import read_mocap
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
 RATES = {"02_04": 120.0, "02_10": 120.0, "03_01": 60.0}

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
 
 

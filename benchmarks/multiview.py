@@ -31,8 +31,8 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.bench.chain import ONE_EACH
-from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
 from shadowpuppet.motion.metrics import LIMBS, joint_errors
 from shadowpuppet.motion.motion import JointTable

@@ -27,7 +27,7 @@ from multiview import BUILD, made, measures
 from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig

@@ -18,7 +18,7 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.io.run import read_run

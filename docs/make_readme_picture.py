@@ -23,7 +23,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model, draw_skeleton, write_text
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.options import make_options

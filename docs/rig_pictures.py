@@ -19,7 +19,7 @@ from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.demo import run_demo
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.options import Options

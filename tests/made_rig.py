@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.video import write_frames
 from solids import Ellipsoid, ring, seen_by
 

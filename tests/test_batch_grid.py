@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from shadowpuppet.batch.grid import Case, make_grid, read_grid, seeds_of
 from shadowpuppet.batch.plan import fingerprint, make_tasks
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.io._plain import for_toml
+from shadowpuppet.io.files.plain import for_toml
 from shadowpuppet.options import Options, make_options, plain_options
 
 GRID = """\

@@ -11,7 +11,7 @@ import made
 from shadowpuppet.bench import multi, naive_multi, ring_film
 from shadowpuppet.bench.ring import Around, RingFollower
 from shadowpuppet.bench.timing import Times, in_turns
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.plots import plot_curves
 from shadowpuppet.threads import one_blas_thread

@@ -15,7 +15,7 @@ from shadowpuppet import cli
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.demo import contact_sheet
 from shadowpuppet.evaluation import angle_errors
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.inverse_kinematics import fit_poses

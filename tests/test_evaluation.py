@@ -14,8 +14,8 @@ from measured import NAMES, moved, person, write_run
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.evaluation import Comparison, evaluate_run, measure_run
 from shadowpuppet.geometry import rotation_from_vector
-from shadowpuppet.io.joints import write_joints
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.motion import JointTable
 from vicon import c3d

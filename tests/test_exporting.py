@@ -12,12 +12,12 @@ import acclaim
 import biovision
 import runs
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.exporting import CONVERSIONS, EXPORTS, export_run
-from shadowpuppet.io.bvh import read_bvh
-from shadowpuppet.io.c3d import read_c3d, read_header
-from shadowpuppet.io.joints import read_joints
-from shadowpuppet.io.mot import read_mot
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.export import CONVERSIONS, EXPORTS, export_run
+from shadowpuppet.io.motion.bvh import read_bvh
+from shadowpuppet.io.motion.c3d import read_c3d, read_header
+from shadowpuppet.io.motion.mot import read_mot
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Y_UP
 

@@ -14,7 +14,7 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about, three_turns
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.inverse_kinematics import _along, _Linear, _solved, fit_poses
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.plausibility import NEEDED

@@ -170,7 +170,7 @@ def test_a_folder_with_other_things_is_refused_before_the_camera_is_opened(tmp_p
 
 def test_a_calibration_for_another_size_is_refused(film, tmp_path):
     from shadowpuppet.camera.camera import Camera
-    from shadowpuppet.io.calibration import write_calibration
+    from shadowpuppet.io.calibration.calibration_files import write_calibration
 
     write_calibration(tmp_path / "c.toml", [Camera.from_fov((640, 480), 1.0)])
     options = replace(OPTIONS, fov=None, calibration=tmp_path / "c.toml")

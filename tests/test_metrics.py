@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector, transform
-from shadowpuppet.io.joints import read_joints, write_joints
+from shadowpuppet.io.motion.table import read_joints, write_joints
 from shadowpuppet.motion import metrics
 from shadowpuppet.motion.metrics import LIMBS, UPPER, evaluate, joint_errors, match
 from shadowpuppet.motion.motion import JointTable, MotionBuilder, MotionFrame
@@ -252,7 +252,7 @@ def test_an_evaluation_is_all_plain_numbers():
 
 
 def test_measuring_and_reading_need_no_compiler_codec_or_pictures():
-    code = ("import sys, shadowpuppet.motion.metrics, shadowpuppet.io.joints, shadowpuppet.io.run, shadowpuppet.io.person\n"
+    code = ("import sys, shadowpuppet.motion.metrics, shadowpuppet.io.motion.table, shadowpuppet.io.run, shadowpuppet.io.person\n"
             "import shadowpuppet.camera.drawing\n"
             "print([name for name in ('numba', 'av', 'cv2', 'matplotlib') if name in sys.modules])")
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -9,7 +9,7 @@ import pytest
 
 import acclaim
 from shadowpuppet.errors import FormatError, SettingsError
-from shadowpuppet.io.amc import read_mocap
+from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, spec_from
 from shadowpuppet.synthetic.kinematics import SEGMENTS
 from shadowpuppet.synthetic.mannequin import JOINTS

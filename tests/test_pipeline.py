@@ -10,7 +10,7 @@ import pytest
 import made
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.footage import RUN, RUNS, Shot, open_footage, read_masks, silhouettes, take_sample
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import overlap

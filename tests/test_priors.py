@@ -8,8 +8,8 @@ import pytest
 from movers import walk
 from shadowpuppet.cli import run
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.joints import write_joints
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import make_options, plain_options, read_options

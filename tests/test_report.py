@@ -18,8 +18,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Comparison, measure_run
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.joints import write_joints
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.report.charts import by_joint_and_time
 from shadowpuppet.report.page import page, write_report

@@ -209,7 +209,7 @@ def test_a_reader_who_stops_leaves_no_threads(tmp_path):
 
 def recording(folder: Path, count: int = 3) -> Path:
     """A folder of a recording."""
-    from shadowpuppet.io.calibration import write_calibration
+    from shadowpuppet.io.calibration.calibration_files import write_calibration
 
     (folder / "video").mkdir(parents=True)
     cameras = [looking((2.0, k, 1.0), size=SIZE, name=f"cam{k + 1}") for k in range(count)]

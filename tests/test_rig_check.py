@@ -17,7 +17,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.options import Options
 from shadowpuppet.rig import open_rig
 from shadowpuppet.rig_check import check_rig

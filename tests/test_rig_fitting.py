@@ -14,7 +14,7 @@ import made
 import made_rig
 from shadowpuppet import rig_fitting
 from shadowpuppet.body.whole_body import anatomical
-from shadowpuppet.io.joints import write_joints
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.motion import JointTable

@@ -14,7 +14,7 @@ import made_rig
 from shadowpuppet.cli import run
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.options import Options
 from shadowpuppet.pipeline import look_at, track_recording
 from shadowpuppet.rig import open_rig

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, motions, synthesize
 from shadowpuppet.synthetic.clothes import Clothes
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture

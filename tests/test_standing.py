@@ -14,7 +14,7 @@ import made_rig
 from shadowpuppet.calibration.overview import SIDE, cells, look_at_calibration, meeting_point
 from shadowpuppet.cli import run
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.io.calibration import read_calibration, stood_up, write_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration, stood_up, write_calibration
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import acclaim
 from shadowpuppet.errors import RecordingError, SettingsError
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.making import make_recording
 from shadowpuppet.pipeline import Listener

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import RecordingError, SettingsError
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.synthetic import (
     Gesture,

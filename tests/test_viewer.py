@@ -22,9 +22,9 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import run as command
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
-from shadowpuppet.io.bvh_writing import write_bvh
-from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.joints import write_joints
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.motion.bvh_writer import write_bvh
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.body_animation import BodyTree
@@ -367,7 +367,7 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
 
 def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
     from shadowpuppet.footage import opened
-    from shadowpuppet.io.truth import read_truth
+    from shadowpuppet.io.motion.truth import read_truth
     from shadowpuppet.motion.inverse_kinematics import fit_poses
     from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
     from shadowpuppet.synthetic import synthesize

@@ -194,7 +194,7 @@ def test_the_command_serves_until_it_is_interrupted(browser, run):
 def test_a_live_session_is_shown_and_its_buttons_are_wishes(browser, run):
     from shadowpuppet.body.models import make_body
     from shadowpuppet.camera.rasterize import Picture
-    from shadowpuppet.io.calibration import read_calibration
+    from shadowpuppet.io.calibration.calibration_files import read_calibration
     from shadowpuppet.io.person import read_person
     from shadowpuppet.io.run import read_run
     from shadowpuppet.viewer.live import ViewerDisplay

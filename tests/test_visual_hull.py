@@ -16,7 +16,7 @@ import naive_hull
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector, transform
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.tracking.multiview.settings import HullSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull, _silhouette
 from shadowpuppet.video import open_frames

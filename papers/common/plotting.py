@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io._files import reason
+from shadowpuppet.io.files.text import reason
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,7 +22,7 @@ from papers.common.claims import ANSWERS, all_of
 from papers.common.plotting import LARGEST
 from papers.common.writing import markdown
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io._files import read_text, write_whole
+from shadowpuppet.io.files.text import read_text, write_whole
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = "reproduction.md"

@@ -12,7 +12,7 @@ from papers.common.claims import HEADER
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import save_picture
 from shadowpuppet.bench.machine import environment
-from shadowpuppet.io._files import write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.running import json_text
 
 

@@ -18,8 +18,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._plain import plain
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.files.plain import plain
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.look import Prepared, check, prepare
 from shadowpuppet.making import make_recording
 from shadowpuppet.motion.metrics import match

@@ -24,7 +24,7 @@ from shadowpuppet.body.whole_sizes import sizes_kind
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration import read_calibration, write_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.synthetic import Spec, humaneva, synthesize
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints

@@ -17,8 +17,8 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.joints import read_joints
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable

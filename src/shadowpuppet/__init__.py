@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
-    from shadowpuppet.exporting import convert_motion, export_run
     from shadowpuppet.footage import open_footage, read_masks
-    from shadowpuppet.io.calibration import read_calibration, write_calibration
+    from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
+    from shadowpuppet.io.export import convert_motion, export_run
     from shadowpuppet.io.humaneva import read_humaneva
-    from shadowpuppet.io.joints import read_joints, write_joints
-    from shadowpuppet.io.motion_files import read_motion
+    from shadowpuppet.io.motion.motion_files import read_motion
+    from shadowpuppet.io.motion.table import read_joints, write_joints
+    from shadowpuppet.io.motion.truth import read_truth
     from shadowpuppet.io.person import Person, read_person, write_person
     from shadowpuppet.io.prior import read_prior, write_prior
     from shadowpuppet.io.recording import Recording, read_recording
     from shadowpuppet.io.run import Run, read_run
-    from shadowpuppet.io.truth import read_truth
     from shadowpuppet.look import Look
     from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.motion.metrics import evaluate
@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 _HOMES = {
     "CardboxSizes": "body.sizes", "Camera": "camera.camera", "ShadowPuppetError": "errors", "ShadowPuppetWarning": "errors",
     "find_person": "tracking.monocular.initialization", "fit_references": "tracking.monocular.initialization",
-    "read_calibration": "io.calibration", "write_calibration": "io.calibration", "read_joints": "io.joints", "write_joints": "io.joints",
-    "Person": "io.person", "read_person": "io.person", "write_person": "io.person", "Recording": "io.recording",
-    "read_recording": "io.recording", "Run": "io.run", "read_run": "io.run", "Look": "look", "evaluate": "motion.metrics",
-    "JointTable": "motion.motion", "Motion": "motion.motion", "Options": "options", "make_options": "options", "Listener": "pipeline",
-    "look_at": "pipeline", "track_recording": "pipeline", "Picture": "camera.rasterize",
-    "MonocularSettings": "tracking.monocular.settings", "make_settings": "tracking.monocular.settings",
+    "read_calibration": "io.calibration.calibration_files", "write_calibration": "io.calibration.calibration_files",
+    "read_joints": "io.motion.table", "write_joints": "io.motion.table", "Person": "io.person", "read_person": "io.person",
+    "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording", "Run": "io.run", "read_run": "io.run",
+    "Look": "look", "evaluate": "motion.metrics", "JointTable": "motion.motion", "Motion": "motion.motion", "Options": "options",
+    "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
+    "Picture": "camera.rasterize", "MonocularSettings": "tracking.monocular.settings", "make_settings": "tracking.monocular.settings",
     "SilhouetteSettings": "silhouette", "learn_background": "silhouette", "synthesize": "synthetic",
     "MonocularTracker": "tracking.monocular.tracker", "open_frames": "video", "write_frames": "video",
     "MotionPrior": "motion.prior.motion_prior", "PriorSettings": "motion.prior.settings", "choose_regions": "motion.prior.vqpca",
@@ -64,10 +64,10 @@ _HOMES = {
     "HullSettings": "tracking.multiview.settings", "SurfacePoints": "tracking.multiview.surface.visual_hull",
     "VisualHull": "tracking.multiview.surface.visual_hull", "FittedPoses": "motion.inverse_kinematics",
     "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes",
-    "read_humaneva": "io.humaneva", "read_motion": "io.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
+    "read_humaneva": "io.humaneva", "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
-    "export_run": "exporting", "convert_motion": "exporting", "Comparison": "evaluation", "Evaluation": "evaluation",
-    "measure_run": "evaluation", "read_truth": "io.truth", "write_report": "report.page", "open_footage": "footage",
+    "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation", "Evaluation": "evaluation",
+    "measure_run": "evaluation", "read_truth": "io.motion.truth", "write_report": "report.page", "open_footage": "footage",
     "read_masks": "footage",
 }  # fmt: skip
 """Where each public name lives."""

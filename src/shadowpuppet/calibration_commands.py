@@ -36,7 +36,7 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
 
 def is_explained(path: Path) -> bool:
     """Whether `info` is asked about a calibration, not a recording."""
-    from shadowpuppet.io.calibration import find_calibration, is_calibration
+    from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
 
     if path.is_dir():
         made = any((path / name).exists() for name in ("video", "recording.toml"))
@@ -48,7 +48,7 @@ def explain(path: Path, to: Path | None, unit: str | None, up: str | None, as_js
     """Tell what a calibration says, and write it as another file where that is asked for."""
     from shadowpuppet.calibration.overview import look_at_calibration
     from shadowpuppet.calibration_tables import calibration_table
-    from shadowpuppet.io.calibration import find_calibration, is_calibration, write_calibration
+    from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration, write_calibration
     from shadowpuppet.terminal import show, show_json, terminal
 
     with terminal(quiet=as_json) as shown:

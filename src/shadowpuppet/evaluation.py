@@ -14,11 +14,11 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.intervals import coverage
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io._plain import for_json, plain
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.files.plain import for_json, plain
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.truth import names_in, read_truth
 from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
-from shadowpuppet.io.truth import names_in, read_truth
 from shadowpuppet.joint_angles import angle_errors, compared_poses, dof_errors, turn_errors
 from shadowpuppet.measures import (
     aligned_errors,

@@ -93,7 +93,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     unit
         Of BVH files, which do not tell it; Blender takes m.
     """
-    from shadowpuppet.exporting import EXPORTS, export_run
+    from shadowpuppet.io.export import EXPORTS, export_run
     from shadowpuppet.tables import pairs
     from shadowpuppet.terminal import show, terminal
 
@@ -126,7 +126,7 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
         Of a .bvh file that is written.
     """
     from shadowpuppet.errors import SettingsError
-    from shadowpuppet.exporting import UNITS, convert_motion
+    from shadowpuppet.io.export import UNITS, convert_motion
     from shadowpuppet.tables import pairs
     from shadowpuppet.terminal import show, terminal
 

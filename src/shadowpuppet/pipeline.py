@@ -16,8 +16,8 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.fitting import Found
 from shadowpuppet.footage import opened
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.look import Look, Prepared, check, prepare

@@ -14,7 +14,7 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable

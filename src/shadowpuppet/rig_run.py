@@ -16,9 +16,9 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame

@@ -15,9 +15,9 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io._plain import for_json, plain
+from shadowpuppet.io.files.plain import for_json, plain
+from shadowpuppet.io.motion.truth import read_truth
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.io.truth import read_truth
 from shadowpuppet.look import Look
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion

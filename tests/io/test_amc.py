@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import acclaim
 from shadowpuppet.errors import FormatError
-from shadowpuppet.io.amc import read_amc, read_mocap
-from shadowpuppet.io.asf import euler, read_asf
+from shadowpuppet.io.motion.amc import read_amc, read_mocap
+from shadowpuppet.io.motion.asf import euler, read_asf
 
 UNIT = 0.0254 / 0.45
 

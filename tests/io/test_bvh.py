@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from biovision import bvh, in_order, person
 from damage import told_or_read
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.bvh import read_bvh
+from shadowpuppet.io.motion.bvh import read_bvh
 
 TEXT = """HIERARCHY
 ROOT Hips
@@ -112,7 +112,7 @@ def test_bones_keep_their_length(tmp_path):
 def test_long_files_are_placed_in_blocks_alike(tmp_path, monkeypatch):
     text = person(23)
     whole = read(tmp_path, text).joints().positions
-    monkeypatch.setattr("shadowpuppet.io.bvh.BLOCK", 7)
+    monkeypatch.setattr("shadowpuppet.io.motion.bvh.BLOCK", 7)
     np.testing.assert_array_equal(read(tmp_path, text).joints().positions, whole)
 
 

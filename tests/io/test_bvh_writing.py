@@ -11,8 +11,8 @@ import pytest
 
 import runs
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io.bvh import read_bvh
-from shadowpuppet.io.bvh_writing import write_bvh
+from shadowpuppet.io.motion.bvh import read_bvh
+from shadowpuppet.io.motion.bvh_writer import write_bvh
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.body_animation import BodyTree
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from damage import told_or_read
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.c3d import read_c3d
+from shadowpuppet.io.motion.c3d import read_c3d
 from vicon import DEC, INTEL, MIPS, c3d
 
 PLACES = np.array([[[10.0, -20.5, 1800.25], [1, 2, 3]], [[11.0, -21.5, 1801.25], [np.nan] * 3], [[12.0, -22.5, 1802.25], [4, 5, 6]]])

@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io.c3d import read_c3d, read_header
-from shadowpuppet.io.c3d_writing import write_c3d
+from shadowpuppet.io.motion.c3d import read_c3d, read_header
+from shadowpuppet.io.motion.c3d_writer import write_c3d
 from shadowpuppet.motion.motion import JointTable
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.io.calibration import read_calibration, write_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
 
 GOOD = {
     "name": '"left"', "size": "[640, 480]", "matrix": "[[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]]",

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import runs
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io.glb import write_glb
+from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.mesh import body_mesh, bone_mesh

@@ -11,7 +11,7 @@ from shadowpuppet.cli import run
 from shadowpuppet.errors import CalibrationError, FormatError, RecordingError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.humaneva import PARTS, Sync, read_cal, read_humaneva, read_sync, timing_of, write_humaneva
-from shadowpuppet.io.joints import read_joints
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.metrics import GROUPS
 from shadowpuppet.video import open_frames

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.joints import read_joints, write_joints
+from shadowpuppet.io.motion.table import read_joints, write_joints
 from shadowpuppet.motion.motion import JointTable
 
 HEAD = "time,neck_x,neck_y,neck_z\n"

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 import runs
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io.mot import Coordinates, read_mot, write_mot
-from shadowpuppet.io.motion_files import read_motion
+from shadowpuppet.io.motion.mot import Coordinates, read_mot, write_mot
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.opensim import COORDINATES, MARKERS, Ball, coordinates, marker_names
+from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.io.run import read_run
-from shadowpuppet.io.trc import read_trc, write_trc
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation
-from shadowpuppet.opensim import COORDINATES, MARKERS, Ball, coordinates, marker_names
 
 TEXT = """walk
 version=1

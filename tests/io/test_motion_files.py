@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 import acclaim
 import biovision
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.bvh import read_bvh
-from shadowpuppet.io.joint_names import JOINTS, columns_of, renamed
-from shadowpuppet.io.joints import write_joints
-from shadowpuppet.io.motion_files import TURNS, leg_length, read_motion, up_axis
+from shadowpuppet.io.motion.bvh import read_bvh
+from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, renamed
+from shadowpuppet.io.motion.motion_files import TURNS, leg_length, read_motion, up_axis
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.metrics import LIMBS
 from shadowpuppet.motion.motion import JointTable
 from vicon import c3d

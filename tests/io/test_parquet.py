@@ -14,10 +14,10 @@ import runs
 from damage import told_or_read
 from shadowpuppet.body.models import ALL
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.joints import read_joints
-from shadowpuppet.io.motion_table import LENGTHS, motion_columns, table_columns, write_columns_csv
-from shadowpuppet.io.npz import read_npz, write_npz
-from shadowpuppet.io.parquet import read_parquet, write_parquet
+from shadowpuppet.io.files.npz import read_npz, write_npz
+from shadowpuppet.io.motion.motion_table import LENGTHS, motion_columns, table_columns, write_columns_csv
+from shadowpuppet.io.motion.parquet import read_parquet, write_parquet
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.motion import JointTable, Motion
 

@@ -10,7 +10,7 @@ import pytest
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, VideoError
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.recording import POSTURES, Subject, read_recording
 from shadowpuppet.video import write_frames, write_image
 

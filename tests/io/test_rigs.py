@@ -14,10 +14,18 @@ import calibrations
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetError
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.calibration import UPS, find_calibration, is_calibration, look_into, read_calibration, stood_up, write_calibration
+from shadowpuppet.io.calibration.calibration_files import (
+    UPS,
+    find_calibration,
+    is_calibration,
+    look_into,
+    read_calibration,
+    stood_up,
+    write_calibration,
+)
+from shadowpuppet.io.calibration.opencv_storage import read_storage
+from shadowpuppet.io.calibration.vicon import Bend, opencv_distortion
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.io.rigs.storage import read_storage
-from shadowpuppet.io.rigs.vicon import Bend, opencv_distortion
 
 KINDS = ("anipose.toml", "freemocap.toml", "camera_array.toml", "Calib.qca.txt", "easy", "cal", "yaml", "xml")
 """That hold OpenCV's own lens; Vicon's is another."""

@@ -9,10 +9,10 @@ import acclaim
 import biovision
 from damage import told_or_read
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.amc import ENDS, read_mocap
-from shadowpuppet.io.bvh_writing import write_bvh
-from shadowpuppet.io.motion_files import read_motion
-from shadowpuppet.io.skeletons import CMU, read_animation
+from shadowpuppet.io.motion.amc import ENDS, read_mocap
+from shadowpuppet.io.motion.bvh_writer import write_bvh
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.skeletons import CMU, read_animation
 
 
 def test_amc_bones_begin_where_those_above_them_end(tmp_path, rng):

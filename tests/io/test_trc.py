@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io.trc import read_trc, write_trc
+from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.motion.motion import JointTable
 
 TEXT = """PathFileType\t4\t(X/Y/Z)\ttruth.trc

@@ -13,8 +13,8 @@ import biovision
 from damage import told_or_read
 from measured import moved, person
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.joints import write_joints
-from shadowpuppet.io.truth import names_in, read_truth
+from shadowpuppet.io.motion.table import write_joints
+from shadowpuppet.io.motion.truth import names_in, read_truth
 from shadowpuppet.motion.metrics import LIMBS
 from vicon import c3d
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.batch.summary import BatchRun
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io._files import reason
+from shadowpuppet.io.files.text import reason
 
 MEASURES = ((("errors", "mean_mm"), "mean joint error, mm"), (("overlap", "mean"), "mean overlap with the silhouettes"))
 """What is drawn, where it was measured: places in metrics.json, and words."""

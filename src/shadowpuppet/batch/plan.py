@@ -13,8 +13,8 @@ from typing import Any
 
 from shadowpuppet.batch.grid import MOST, Case
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.io._plain import plain
-from shadowpuppet.io.calibration import read_toml
+from shadowpuppet.io.calibration.calibration_files import read_toml
+from shadowpuppet.io.files.plain import plain
 from shadowpuppet.options import PATHS, make_options, plain_options
 from shadowpuppet.repeats import film_of
 

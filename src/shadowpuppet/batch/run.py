@@ -17,9 +17,9 @@ from shadowpuppet.batch.plan import Task, Track, make_tasks
 from shadowpuppet.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
 from shadowpuppet.batch.task import PART, PLAN, RUNS
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, shown
-from shadowpuppet.io._files import reason, write_whole
-from shadowpuppet.io._plain import for_toml
-from shadowpuppet.io._table import shorten
+from shadowpuppet.io.files.plain import for_toml
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import reason, write_whole
 from shadowpuppet.io.run import versions
 from shadowpuppet.threads import usable_cores
 

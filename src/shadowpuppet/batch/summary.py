@@ -12,9 +12,9 @@ from typing import Any
 from shadowpuppet.batch.plan import Task
 from shadowpuppet.batch.task import RUNS, read_mark
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io._files import read_text, write_whole
-from shadowpuppet.io._table import csv_line
-from shadowpuppet.io.parquet import write_lists
+from shadowpuppet.io.files.table import csv_line
+from shadowpuppet.io.files.text import read_text, write_whole
+from shadowpuppet.io.motion.parquet import write_lists
 
 TABLES = ("csv", "parquet")
 """Formats of the summary."""

@@ -17,7 +17,7 @@ from typing import Any
 
 from shadowpuppet.batch.plan import named
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io._files import read_text, write_whole
+from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.io.run import versions
 from shadowpuppet.options import make_options
 from shadowpuppet.repeats import Repeats

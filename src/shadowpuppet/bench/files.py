@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io._files import reason, write_whole
+from shadowpuppet.io.files.text import reason, write_whole
 
 PICTURES = (".pdf", ".png", ".svg")
 

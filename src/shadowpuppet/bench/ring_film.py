@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec
 from shadowpuppet.video import write_frames
 

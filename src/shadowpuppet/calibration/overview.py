@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration import UPS, Calibration, look_into
+from shadowpuppet.io.calibration.calibration_files import UPS, Calibration, look_into
 
 PERSON = (0.0, 0.9, 1.8)
 """Heights (metres) at which a standing person must be in the picture to be seen whole."""

@@ -17,13 +17,13 @@ import numpy as np
 
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import read_text, write_whole
-from shadowpuppet.io.c3d import read_c3d
-from shadowpuppet.io.calibration import write_calibration
-from shadowpuppet.io.joint_names import renamed
-from shadowpuppet.io.joints import write_joints
+from shadowpuppet.io.calibration.bouguet import read_cal
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.files.text import read_text, write_whole
+from shadowpuppet.io.motion.c3d import read_c3d
+from shadowpuppet.io.motion.joint_names import renamed
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.io.rigs.bouguet import read_cal
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.video import open_frames
 

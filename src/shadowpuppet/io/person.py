@@ -9,8 +9,8 @@ from typing import Any
 from shadowpuppet.body.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.body.whole_sizes import KINDS, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io.calibration import read_toml
+from shadowpuppet.io.calibration.calibration_files import read_toml
+from shadowpuppet.io.files.text import write_whole
 
 KEYS = ("body", "height", "source", "notes", "sizes")
 UPPER = "rounded"

@@ -12,7 +12,7 @@ from warnings import warn
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
-from shadowpuppet.io.calibration import UNITS, UPS, find_calibration, read_calibration, read_toml
+from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, find_calibration, read_calibration, read_toml
 from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
 
 FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",

@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.video import FrameWriter, Image, write_frames
 
 FALLBACK_RATE = 15.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.display.view import Display
 from shadowpuppet.geometry import inverse
-from shadowpuppet.io.calibration import write_calibration
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.live.background import in_background

@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
 from shadowpuppet.footage import worked_size
-from shadowpuppet.io.calibration import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.live.learning import KEPT
 from shadowpuppet.options import Options

@@ -12,7 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation_words import coverage_words
 from shadowpuppet.intervals import LEVELS
-from shadowpuppet.io._files import write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.measures import aligned_distances
 from shadowpuppet.report import charts
 from shadowpuppet.report.html import figure, plain, rows, table

@@ -19,7 +19,7 @@ from shadowpuppet.synthetic.kinematics import SIDES, Figure, assembled, fingers,
 from shadowpuppet.synthetic.mannequin import Mannequin
 
 if TYPE_CHECKING:
-    from shadowpuppet.io.amc import Capture
+    from shadowpuppet.io.motion.amc import Capture
     from shadowpuppet.synthetic.script import Gesture
 
 Points = dict[str, Array]
@@ -52,7 +52,7 @@ def seconds_of(gestures: Sequence[Gesture]) -> float:
 
 
 def _one(gestures: Sequence[Gesture]) -> tuple[Gesture, Capture]:
-    from shadowpuppet.io.amc import read_mocap
+    from shadowpuppet.io.motion.amc import read_mocap
 
     if len(gestures) != 1 or gestures[0].file is None:
         raise SettingsError(f"motion: found mocap among {len(gestures)} motions, expected it alone")

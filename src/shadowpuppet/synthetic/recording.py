@@ -137,7 +137,7 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
     The training motion is a second performance of the same gestures, or one of others, by the same body, with another's chance.
     """
-    from shadowpuppet.io.calibration import write_calibration
+    from shadowpuppet.io.calibration.calibration_files import write_calibration
 
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)

@@ -159,7 +159,7 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
 
 def spec_values(spec: Spec) -> dict[str, Any]:
     """Plain values that `spec_from` makes the same spec of, and that TOML can hold: every setting, also where it is the default."""
-    from shadowpuppet.io._plain import for_toml, plain
+    from shadowpuppet.io.files.plain import for_toml, plain
 
     values = for_toml(plain(spec, "spec"))
     if spec.ring is not None:

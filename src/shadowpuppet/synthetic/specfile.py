@@ -20,7 +20,7 @@ UNSEEDED = "# The generator that was given had no seed that could be kept: the s
 
 def read_spec(path: str | Path) -> Spec:
     """The spec in a TOML file; files that it names are relative to it. Raises `SettingsError`: one sentence with file and field."""
-    from shadowpuppet.io.calibration import read_toml
+    from shadowpuppet.io.calibration.calibration_files import read_toml
 
     values = read_toml(path, SettingsError)
     for gesture in _gestures(values):
@@ -52,7 +52,7 @@ def _text(values: dict[str, Any]) -> str:
 
 def write_spec(path: Path, spec: Spec, seed: int | tuple[int, ...] | None) -> None:
     """Write a spec with the seed that it was made with. Raises `ShadowPuppetError` where it cannot be written."""
-    from shadowpuppet.io._files import write_whole
+    from shadowpuppet.io.files.text import write_whole
 
     known = spec if seed is None else replace(spec, seed=seed)
     values = spec_values(known)

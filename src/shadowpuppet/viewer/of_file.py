@@ -8,9 +8,9 @@ import numpy as np
 
 from shadowpuppet.calibration.overview import look_at_calibration
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.motion_files import read_motion
-from shadowpuppet.io.skeletons import ENDINGS as SKELETONS
-from shadowpuppet.io.skeletons import read_animation
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETONS
+from shadowpuppet.io.motion.skeletons import read_animation
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.viewer.figures import of_animation, of_table
 from shadowpuppet.viewer.show import Eye, Show

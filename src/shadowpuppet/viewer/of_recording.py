@@ -11,8 +11,8 @@ import numpy as np
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.footage import Footage, footage_of, opened
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.motion.truth import read_truth
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.io.truth import read_truth
 from shadowpuppet.options import Options
 from shadowpuppet.rig import chosen_views
 from shadowpuppet.video.frames import ASSUMED_RATE

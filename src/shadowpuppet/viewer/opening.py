@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
-from shadowpuppet.io.calibration import find_calibration, is_calibration
-from shadowpuppet.io.motion_files import ENDINGS
+from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
+from shadowpuppet.io.motion.motion_files import ENDINGS
 from shadowpuppet.io.prior import FORMAT
 from shadowpuppet.options import Options
 from shadowpuppet.viewer.of_file import show_calibration, show_motion
@@ -44,7 +44,7 @@ def show_of(path: str | Path, options: Options | None = None, truth: Path | None
 
 def is_prior(path: Path) -> bool:
     """Whether an archive of arrays says that it is a motion prior."""
-    from shadowpuppet.io.npz import BROKEN
+    from shadowpuppet.io.files.npz import BROKEN
 
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.running import Listener
 from shadowpuppet.viewer.pictures import Look
 from shadowpuppet.viewer.server import POLICY, close_server, open_server

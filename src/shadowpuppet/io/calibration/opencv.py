@@ -18,8 +18,8 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
-from shadowpuppet.io.rigs.draft import Draft, Found
-from shadowpuppet.io.rigs.storage import read_storage
+from shadowpuppet.io.calibration.draft import Draft, Found
+from shadowpuppet.io.calibration.opencv_storage import read_storage
 
 STEMS = {
     "matrix": "camera_?matrix|intrinsic_?matrix|intrinsics?|matrix|mtx|k|m",

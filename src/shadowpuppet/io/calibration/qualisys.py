@@ -14,8 +14,8 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.rigs.draft import Draft, Found
-from shadowpuppet.io.rigs.markup import Entry, entries, tree_of
+from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
+from shadowpuppet.io.calibration.draft import Draft, Found
 
 SUBPIXELS = 64
 BACKWARD = np.diag([1.0, -1.0, -1.0])

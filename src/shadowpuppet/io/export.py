@@ -14,27 +14,27 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import reason, write_whole
-from shadowpuppet.io.bvh_writing import write_bvh
-from shadowpuppet.io.c3d_writing import write_c3d
-from shadowpuppet.io.glb import write_glb
-from shadowpuppet.io.joints import write_joints
-from shadowpuppet.io.mot import write_mot
-from shadowpuppet.io.motion_files import ENDINGS, read_motion
-from shadowpuppet.io.motion_table import dof_unit, motion_columns, table_columns, write_columns_csv
-from shadowpuppet.io.npz import write_npz
-from shadowpuppet.io.parquet import write_parquet
+from shadowpuppet.io.files.npz import write_npz
+from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.motion.bvh_writer import write_bvh
+from shadowpuppet.io.motion.c3d_writer import write_c3d
+from shadowpuppet.io.motion.glb import write_glb
+from shadowpuppet.io.motion.mot import write_mot
+from shadowpuppet.io.motion.motion_files import ENDINGS, read_motion
+from shadowpuppet.io.motion.motion_table import dof_unit, motion_columns, table_columns, write_columns_csv
+from shadowpuppet.io.motion.opensim import coordinates, marker_names
+from shadowpuppet.io.motion.parquet import write_parquet
+from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETONS
+from shadowpuppet.io.motion.skeletons import read_animation
+from shadowpuppet.io.motion.table import write_joints
+from shadowpuppet.io.motion.trc import METRES, write_trc
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, motion_bytes, read_run
-from shadowpuppet.io.skeletons import ENDINGS as SKELETONS
-from shadowpuppet.io.skeletons import read_animation
-from shadowpuppet.io.trc import METRES, write_trc
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.opensim import coordinates, marker_names
 
 STRAY = 1e-3
 """Metres by which a written skeleton's joints may lie off the run's before that is said."""

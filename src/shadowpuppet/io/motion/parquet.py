@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io._table import Table, shorten
-from shadowpuppet.io.joints import joint_columns, joint_names
-from shadowpuppet.io.motion_table import Columns
+from shadowpuppet.io.files.table import Table, shorten
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.motion_table import Columns
+from shadowpuppet.io.motion.table import joint_columns, joint_names
 from shadowpuppet.motion.motion import JointTable
 
 TOLD = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up; radians"}

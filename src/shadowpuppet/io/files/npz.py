@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io._files import write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.motion import JointTable
 
 ARRAYS = ("times", "joint_names", "joints")

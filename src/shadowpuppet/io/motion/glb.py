@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.mesh import Mesh
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import reason
-from shadowpuppet.io._table import shorten
-from shadowpuppet.io.trc import METRES
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import reason
+from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.motion import JointTable
 
 BYTES = 512

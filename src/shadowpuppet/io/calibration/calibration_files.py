@@ -12,15 +12,15 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices
 from shadowpuppet.geometry import Array, inverse, rigid
-from shadowpuppet.io._files import reason, write_whole
-from shadowpuppet.io._toml import FILE_LIMIT as FILE_LIMIT
-from shadowpuppet.io._toml import read_toml as read_toml
-from shadowpuppet.io.rigs.bouguet import read_bouguet
-from shadowpuppet.io.rigs.draft import Draft, Found
-from shadowpuppet.io.rigs.opencv import SUFFIXES, easymocap_texts, files_of, pair_of, read_opencv
-from shadowpuppet.io.rigs.qualisys import read_qualisys
-from shadowpuppet.io.rigs.tables import check_name, read_tables, tables_text
-from shadowpuppet.io.rigs.vicon import read_vicon
+from shadowpuppet.io.calibration.bouguet import read_bouguet
+from shadowpuppet.io.calibration.draft import Draft, Found
+from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts, files_of, pair_of, read_opencv
+from shadowpuppet.io.calibration.pose2sim import check_name, read_tables, tables_text
+from shadowpuppet.io.calibration.qualisys import read_qualisys
+from shadowpuppet.io.calibration.vicon import read_vicon
+from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.toml import FILE_LIMIT as FILE_LIMIT
+from shadowpuppet.io.files.toml import read_toml as read_toml
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres of what lengths may be in."""

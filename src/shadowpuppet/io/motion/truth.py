@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError, choices
-from shadowpuppet.io._table import shorten
-from shadowpuppet.io.c3d import read_c3d
-from shadowpuppet.io.joint_names import JOINTS, columns_of, pairs_of, renamed
-from shadowpuppet.io.joints import read_joints
-from shadowpuppet.io.motion_files import ENDINGS, read_motion
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.motion.c3d import read_c3d
+from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, pairs_of, renamed
+from shadowpuppet.io.motion.motion_files import ENDINGS, read_motion
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io._table import cells, csv_line
-from shadowpuppet.io.joints import joint_columns
+from shadowpuppet.io.files.table import cells, csv_line
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.table import joint_columns
 from shadowpuppet.motion.motion import JointTable, Motion
 
 LENGTHS = ("torso_y", "root_x", "root_y", "root_z")

@@ -11,8 +11,8 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import read_text, write_whole
-from shadowpuppet.io._table import check_times, number, shorten
+from shadowpuppet.io.files.table import check_times, number, shorten
+from shadowpuppet.io.files.text import read_text, write_whole
 
 LENGTHS = ("_tx", "_ty", "_tz")
 """What the name of a coordinate that is a place ends in; all others are angles."""

@@ -10,13 +10,13 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.amc import read_mocap
-from shadowpuppet.io.bvh import read_bvh
-from shadowpuppet.io.c3d import read_c3d
-from shadowpuppet.io.joint_names import renamed
-from shadowpuppet.io.joints import read_joints
-from shadowpuppet.io.npz import read_npz
-from shadowpuppet.io.parquet import read_parquet
+from shadowpuppet.io.files.npz import read_npz
+from shadowpuppet.io.motion.amc import read_mocap
+from shadowpuppet.io.motion.bvh import read_bvh
+from shadowpuppet.io.motion.c3d import read_c3d
+from shadowpuppet.io.motion.joint_names import renamed
+from shadowpuppet.io.motion.parquet import read_parquet
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
 
 ENDINGS = (".amc", ".bvh", ".c3d", ".csv", ".npz", ".parquet", ".trc")

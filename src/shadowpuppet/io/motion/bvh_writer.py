@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array, clear_order, continuous_angles
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io._table import shorten
-from shadowpuppet.io.trc import METRES
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.interpolation import steady
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io._table import Table, cells, csv_line, read_table, shorten
-from shadowpuppet.io.trc import read_trc, write_trc
+from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.motion.motion import JointTable
 
 __all__ = ["JointTable", "joint_columns", "joint_names", "read_joints", "write_joints"]

@@ -11,8 +11,8 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about
-from shadowpuppet.io._files import read_text
-from shadowpuppet.io._table import shorten
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import read_text
 from shadowpuppet.motion.motion import JointTable
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")

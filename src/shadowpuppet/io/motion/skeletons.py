@@ -8,10 +8,10 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.amc import Z_UP, Capture, read_mocap
-from shadowpuppet.io.bvh import END, Bvh, different, read_bvh
-from shadowpuppet.io.joint_names import columns_of
-from shadowpuppet.io.motion_files import AMC_RATE, turn_of, unit_of
+from shadowpuppet.io.motion.amc import Z_UP, Capture, read_mocap
+from shadowpuppet.io.motion.bvh import END, Bvh, different, read_bvh
+from shadowpuppet.io.motion.joint_names import columns_of
+from shadowpuppet.io.motion.motion_files import AMC_RATE, turn_of, unit_of
 from shadowpuppet.motion.animation import Y_UP, Animation
 
 ENDINGS = (".amc", ".bvh")

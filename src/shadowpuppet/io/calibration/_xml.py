@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, ParseError, XMLPullParser
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.rigs.draft import numbers_of, text_of
+from shadowpuppet.io.calibration.draft import numbers_of, text_of
 
 DEEPEST = 40
 """Levels; calibrations have seven."""

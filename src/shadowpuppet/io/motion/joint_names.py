@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.body.segments import BONES
 from shadowpuppet.errors import FormatError
-from shadowpuppet.io._table import shorten
+from shadowpuppet.io.files.table import shorten
 from shadowpuppet.motion.motion import JointTable
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))

@@ -14,8 +14,8 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.rigs.draft import numbers_of, text_of
-from shadowpuppet.io.rigs.markup import tree_of
+from shadowpuppet.io.calibration._xml import tree_of
+from shadowpuppet.io.calibration.draft import numbers_of, text_of
 
 MATRIX = ("rows", "cols", "data")
 """What makes a table a matrix."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array, rotation_about
-from shadowpuppet.io._files import read_text
-from shadowpuppet.io._table import shorten
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import read_text
 
 INCH = 0.0254
 DOFS = ("rx", "ry", "rz")

@@ -15,9 +15,9 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import read_text
-from shadowpuppet.io._table import shorten
-from shadowpuppet.io.asf import Skeleton, euler, read_asf
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import read_text
+from shadowpuppet.io.motion.asf import Skeleton, euler, read_asf
 from shadowpuppet.motion.motion import JointTable
 
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import write_whole
-from shadowpuppet.io._table import shorten
-from shadowpuppet.io.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
 from shadowpuppet.motion.interpolation import resampled, steady
 from shadowpuppet.motion.motion import JointTable
 

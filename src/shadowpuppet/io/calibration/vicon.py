@@ -14,8 +14,8 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.io.rigs.draft import Draft, Found, numbers_of
-from shadowpuppet.io.rigs.markup import Entry, entries, tree_of
+from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
+from shadowpuppet.io.calibration.draft import Draft, Found, numbers_of
 
 GRID = 33
 """Pixels to a side at which distortion is compared."""

@@ -9,8 +9,8 @@ from warnings import warn
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
-from shadowpuppet.io._files import read_text, write_whole
-from shadowpuppet.io._table import cells, check_times, number, shorten
+from shadowpuppet.io.files.table import cells, check_times, number, shorten
+from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.motion.motion import JointTable
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}

@@ -11,8 +11,8 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import reason
-from shadowpuppet.io._toml import FILE_LIMIT
+from shadowpuppet.io.files.text import reason
+from shadowpuppet.io.files.toml import FILE_LIMIT
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.rigs.draft import Draft, Found, text_of
+from shadowpuppet.io.calibration.draft import Draft, Found, text_of
 
 CALIBRATION = 22
 """Numbers of a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io._files import read_text
+from shadowpuppet.io.files.text import read_text
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,1 @@
+"""Text, tables, TOML and arrays, read and written safely."""
