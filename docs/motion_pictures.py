@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, Viewpoint
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.kinematics import Figure
-from shadowpuppet.synthetic.parts import dressed
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.parts import dressed
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.video import write_image

@@ -13,7 +13,7 @@ import shadowpuppet as sp
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.motion.prior.training import train_prior
 from shadowpuppet.synthetic import Gesture, Ring, Spec
-from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.video import write_image
 

@@ -19,7 +19,7 @@ from shadowpuppet.motion.inverse_kinematics import _along, _Linear, _solved, fit
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.plausibility import NEEDED
 from shadowpuppet.motion.prior.clips import mirrored
-from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.person.mannequin import JOINTS
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
 SOMEONE = {"upper_arm_length": 0.27, "forearm_length": 0.25, "thigh_length": 0.41, "shank_length": 0.39, "hip_distance": 0.19,

@@ -11,9 +11,9 @@ import acclaim
 from shadowpuppet.errors import FormatError, SettingsError
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, spec_from
-from shadowpuppet.synthetic.kinematics import SEGMENTS
-from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.synthetic.mocap import retarget
+from shadowpuppet.synthetic.movement.mocap import retarget
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS
+from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 
 BONES = (("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "hand"), ("hip", "knee"), ("knee", "ankle"))

@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, demo_spec, proving_ground, spec_from
-from shadowpuppet.synthetic.curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
-from shadowpuppet.synthetic.cycle import JOGGING, WALKING, Cycle, Sole, stride_of
-from shadowpuppet.synthetic.gait import Walk
-from shadowpuppet.synthetic.kinematics import CHANNELS, SEGMENTS, SIDES, figure, lesser, pose
-from shadowpuppet.synthetic.mannequin import FRACTIONS, GROWTH, JOINTS
-from shadowpuppet.synthetic.motions import LEVEL, posture
-from shadowpuppet.synthetic.paths import Path
+from shadowpuppet.synthetic.movement.gait import Walk
+from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
+from shadowpuppet.synthetic.movement.gait_cycle import JOGGING, WALKING, Cycle, Sole, stride_of
+from shadowpuppet.synthetic.movement.gestures import LEVEL, posture
+from shadowpuppet.synthetic.movement.paths import Path
+from shadowpuppet.synthetic.movement.whole_body import ACTS
 from shadowpuppet.synthetic.performance import SOFT
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, SIDES, figure, lesser, pose
+from shadowpuppet.synthetic.person.mannequin import FRACTIONS, GROWTH, JOINTS
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.whole_body import ACTS
 
 MAN = Mannequin()
 WHOLE = sorted([*ACTS, "walk", "jog"])
@@ -498,8 +498,8 @@ def test_walks_are_made_of_all_channels():
 def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
     """Volume within the bare surface, by points on a grid, times the density of water."""
     from shadowpuppet.synthetic import Viewpoint
-    from shadowpuppet.synthetic.clothes import Clothes
-    from shadowpuppet.synthetic.parts import dressed
+    from shadowpuppet.synthetic.person.clothes import Clothes
+    from shadowpuppet.synthetic.person.parts import dressed
     from shadowpuppet.synthetic.renderer import Renderer
     from test_synthetic import LIGHTS, naive_distance
 

@@ -14,17 +14,18 @@ from hypothesis import strategies as st
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, motions, synthesize
-from shadowpuppet.synthetic.clothes import Clothes
+from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
-from shadowpuppet.synthetic.kinematics import SEGMENTS, Figure, pose
 from shadowpuppet.synthetic.layers import FAR, Layer, composed, in_front, pictured
-from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.movement import gestures
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure, pose
+from shadowpuppet.synthetic.person.mannequin import JOINTS
+from shadowpuppet.synthetic.person.surface import Surface, ball
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.renderer import Renderer
-from shadowpuppet.synthetic.scene import brightness
+from shadowpuppet.synthetic.room import brightness
 from shadowpuppet.synthetic.studio import Studio, body_of
-from shadowpuppet.synthetic.surface import Surface, ball
 from shadowpuppet.synthetic.viewpoint import JITTER, MIDDLE, STRAY
 from shadowpuppet.video import open_frames
 
@@ -42,7 +43,7 @@ def shot(spec: Spec, figure: Figure, index: int = 0, others: tuple[Figure, ...] 
 
 
 def standing(body: Mannequin | None = None, left: float = 0.0, ahead: float = 0.0, **posture: float) -> Figure:
-    figure = pose(body or Mannequin(), motions.posture(**(posture or motions.LEVEL)))
+    figure = pose(body or Mannequin(), gestures.posture(**(posture or gestures.LEVEL)))
     place = np.array([left, -ahead, 0])
     return figure._replace(joints=figure.joints + place, origin=figure.origin + place)
 
@@ -271,7 +272,7 @@ def test_the_empty_scene_shows_the_thing_and_its_shadow():
 
 def test_somebody_behind_takes_nothing_and_is_in_the_mask_of_all():
     someone = Bystander(kind="man", ahead=-0.9, left=0.6)
-    other = standing(body_of(someone), someone.left, someone.ahead, **motions.HANGING_ARMS)
+    other = standing(body_of(someone), someone.left, someone.ahead, **gestures.HANGING_ARMS)
     spec = with_scene(bystanders=(someone,), shadow=0)
     alone, both = shot(with_scene(shadow=0), standing()), shot(spec, standing(), others=(other,))
     np.testing.assert_array_equal(both.mask, alone.mask)
@@ -350,7 +351,7 @@ def test_pictures_are_the_same_whatever_the_number_of_threads_with_everything_in
     someone = Bystander(kind="child", ahead=0.5, left=-0.5)
     spec = with_scene(replace(SMALL, rate=3), obstacles=(Obstacle(kind="chair"),), bystanders=(someone,), flicker=0.1, noise=5)
     _, figure = perform(spec, np.random.default_rng(0))
-    other = pose(body_of(someone), np.repeat(motions.posture(), len(figure.joints), 0))
+    other = pose(body_of(someone), np.repeat(gestures.posture(), len(figure.joints), 0))
     films = [list(Studio(spec, VIEW.camera(), np.random.default_rng(1), [other]).film(figure, workers)) for workers in (1, 3)]
     for a, b in zip(*films):
         assert all(np.array_equal(x, y) for x, y in zip(a, b))

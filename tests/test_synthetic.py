@@ -21,20 +21,20 @@ from shadowpuppet.synthetic import (
     Spec,
     Viewpoint,
     demo_spec,
-    motions,
     proving_ground,
     proving_rings,
     spec_from,
     synthesize,
 )
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.kinematics import CHANNELS, SEGMENTS, pose
-from shadowpuppet.synthetic.mannequin import FRACTIONS, JOINTS, MEASURES
-from shadowpuppet.synthetic.parts import dressed
+from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.performance import seconds_of
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, pose
+from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
+from shadowpuppet.synthetic.person.parts import dressed
+from shadowpuppet.synthetic.person.surface import GROUPS, Surface, ball
 from shadowpuppet.synthetic.recording import Studio, perform
 from shadowpuppet.synthetic.renderer import Renderer
-from shadowpuppet.synthetic.surface import GROUPS, Surface, ball
 from shadowpuppet.video import open_frames, read_image
 
 VIEW = Viewpoint(size=(80, 60))
@@ -120,23 +120,23 @@ def test_the_mirrored_posture_gives_the_mirrored_figure(seed):
 
 
 def test_conventions_of_the_world():
-    figure = pose(Mannequin(), motions.posture(**(motions.LEVEL | motions.left(front=90, side=0))))
+    figure = pose(Mannequin(), gestures.posture(**(gestures.LEVEL | gestures.left(front=90, side=0))))
     assert (at(figure, "left_hip") > at(figure, "right_hip"))[0, 0]  # left is +X
     assert at(figure, "left_hand")[0, 1] < -0.5  # forward is -Y
     np.testing.assert_allclose(at(figure, "pelvis")[0, :2], 0, atol=1e-9)
-    hanging = pose(Mannequin(), motions.posture())
+    hanging = pose(Mannequin(), gestures.posture())
     np.testing.assert_allclose((at(hanging, "left_hand") - at(hanging, "left_shoulder"))[0, :2], 0, atol=1e-9)
     assert at(hanging, "left_hand")[0, 2] < at(hanging, "left_elbow")[0, 2]
-    bent = pose(Mannequin(), motions.posture(**motions.left(elbow=90)))
+    bent = pose(Mannequin(), gestures.posture(**gestures.left(elbow=90)))
     assert (at(bent, "left_wrist") - at(bent, "left_elbow"))[0, 1] < -0.2  # the forearm swings forward
-    bowed = pose(Mannequin(), motions.posture(**motions.trunk(spine_bow=40)))
+    bowed = pose(Mannequin(), gestures.posture(**gestures.trunk(spine_bow=40)))
     assert at(bowed, "neck")[0, 1] < at(hanging, "neck")[0, 1] - 0.1
-    aside = pose(Mannequin(), motions.posture(**motions.trunk(spine_side=30)))
+    aside = pose(Mannequin(), gestures.posture(**gestures.trunk(spine_side=30)))
     assert at(aside, "neck")[0, 0] > 0.1
 
 
 def test_shoulders_rise_with_the_arms_but_the_arms_stay_level():
-    level, hanging = pose(Mannequin(), motions.posture(**motions.LEVEL)), pose(Mannequin(), motions.posture())
+    level, hanging = pose(Mannequin(), gestures.posture(**gestures.LEVEL)), pose(Mannequin(), gestures.posture())
     assert 0.01 < (at(level, "left_shoulder") - at(hanging, "left_shoulder"))[0, 2] < 0.04
     for side in ("left", "right"):
         height = [at(level, f"{side}_{name}")[0, 2] for name in ("shoulder", "elbow", "wrist", "hand")]
@@ -146,14 +146,14 @@ def test_shoulders_rise_with_the_arms_but_the_arms_stay_level():
 # Motions
 
 
-@pytest.mark.parametrize("name", sorted(motions.MOTIONS))
+@pytest.mark.parametrize("name", sorted(gestures.MOTIONS))
 def test_gestures_stay_in_their_time_and_are_smooth(name, rng):
     for seconds in (2.0, 7.0):
-        times = [when for when, _ in motions.MOTIONS[name](seconds, rng)]
+        times = [when for when, _ in gestures.MOTIONS[name](seconds, rng)]
         assert all(b > a for a, b in itertools.pairwise(times))
         assert 0 < times[0] <= times[-1] < seconds
-    t = np.arange(0, motions.duration([(name, 6.0)]), 1 / 60)
-    figure = pose(Mannequin(), motions.compose([(name, 6.0)], t, rng))
+    t = np.arange(0, gestures.duration([(name, 6.0)]), 1 / 60)
+    figure = pose(Mannequin(), gestures.compose([(name, 6.0)], t, rng))
     speed = np.linalg.norm(np.diff(figure.joints, axis=0), axis=-1) * 60
     assert speed.max() < 5.0
     assert (np.abs(np.diff(speed, axis=0)) * 60).max() < 90.0
@@ -169,9 +169,9 @@ def test_motion_does_not_depend_on_the_frame_rate():
 
 
 def test_recordings_begin_and_end_standing(rng):
-    t = np.array([0.0, motions.duration([("wave_hands", 4.0)])])
-    ends = motions.compose([("wave_hands", 4.0)], t, rng, still=0.0)
-    wanted = motions.posture(**motions.STANDING)
+    t = np.array([0.0, gestures.duration([("wave_hands", 4.0)])])
+    ends = gestures.compose([("wave_hands", 4.0)], t, rng, still=0.0)
+    wanted = gestures.posture(**gestures.STANDING)
     np.testing.assert_allclose(ends, np.broadcast_to(wanted, ends.shape), atol=0.01)
 
 
@@ -185,21 +185,21 @@ def gap(postures):
 
 
 def test_arms_are_kept_out_of_the_trunk():
-    into_the_chest = motions.posture(**motions.both(side=8, front=20, roll=-70, elbow=110))
-    level = motions.posture(**motions.LEVEL)
+    into_the_chest = gestures.posture(**gestures.both(side=8, front=20, roll=-70, elbow=110))
+    level = gestures.posture(**gestures.LEVEL)
     keys = np.concatenate([level, level, level, into_the_chest, level, level, level])
-    cleared = motions.clear_of_trunk(keys)
+    cleared = gestures.clear_of_trunk(keys)
 
     assert gap(keys)[3] < 0.17
     assert gap(cleared)[3] > gap(keys)[3] + 0.03
     np.testing.assert_array_equal(cleared[[0, 6]], keys[[0, 6]])
-    assert (motions.clear_of_trunk(level) == level).all()
-    assert gap(motions.compose([("random", 19.0)], np.arange(0, 20, 0.1), np.random.default_rng(15))).min() > 0.2
+    assert (gestures.clear_of_trunk(level) == level).all()
+    assert gap(gestures.compose([("random", 19.0)], np.arange(0, 20, 0.1), np.random.default_rng(15))).min() > 0.2
 
 
 def test_reach_goes_toward_the_camera_one_arm_after_the_other(rng):
     t = np.arange(0, 7.5, 0.1)
-    figure = pose(Mannequin(), motions.compose([("reach", 6.0)], t, rng))
+    figure = pose(Mannequin(), gestures.compose([("reach", 6.0)], t, rng))
     ahead = {side: -(at(figure, f"{side}_hand") - at(figure, f"{side}_shoulder"))[:, 1] > 0.4 for side in ("left", "right")}
     assert (ahead["left"] & ~ahead["right"]).any()
     assert (ahead["right"] & ~ahead["left"]).any()
@@ -238,20 +238,20 @@ def naive_distance(points, surface, axes, origin, joints):
 
 
 def test_distance_kernel_against_plain_numpy(rng, monkeypatch):
-    from shadowpuppet.synthetic import _tracing
+    from shadowpuppet.synthetic import _ray_marching
 
     body, clothes = Mannequin.draw(rng, "woman"), Clothes.draw(rng)
-    figure = pose(body, motions.compose([("random", 3.0)], np.array([1.5]), rng))
+    figure = pose(body, gestures.compose([("random", 3.0)], np.array([1.5]), rng))
     renderer = Renderer(VIEW.camera(), dressed(body, clothes), clothes, LIGHTS)
     seen = {}
-    trace = _tracing.find_surface
-    monkeypatch.setattr(_tracing, "find_surface", lambda *a: (seen.update(a=a), trace(*a)))
+    trace = _ray_marching.find_surface
+    monkeypatch.setattr(_ray_marching, "find_surface", lambda *a: (seen.update(a=a), trace(*a)))
     renderer.draw(figure, 0)
     _, _, _, _, _, placed, table, code, joints, _, _ = seen["a"]
     parts = np.arange(-1, len(placed))
     parts[0] = len(placed)
     points = figure.joints[0].repeat(20, 0) + rng.normal(0, 0.08, (20 * len(JOINTS), 3))
-    found = np.array([_tracing.distance(*p, parts, placed, table, code, joints)[0] for p in points])
+    found = np.array([_ray_marching.distance(*p, parts, placed, table, code, joints)[0] for p in points])
     axes, origin = placed[:, :9].reshape(-1, 3, 3).swapaxes(1, 2), placed[:, 9:12]
     wanted = naive_distance(points, renderer.surface, axes, origin, joints)
     close = np.abs(wanted) < 0.05  # where it matters: bounding spheres may skip parts that cannot touch the surface
@@ -261,18 +261,18 @@ def test_distance_kernel_against_plain_numpy(rng, monkeypatch):
 
 
 def test_leaving_out_parts_that_a_tile_cannot_see_changes_nothing(rng, monkeypatch):
-    from shadowpuppet.synthetic import _tracing
+    from shadowpuppet.synthetic import _ray_marching
 
     def list_all(direction, sine, cosine, eye, spheres, lists, span):
         lists[:, 0], lists[:, 1:] = len(spheres), np.arange(len(spheres))
         span[:] = 0.3, 6.0
 
     body, clothes = Mannequin.draw(rng), Clothes.draw(rng)
-    figure = pose(body, motions.compose([("random", 6.0)], np.array([3.0, 5.0]), rng))
+    figure = pose(body, gestures.compose([("random", 6.0)], np.array([3.0, 5.0]), rng))
     camera = replace(VIEW, size=(160, 120), distortion=(-0.2, 0.05, 0, 0)).camera()
     renderer = Renderer(camera, dressed(body, clothes), clothes, LIGHTS)
     culled = [renderer.draw(figure, index) for index in range(2)]
-    monkeypatch.setattr(_tracing, "list_parts", list_all)
+    monkeypatch.setattr(_ray_marching, "list_parts", list_all)
     for index, shot in enumerate(culled):
         whole = renderer.draw(figure, index)
         assert (whole.mask != shot.mask).sum() <= 1  # where a ray grazes the surface the steps decide
@@ -283,7 +283,7 @@ def test_leaving_out_parts_that_a_tile_cannot_see_changes_nothing(rng, monkeypat
 @pytest.mark.parametrize("distortion", [(), (-0.25, 0.08, 0.001, -0.002)])
 def test_a_ball_has_the_silhouette_of_a_sphere(distortion):
     radius, centre = 0.3, np.array([0.1, 0.0, 1.5])
-    figure = pose(Mannequin(), motions.posture())
+    figure = pose(Mannequin(), gestures.posture())
     origin = figure.origin[0, SEGMENTS.index("pelvis")]
     one = Surface.of([ball("pelvis", origin, centre, (radius,) * 3, blend=0.01)])
     camera = Viewpoint(size=(80, 60), distortion=distortion, pitch_deg=7).camera()
@@ -317,7 +317,7 @@ def test_all_true_joints_lie_in_the_mask(changes, rng):
 def test_the_level_posture_is_symmetric_to_the_last_finger():
     body, clothes = Mannequin(), Clothes.draw(np.random.default_rng(0))
     shot = Renderer(Viewpoint(size=(240, 180)).camera(), dressed(body, clothes), clothes, LIGHTS).draw(
-        pose(body, motions.posture(**motions.LEVEL)), 0)
+        pose(body, gestures.posture(**gestures.LEVEL)), 0)
     assert (shot.mask != shot.mask[:, ::-1]).sum() <= 2
     assert shot.mask.any(0).sum() > 180
 
@@ -400,7 +400,7 @@ def test_layout_is_read_back(made):
 def test_every_picture_has_a_mask_and_a_truth_at_its_time(made):
     film, masks = list(open_frames(made / "video" / "cam.mp4")), list(open_frames(made / "masks" / "cam.mkv", grey=True))
     rows = rows_of(made / "truth.csv")
-    seconds = motions.duration([("wave_hands", 2.0)])
+    seconds = gestures.duration([("wave_hands", 2.0)])
     assert len(film) == len(masks) == len(rows) == int(4 * seconds) + 1
     assert len(list(open_frames(made / "background" / "cam.mp4"))) == 2
     np.testing.assert_allclose([frame.time for frame in film], [float(row["time"]) for row in rows], atol=1e-3)
@@ -511,7 +511,7 @@ def test_the_proving_ground_is_varied_and_fixed():
     assert len({spec.name for spec in specs}) == len(specs)
     assert specs == proving_ground()
     used = {gesture.motion for spec in specs for gesture in spec.motion}
-    assert used >= set(motions.MOTIONS) - {"stand"}
+    assert used >= set(gestures.MOTIONS) - {"stand"}
     cameras = [spec.cameras[0] for spec in specs]
     assert min(c.distance for c in cameras) <= 1.8
     assert max(c.distance for c in cameras) >= 3.5
@@ -537,7 +537,7 @@ def test_the_rings_of_the_proving_ground_are_varied_and_fixed():
 def test_the_demo_shows_the_papers_motions_and_a_reach():
     spec = demo_spec()
     assert [g.motion for g in spec.motion] == ["wave_hands", "bend_aside", "bow_forward", "reach"]
-    assert 13 < motions.duration([(g.motion, g.seconds) for g in spec.motion]) < 16.5
+    assert 13 < gestures.duration([(g.motion, g.seconds) for g in spec.motion]) < 16.5
 
 
 @pytest.mark.shared

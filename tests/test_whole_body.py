@@ -16,7 +16,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.person.mannequin import JOINTS
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}
 

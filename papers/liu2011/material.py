@@ -26,9 +26,9 @@ from shadowpuppet.motion.metrics import match
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import Options, make_options, plain_options
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
-from shadowpuppet.synthetic.motions import LEAD
+from shadowpuppet.synthetic.movement.gestures import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from
-from shadowpuppet.synthetic.specfile import SPEC_FILE
+from shadowpuppet.synthetic.spec_file import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.monocular.initialization import Guess
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, make_settings

@@ -25,7 +25,7 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.options import make_options
 from shadowpuppet.rig import follow, open_rig
 from shadowpuppet.rig_look import check_rig, look_at_rig
-from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 from shadowpuppet.tracking.multiview.size_estimation import measure, spread_of

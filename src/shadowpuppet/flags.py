@@ -20,7 +20,7 @@ from shadowpuppet.settings import default_of, settings_of, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
-from shadowpuppet.synthetic.specfile import read_spec
+from shadowpuppet.synthetic.spec_file import read_spec
 
 HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other programs", "Learning", "Other")
 RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))

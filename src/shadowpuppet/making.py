@@ -12,7 +12,7 @@ from shadowpuppet.io.recording import POSTURES, Recording, read_recording
 from shadowpuppet.pipeline import Listener
 from shadowpuppet.synthetic import Spec, synthesize
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.specfile import HEAD, SPEC_FILE, read_spec
+from shadowpuppet.synthetic.spec_file import HEAD, SPEC_FILE, read_spec
 
 
 def make_recording(spec: Spec, folder: str | Path, listener: Listener | None = None, force: bool = False) -> Recording:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, humaneva, named_specs, proving_ground, proving_rings
 from shadowpuppet.synthetic.furniture import Obstacle
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.script import Gesture
+from shadowpuppet.synthetic.movement.script import Gesture
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Bystander, Scene, Spec, spec_from
-from shadowpuppet.synthetic.specfile import read_spec, spec_text
+from shadowpuppet.synthetic.spec_file import read_spec, spec_text
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 
 if TYPE_CHECKING:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic import motions
-from shadowpuppet.synthetic.cycle import smooth
-from shadowpuppet.synthetic.gait import Walk
-from shadowpuppet.synthetic.kinematics import CHANNELS, Figure, Stance, figure, planted, pose, turns
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.whole_body import ACTS
+from shadowpuppet.synthetic.movement import gestures
+from shadowpuppet.synthetic.movement.gait import Walk
+from shadowpuppet.synthetic.movement.gait_cycle import smooth
+from shadowpuppet.synthetic.movement.whole_body import ACTS
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, Figure, Stance, figure, planted, pose, turns
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 if TYPE_CHECKING:
-    from shadowpuppet.synthetic.script import Gesture
+    from shadowpuppet.synthetic.movement.script import Gesture
 
 BLEND = 0.4
 """Seconds before and after the change from one part to the next over which trunk and arms go from one to the other."""
@@ -40,11 +40,11 @@ class Standing:
     def __init__(self, body: Mannequin, gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> None:
         """Of gestures `(name, seconds)` one after another."""
         self.body, self.seconds = body, sum(seconds for _, seconds in gestures)
-        self.keys = motions.keys_of(gestures, rng)
+        self.keys = gestures.keys_of(gestures, rng)
 
     def at(self, t: Array) -> tuple[Array, Stance]:
         """As `Part.at`."""
-        postures = motions.through(self.keys, np.clip(t + motions.LEAD, 0, None))
+        postures = gestures.through(self.keys, np.clip(t + gestures.LEAD, 0, None))
         return postures, planted(self.body, postures)
 
 
@@ -59,10 +59,10 @@ class Place(NamedTuple):
 def seconds_of(gestures: Sequence[Gesture]) -> float:
     """Seconds from the first to the last picture."""
     if any(gesture.motion == "mocap" for gesture in gestures):
-        from shadowpuppet.synthetic.mocap import seconds_of as played
+        from shadowpuppet.synthetic.movement.mocap import seconds_of as played
 
         return played(gestures)
-    return motions.duration([(gesture.motion, gesture.seconds) for gesture in gestures])
+    return gestures.duration([(gesture.motion, gesture.seconds) for gesture in gestures])
 
 
 def perform(
@@ -74,18 +74,18 @@ def perform(
     origin: the middle of the area they cover lies there. A motion from a file stands alone (see `mocap.play`).
     """
     if any(gesture.motion == "mocap" for gesture in gestures):
-        from shadowpuppet.synthetic.mocap import play
+        from shadowpuppet.synthetic.movement.mocap import play
 
         return play(body, gestures, t, turn)
-    if all(gesture.motion in motions.MOTIONS for gesture in gestures):
-        postures = motions.compose([(g.motion, g.seconds) for g in gestures], t, rng, still)
+    if all(gesture.motion in gestures.MOTIONS for gesture in gestures):
+        postures = gestures.compose([(g.motion, g.seconds) for g in gestures], t, rng, still)
         postures[:, CHANNELS.index("turn")] += turn
         return pose(body, postures)
     parts = _parts(body, gestures, rng)
     postures, stance = _joined(parts, t, turn)
-    restless = still * motions.involuntary(t, rng)
+    restless = still * gestures.involuntary(t, rng)
     sway = restless[:, [CHANNELS.index("sway_x"), CHANNELS.index("sway_y")]]
-    postures = motions.settled(postures + restless)
+    postures = gestures.settled(postures + restless)
     shift = _middle(parts, turn) if _goes(gestures) else np.zeros(3)
     moved = stance._replace(pelvis=stance.pelvis - shift + np.column_stack([sway, 0 * t]), ankles=stance.ankles - shift)
     return figure(body, postures, moved, SOFT)
@@ -93,7 +93,7 @@ def perform(
 
 def _middle(parts: Sequence[Part], turn: float) -> Array:
     """The middle (3,) of the area that the person covers, whatever times are shown."""
-    whole = np.arange(0, motions.LEAD + sum(part.seconds for part in parts), 0.05)
+    whole = np.arange(0, gestures.LEAD + sum(part.seconds for part in parts), 0.05)
     places = _joined(parts, whole, turn)[1].pelvis[:, :2]
     return np.append((places.max(0) + places.min(0)) / 2, 0.0)
 
@@ -108,7 +108,7 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
     parts: list[Part] = []
     waiting: list[tuple[str, float]] = []
     for gesture in (*gestures, None):
-        if gesture is not None and gesture.motion in motions.MOTIONS:
+        if gesture is not None and gesture.motion in gestures.MOTIONS:
             waiting.append((gesture.motion, gesture.seconds))
             continue
         if waiting:
@@ -124,7 +124,7 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
 
 def _joined(parts: Sequence[Part], t: Array, turn: float) -> tuple[Array, Stance]:
     """Postures and stance of `parts`, each from where the one before ended; trunk and arms go over from one to the next."""
-    begin, place = motions.LEAD, Place(turn=turn)
+    begin, place = gestures.LEAD, Place(turn=turn)
     postures, pieces, of = np.zeros((len(t), len(CHANNELS))), [], np.zeros(len(t), int)
     for n, part in enumerate(parts):
         end = begin + part.seconds

@@ -8,10 +8,10 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.kinematics import Figure
-from shadowpuppet.synthetic.mannequin import JOINTS
-from shadowpuppet.synthetic.surface import GROUPS, MATERIALS, Surface
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.mannequin import JOINTS
+from shadowpuppet.synthetic.person.surface import GROUPS, MATERIALS, Surface
 
 OFFSETS = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
 """Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
@@ -35,7 +35,7 @@ class Renderer:
 
     def __init__(self, camera: Camera, surface: Surface, clothes: Clothes, lights: Array) -> None:
         """lights: (3, 4), unit directions toward the two lamps and their strength; the third row's is the ambient light."""
-        from shadowpuppet.synthetic._tracing import TILE
+        from shadowpuppet.synthetic._ray_marching import TILE
 
         width, height = camera.size
         R = inverse(camera.T_camera_world)[:3, :3]
@@ -62,7 +62,7 @@ class Renderer:
 
     def draw(self, figure: Figure, index: int) -> Shot:
         """The figure's posture `index`."""
-        from shadowpuppet.synthetic import _tracing
+        from shadowpuppet.synthetic import _ray_marching
 
         s, (width, height), eye = self.surface, self.camera.size, self.camera.centre
         R, o = figure.rotation[index, s.segment], figure.origin[index, s.segment]
@@ -72,12 +72,12 @@ class Renderer:
         sizes = [s.length, 1 / s.caps, s.blend, (s.table.shape[1] - 1) / s.length, s.change]
         placed = np.column_stack([axes.swapaxes(1, 2).reshape(-1, 9), origin, middle, reach, *sizes])
         lists, span = np.zeros((len(self.direction), len(origin) + 1), np.int64), np.zeros((len(self.direction), 2))
-        _tracing.list_parts(self.direction, self.sine, self.cosine, eye, _covering(origin, axes, s), lists, span)
+        _ray_marching.list_parts(self.direction, self.sine, self.cosine, eye, _covering(origin, axes, s), lists, span)
         traced = eye, self.rays, self.across, lists, span, placed, self.table, s.code, self._joins(figure, index)
         depth, near = np.empty((height, width)), np.empty((height, width), np.int64)
-        _tracing.find_surface(*traced, depth, near)
+        _ray_marching.find_surface(*traced, depth, near)
         alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
-        _tracing.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
+        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
         return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha, depth)
 
     def _joins(self, figure: Figure, index: int) -> Array:

@@ -11,8 +11,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.script import Gesture
+from shadowpuppet.synthetic.movement.script import Gesture
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.viewpoint import STRICT
 from shadowpuppet.synthetic.walls import Background

@@ -12,8 +12,8 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic.furniture import Furniture, Obstacle, Place
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.script import Gesture
+from shadowpuppet.synthetic.movement.script import Gesture
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.viewpoint import STRICT, Name, Ring, Viewpoint
 from shadowpuppet.synthetic.walls import Background
 

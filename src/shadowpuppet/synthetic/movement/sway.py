@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.kinematics import CHANNELS
+from shadowpuppet.synthetic.person.kinematics import CHANNELS
 
 RESTLESS = {
     "sway_x": (0.006, 0.35),

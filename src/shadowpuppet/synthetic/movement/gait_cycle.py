@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
-from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GRAVITY = 9.81
 POINTS = 200

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.surface import Loft, Rows, between, stations_of
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.mannequin import Mannequin
+from shadowpuppet.synthetic.person.surface import Loft, Rows, between, stations_of
 
 
 def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:

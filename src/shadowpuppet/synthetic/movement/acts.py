@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.cycle import GRAVITY, Sole, smooth
-from shadowpuppet.synthetic.kinematics import CHANNELS, TOE_OUT, Stance, turns
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.motions import Keys, rounded, through
+from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, Sole, smooth
+from shadowpuppet.synthetic.movement.gestures import Keys, rounded, through
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, turns
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 STANCE = 0.13
 """Half the distance of a standing person's ankles."""

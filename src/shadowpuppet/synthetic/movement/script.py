@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from shadowpuppet.synthetic.paths import PathName
+from shadowpuppet.synthetic.movement.paths import PathName
 from shadowpuppet.synthetic.viewpoint import STRICT
 
 MotionName = Literal[

@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.kinematics import CHANNELS, pose
-from shadowpuppet.synthetic.mannequin import JOINTS, Mannequin
-from shadowpuppet.synthetic.restless import band_noise, involuntary, plain
+from shadowpuppet.synthetic.movement.sway import band_noise, involuntary, plain
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, pose
+from shadowpuppet.synthetic.person.mannequin import JOINTS, Mannequin
 
 Posture = dict[str, float]
 Keys = list[tuple[float, Posture]]

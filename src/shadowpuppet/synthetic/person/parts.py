@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.head import head
-from shadowpuppet.synthetic.limbs import arm, leg
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.surface import Surface
-from shadowpuppet.synthetic.trunk import shoulders, trunk
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.head import head
+from shadowpuppet.synthetic.person.limbs import arm, leg
+from shadowpuppet.synthetic.person.mannequin import Mannequin
+from shadowpuppet.synthetic.person.surface import Surface
+from shadowpuppet.synthetic.person.trunk import shoulders, trunk
 
 
 def dressed(body: Mannequin, clothes: Clothes) -> Surface:

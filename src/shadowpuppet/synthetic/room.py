@@ -12,8 +12,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.synthetic import walls
 from shadowpuppet.synthetic.furniture import Furniture
-from shadowpuppet.synthetic.kinematics import Figure
-from shadowpuppet.synthetic.mannequin import JOINTS
+from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.spec import Scene
 
 SHADOW_PARTS = (

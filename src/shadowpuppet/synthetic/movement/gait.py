@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.cycle import GRAVITY, JOGGING, WALKING, Cycle, smooth, stride_of
-from shadowpuppet.synthetic.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, turns
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.motions import STANDING, band_noise
-from shadowpuppet.synthetic.paths import Path, PathName
+from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, JOGGING, WALKING, Cycle, smooth, stride_of
+from shadowpuppet.synthetic.movement.gestures import STANDING, band_noise
+from shadowpuppet.synthetic.movement.paths import Path, PathName
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, turns
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 TICK = 0.002
 """Seconds between the times at which speed and cadence are summed up."""

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shadowpuppet.synthetic.acts import STANCE, Act, Hop, Step
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.motions import Keys, Posture, band_noise, both, left, right, trunk
-from shadowpuppet.synthetic.motions import random as random_keys
+from shadowpuppet.synthetic.movement.acts import STANCE, Act, Hop, Step
+from shadowpuppet.synthetic.movement.gestures import Keys, Posture, band_noise, both, left, right, trunk
+from shadowpuppet.synthetic.movement.gestures import random as random_keys
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GUARD = both(front=38, side=12, roll=6, elbow=122, supination=10, curl=85, wrist_flex=0)
 """Fists before the chin, elbows in."""

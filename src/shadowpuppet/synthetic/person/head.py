@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.mannequin import Mannequin
-from shadowpuppet.synthetic.surface import Loft, Rows, ball, between
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.mannequin import Mannequin
+from shadowpuppet.synthetic.person.surface import Loft, Rows, ball, between
 
 
 def head(body: Mannequin, clothes: Clothes) -> list[Loft]:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.clothes import Clothes
-from shadowpuppet.synthetic.mannequin import KNUCKLES, Mannequin
-from shadowpuppet.synthetic.surface import Loft, Rows, frame_of, stations_of
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.mannequin import KNUCKLES, Mannequin
+from shadowpuppet.synthetic.person.surface import Loft, Rows, frame_of, stations_of
 
 DOWN = np.diag([1.0, 1.0, -1.0])
 ALONG_X = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])

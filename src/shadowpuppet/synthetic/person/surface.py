@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.kinematics import SEGMENTS
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS
 
 MATERIALS = ("skin", "shirt", "trousers", "hair", "shoes", "eyes", "lips")
 GROUPS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.mannequin import HAND_POINT, JOINTS, KNUCKLES, Mannequin
+from shadowpuppet.synthetic.person.mannequin import HAND_POINT, JOINTS, KNUCKLES, Mannequin
 
 ARM = ("side", "front", "roll", "elbow", "supination", "wrist_flex", "wrist_side", "shrug", "protract", "curl")
 CHANNELS = (

@@ -15,12 +15,12 @@ import numpy as np
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.synthetic.kinematics import SIDES, Figure, assembled, fingers, turns
-from shadowpuppet.synthetic.mannequin import Mannequin
+from shadowpuppet.synthetic.person.kinematics import SIDES, Figure, assembled, fingers, turns
+from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 if TYPE_CHECKING:
     from shadowpuppet.io.motion.amc import Capture
-    from shadowpuppet.synthetic.script import Gesture
+    from shadowpuppet.synthetic.movement.script import Gesture
 
 Points = dict[str, Array]
 
@@ -172,7 +172,7 @@ def _bend(p: Points, side: str) -> Array:
 
 def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
     """Raised or lowered as a whole so that the lowest ankle or ball is as high as in standing, save for the lowest 2 %."""
-    from shadowpuppet.synthetic.kinematics import SEGMENTS
+    from shadowpuppet.synthetic.person.kinematics import SEGMENTS
 
     lowest = []
     for side in SIDES:

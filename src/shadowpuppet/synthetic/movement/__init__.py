@@ -1,0 +1,1 @@
+"""How made people move: gestures, gait, paths, motion capture."""

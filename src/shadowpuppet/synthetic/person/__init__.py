@@ -1,0 +1,1 @@
+"""Made people: a mannequin of rounded limbs, that shares nothing with the fitted bodies."""
