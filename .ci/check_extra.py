@@ -62,10 +62,10 @@ def batch(folder: Path) -> None:
     """The scheduler's client can be loaded."""
     import distributed
 
-    import shadowpuppet.batch.cluster
+    import shadowpuppet.pipeline.batch.cluster
 
     assert distributed.Client
-    assert shadowpuppet.batch.cluster
+    assert shadowpuppet.pipeline.batch.cluster
 
 
 def view(folder: Path) -> None:

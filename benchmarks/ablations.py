@@ -2,7 +2,7 @@
 
     python benchmarks/ablations.py [STUDY...] [--seeds 2] [--workers 2] [--one FOLDER] [--rings FOLDER] [-o build/ablations]
 
-Each run is what `shadowpuppet track` does, through `shadowpuppet.batch`: a second start does what is missing. Recordings are those of the
+Each run is what `shadowpuppet track` does, through `shadowpuppet.pipeline.batch`: a second start does what is missing. Recordings are those of the
 proving grounds (`synthetic.proving_ground`, `synthetic.proving_rings`), made where they are missing. The error is that of joints
 in millimetres, a frame that is lost counting 500; `se` is the standard error of its difference from the study's first row, in pairs
 of recording and seed: what is within two of them is not told apart. Tables go into docs/ablations.md, and, once all studies are done,
@@ -27,13 +27,13 @@ from multiview import made as made_rings
 from proving_ground import made as made_one
 from spoiled import SPOILS, spoiled
 
-from shadowpuppet.batch import make_grid, run_batch
-from shadowpuppet.batch.summary import BatchRun
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person, write_person
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import fit_person
+from shadowpuppet.pipeline.batch import make_grid, run_batch
+from shadowpuppet.pipeline.batch.summary import BatchRun
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import fit_person
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD, PAGE, ASSETS = ROOT / "build", ROOT / "docs" / "ablations.md", ROOT / "docs" / "assets"

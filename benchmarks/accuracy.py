@@ -21,7 +21,7 @@ from cases import COLUMNS, Case, means
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.upper_body import HAND_SHARE
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import make_options
+from shadowpuppet.pipeline.options import make_options
 
 ROWS: dict[str, dict[str, Any]] = {
     "default": {},

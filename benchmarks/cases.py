@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.fitting import find
-from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.look import prepare
 from shadowpuppet.motion.metrics import UPPER, joint_errors
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import Options, make_options
+from shadowpuppet.pipeline.footage import Footage, Mask, Sample, Silhouettes
+from shadowpuppet.pipeline.look import prepare
+from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.pipeline.person import find
 from shadowpuppet.tracking.monocular.initialization import Guess
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

@@ -16,10 +16,10 @@ import numpy as np
 
 from shadowpuppet.calibration.epipolar_tangency import Outlines
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.options import Options
-from shadowpuppet.rig import Rig, open_rig
-from shadowpuppet.rig_check import RigCheck, Seen, gather, judge
-from shadowpuppet.running import Listener
+from shadowpuppet.pipeline.check_calibration import RigCheck, Seen, gather, judge
+from shadowpuppet.pipeline.footage_rig import Rig, open_rig
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import Listener
 
 MARGIN = 12
 """Sets at both ends that films are shifted into."""

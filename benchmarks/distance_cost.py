@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 
 from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
-from shadowpuppet.pipeline import track_recording
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.monocular import stages
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 

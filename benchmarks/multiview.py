@@ -36,9 +36,9 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
 from shadowpuppet.motion.metrics import LIMBS, joint_errors
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import track_recording
-from shadowpuppet.priors import prior_from_files
+from shadowpuppet.pipeline.learn_prior import prior_from_files
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.synthetic import proving_rings, synthesize
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -21,7 +21,7 @@ from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import UPPER
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.tracking.monocular.pose_search import arm_dofs
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost

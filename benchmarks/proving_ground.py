@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from cases import Case
 
-from shadowpuppet.options import make_options
+from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.synthetic import proving_ground, synthesize
 from shadowpuppet.tracking.monocular.initialization import Guess
 

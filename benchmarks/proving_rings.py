@@ -29,11 +29,11 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import make_options
-from shadowpuppet.rig import follow, open_rig
-from shadowpuppet.rig_fitting import prepare_puppet
-from shadowpuppet.rig_look import look_at_rig
-from shadowpuppet.rig_run import Puppet, training_of
+from shadowpuppet.pipeline.footage_rig import follow, open_rig
+from shadowpuppet.pipeline.look_rig import look_at_rig
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.person_rig import prepare_puppet
+from shadowpuppet.pipeline.track_rig import Puppet, training_of
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 

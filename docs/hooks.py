@@ -23,7 +23,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import tomli_w
 
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.settings import default_of, settings_of
 from shadowpuppet.synthetic.spec import TABLES, Spec
 from shadowpuppet.tracking.monocular.settings import PRESETS

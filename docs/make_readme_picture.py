@@ -26,8 +26,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import track_recording
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull

@@ -16,7 +16,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.looking import first_wish, served
 from shadowpuppet.viewer.opening import show_of
 from shadowpuppet.viewer.panel import Panel

@@ -17,12 +17,12 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.demo import run_demo
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.demo import run_demo
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Ring, Spec
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud

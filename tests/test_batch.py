@@ -22,16 +22,16 @@ from rich.console import Console
 
 import made
 from shadowpuppet import cli
-from shadowpuppet.batch import Batch, BatchListener, make_grid, run_batch
-from shadowpuppet.batch import crew as crews
-from shadowpuppet.batch.plan import make_tasks, named
-from shadowpuppet.batch.run import _claimed
-from shadowpuppet.batch.task import _put, do
 from shadowpuppet.batch_terminal import LINES, BatchTerminal, _pace
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import track_recording
+from shadowpuppet.pipeline.batch import Batch, BatchListener, make_grid, run_batch
+from shadowpuppet.pipeline.batch import workers as crews
+from shadowpuppet.pipeline.batch.run import _claimed
+from shadowpuppet.pipeline.batch.task import _put, do
+from shadowpuppet.pipeline.batch.tasks import make_tasks, named
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.terminal import Terminal
 
 SETTINGS = {"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
@@ -159,7 +159,7 @@ def test_a_function_that_workers_cannot_find_is_refused(recording, tmp_path, tra
 
 
 def test_a_function_that_a_worker_does_not_have_is_told():
-    for name in ("no.such:thing", "shadowpuppet.pipeline:no_such"):
+    for name in ("no.such:thing", "shadowpuppet.pipeline.track:no_such"):
         with pytest.raises(ShadowPuppetError, match=r"cannot be imported .* expected a function of a module that every worker has"):
             named(name)
 
@@ -284,7 +284,7 @@ def test_a_bug_is_a_sentence_and_a_file_for_its_finder(recording, tmp_path, monk
     def broken(*_):
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr("shadowpuppet.pipeline.motion_frame", broken)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.motion_frame", broken)
     batch = run_batch([recording], tmp_path / "out", QUICK, workers=0, retries=0)
     assert batch.runs[0].message.startswith("ZeroDivisionError in test_batch.py:")
     trace = (tmp_path / "out" / "failed" / f"{batch.runs[0].task.folder}.txt").read_text()

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import made
-from shadowpuppet.batch import BatchListener, make_grid, run_batch
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import read_run
+from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("default")  # theirs are not ours
@@ -70,7 +70,7 @@ def test_a_second_start_elsewhere_does_what_is_missing(cluster, recording, tmp_p
 
 def test_a_run_whose_workers_are_lost_each_time_is_named(cluster, recording, tmp_path, monkeypatch):
     """As one that takes more memory than a worker may have."""
-    monkeypatch.setattr("shadowpuppet.batch.cluster.do_there", _dies)
+    monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.do_there", _dies)
     batch = run_batch([recording], tmp_path / "out", QUICK, retries=0, scheduler=cluster.scheduler_address)
     assert batch.runs[0].message == "its workers were lost, one after another: killed, or out of memory"
 
@@ -80,7 +80,7 @@ def _dies(*_: object) -> None:
 
 
 def test_a_folder_that_a_worker_does_not_see_is_said(tmp_path):
-    from shadowpuppet.batch.cluster import do_there
+    from shadowpuppet.pipeline.batch.cluster import do_there
 
     said = do_there({"folder": "x"}, str(tmp_path / "elsewhere"), "now", True)
     assert said["status"] == "failed"
@@ -89,7 +89,7 @@ def test_a_folder_that_a_worker_does_not_see_is_said(tmp_path):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://here", ""])
 def test_a_scheduler_that_does_not_answer_is_said(recording, tmp_path, address, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.batch.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.PATIENCE", 0.5)
     with pytest.raises(ShadowPuppetError, match=r"scheduler: found '.*', at which no Dask scheduler answers"):
         run_batch([recording], tmp_path / "out", QUICK, scheduler=address)
 
@@ -99,7 +99,7 @@ def test_a_scheduler_that_ends_is_said(recording, tmp_path, monkeypatch):
         def ended(self, task, outcome, again):
             found.scheduler.loop.add_callback(found.scheduler.close)
 
-    monkeypatch.setattr("shadowpuppet.batch.cluster.PATIENCE", 1)
+    monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.PATIENCE", 1)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as found, \
             pytest.raises(ShadowPuppetError, match=r"scheduler: the connection to .* was lost"):
         run_batch([recording], tmp_path / "out", QUICK, range(50), scheduler=found.scheduler_address, listener=Ends())

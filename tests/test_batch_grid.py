@@ -10,11 +10,11 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.batch.grid import Case, make_grid, read_grid, seeds_of
-from shadowpuppet.batch.plan import fingerprint, make_tasks
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.io.files.plain import for_toml
-from shadowpuppet.options import Options, make_options, plain_options
+from shadowpuppet.pipeline.batch.grid import Case, make_grid, read_grid, seeds_of
+from shadowpuppet.pipeline.batch.tasks import fingerprint, make_tasks
+from shadowpuppet.pipeline.options import Options, make_options, plain_options
 
 GRID = """\
 seeds = "0:3"

@@ -20,7 +20,7 @@ import made
 from shadowpuppet import cli
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import UPPER
-from shadowpuppet.options import Options, make_options, options_text
+from shadowpuppet.pipeline.options import Options, make_options, options_text
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
          "--initialization.sweeps", "2"]
@@ -430,7 +430,7 @@ def test_control_c_before_the_first_frame(shell, recording, monkeypatch, tmp_pat
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("shadowpuppet.pipeline.prepare", stop)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", stop)
     assert shell("track", recording, "-o", "run") == (130, "", "interrupted: nothing was written\n")
     assert not (tmp_path / "run").exists()
 
@@ -446,7 +446,7 @@ def test_a_closed_pipe_is_no_error(recording):
 
 
 def test_a_bug_is_not_hidden(shell, recording, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.pipeline.prepare", lambda *_: 1 / 0)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         shell("track", recording, "-o", "run")
 

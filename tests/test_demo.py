@@ -13,13 +13,13 @@ import pytest
 import made
 from shadowpuppet import cli
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
-from shadowpuppet.demo import contact_sheet
 from shadowpuppet.evaluation import angle_errors
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.metrics import LIMBS
+from shadowpuppet.pipeline.demo import contact_sheet
 from shadowpuppet.synthetic import demo_ring_spec
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
@@ -37,15 +37,15 @@ def shown(tmp_path_factory):
     """The demo's folder."""
     folder = tmp_path_factory.mktemp("demo") / "show"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shadowpuppet.demo.demo_spec", lambda: made.SPEC)
-        patch.setattr("shadowpuppet.demo.demo_ring_spec", lambda: made.RING)
+        patch.setattr("shadowpuppet.pipeline.demo.demo_spec", lambda: made.SPEC)
+        patch.setattr("shadowpuppet.pipeline.demo.demo_ring_spec", lambda: made.RING)
         assert cli.run(["demo", "-o", str(folder), "--quiet", *QUICK]) == 0
     return folder
 
 
 def test_a_demo_names_its_pictures(shell, shown, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.demo.track_recording", lambda recording, run, *_: summary_of(run))
-    monkeypatch.setattr("shadowpuppet.demo.synthesize", lambda spec, folder, *_: folder)
+    monkeypatch.setattr("shadowpuppet.pipeline.demo.track_recording", lambda recording, run, *_: summary_of(run))
+    monkeypatch.setattr("shadowpuppet.pipeline.demo.synthesize", lambda spec, folder, *_: folder)
     code, out, err = shell("demo", "-o", "show", *QUICK)
     assert (code, err) == (0, "")
     assert [line for line in out.splitlines() if line in ("one camera", "several cameras")] == ["one camera", "several cameras"]
@@ -56,7 +56,7 @@ def test_a_demo_names_its_pictures(shell, shown, monkeypatch):
 
 
 def summary_of(run):
-    from shadowpuppet.running import Summary
+    from shadowpuppet.pipeline.progress import Summary
 
     read = read_run(run)
     return Summary(run, read.motion, read.metrics, None)  # pyright: ignore[reportArgumentType]

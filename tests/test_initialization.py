@@ -13,7 +13,7 @@ from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.fitting import wrong_posture
+from shadowpuppet.pipeline.person import wrong_posture
 from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, find_person, fit_references, refine
 from shadowpuppet.tracking.monocular.settings import InitializationSettings
 from shadowpuppet.tracking.monocular.size_search import Bodies, Guess, Hypotheses

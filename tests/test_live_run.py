@@ -32,7 +32,7 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.live import run as live_run
 from shadowpuppet.live.run import LiveListener, run_live
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.options import make_options
+from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.video import write_image
 from shadowpuppet.video.live_source import Feed, Snapshot
 

@@ -19,7 +19,7 @@ from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.vigil import FIRST_PATIENCE, Vigil
 from shadowpuppet.live.waiting import Waiter, unfit
-from shadowpuppet.options import make_options
+from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.settings import validate
 from shadowpuppet.video.live_source import Snapshot
 

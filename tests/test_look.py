@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 import made
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
-from shadowpuppet.fitting import DEEP, wrong_posture
-from shadowpuppet.footage import (
+from shadowpuppet.pipeline.footage import (
     FIRST,
     FIRST_SECONDS,
     LOOKED_AT,
@@ -24,9 +23,10 @@ from shadowpuppet.footage import (
     silhouettes,
     take_sample,
 )
-from shadowpuppet.look import prepare, quality_of
-from shadowpuppet.options import Options, make_options
-from shadowpuppet.pipeline import json_text, look_at, track_recording
+from shadowpuppet.pipeline.look import prepare, quality_of
+from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.pipeline.person import DEEP, wrong_posture
+from shadowpuppet.pipeline.track import json_text, look_at, track_recording
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, Guess, sizes_from_height
 
@@ -185,7 +185,7 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
 
 def look_at_masks(recording):
     """The look without the search for the person."""
-    from shadowpuppet import look as module
+    from shadowpuppet.pipeline import look as module
 
     footage = open_footage(recording, Options())
     sample = take_sample(footage)

@@ -15,7 +15,7 @@ from shadowpuppet.camera.drawing import draw_model, matching, overlay_frame
 from shadowpuppet.camera.rasterize import Picture, unpack
 from shadowpuppet.errors import ShadowPuppetError, VideoError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.rig_overlay import OverlayWriter
+from shadowpuppet.pipeline.overlay_video import OverlayWriter
 from shadowpuppet.video import open_frames
 
 SIZES = CardboxSizes(*(1.8 * share for share in (

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import shadowpuppet
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.settings import settings_of
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -9,13 +9,13 @@ import pytest
 
 import made
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
-from shadowpuppet.footage import RUN, RUNS, Shot, open_footage, read_masks, silhouettes, take_sample
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import overlap
-from shadowpuppet.options import Options, make_options, plain_options, read_options
-from shadowpuppet.pipeline import Listener, Watch, fit_person, track_recording
+from shadowpuppet.pipeline.footage import RUN, RUNS, Shot, open_footage, read_masks, silhouettes, take_sample
+from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
+from shadowpuppet.pipeline.track import Listener, Watch, fit_person, track_recording
 from shadowpuppet.video import open_frames
 
 JOINTS = {"pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand"))}

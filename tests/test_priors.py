@@ -12,8 +12,8 @@ from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import make_options, plain_options, read_options
-from shadowpuppet.priors import familiar
+from shadowpuppet.pipeline.learn_prior import familiar
+from shadowpuppet.pipeline.options import make_options, plain_options, read_options
 from vicon import c3d
 
 

@@ -7,9 +7,9 @@ import pytest
 
 import made
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import Listener, track_recording
-from shadowpuppet.repeats import Reel, Repeats
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.silhouette_cache import Reel, Repeats
+from shadowpuppet.pipeline.track import Listener, track_recording
 
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 

@@ -21,10 +21,10 @@ from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.pipeline.overlay_video import grid_of
 from shadowpuppet.report.charts import by_joint_and_time
 from shadowpuppet.report.page import page, write_report
 from shadowpuppet.report.pictures import chosen_frames, draw_bones, pictures
-from shadowpuppet.rig_overlay import grid_of
 
 TRUTH = person(4, 15)
 SIZE = (160, 120)

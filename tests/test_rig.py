@@ -10,10 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
-from shadowpuppet.footage import Footage, Shot
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.options import Options
-from shadowpuppet.rig import LATE, Rig, chosen_views, follow, open_rig
+from shadowpuppet.pipeline.footage import Footage, Shot
+from shadowpuppet.pipeline.footage_rig import LATE, Rig, chosen_views, follow, open_rig
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import write_frames
 from solids import looking
 

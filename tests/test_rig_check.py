@@ -18,9 +18,9 @@ from shadowpuppet.cli import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.options import Options
-from shadowpuppet.rig import open_rig
-from shadowpuppet.rig_check import check_rig
+from shadowpuppet.pipeline.check_calibration import check_rig
+from shadowpuppet.pipeline.footage_rig import open_rig
+from shadowpuppet.pipeline.options import Options
 
 FRAMES = 70
 MASKS = Options(masks=True)

@@ -12,14 +12,14 @@ import pytest
 import actor
 import made
 import made_rig
-from shadowpuppet import rig_fitting
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import track_recording
+from shadowpuppet.pipeline import person_rig
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import track_recording
 
 FRAMES = 16
 QUICK = {"masks": True, "multiview": {"particles": 6}, "training": {"regions": 6, "starts": 1}}
@@ -133,7 +133,7 @@ def test_sizes_of_an_earlier_run_are_used_again(untaught, run, shell):
 
 
 def test_without_training_sizes_come_from_the_height_or_from_what_is_seen(untaught, shell, monkeypatch):
-    monkeypatch.setattr(rig_fitting, "AVERAGE_HEIGHT", 1.0)  # which is for those of whom nothing is seen
+    monkeypatch.setattr(person_rig, "AVERAGE_HEIGHT", 1.0)  # which is for those of whom nothing is seen
     found = tracked(shell, untaught, "--height", 1.75)
     assert json.loads(Path("run/look.json").read_text())["person"]["source"] == "the height, and the hulls of the first seconds"
     assert errors(found).mean() < 0.06

@@ -15,11 +15,11 @@ from shadowpuppet.cli import run
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.options import Options
-from shadowpuppet.pipeline import look_at, track_recording
-from shadowpuppet.rig import open_rig
-from shadowpuppet.rig_look import RigLook, look_at_rig
-from shadowpuppet.running import json_text
+from shadowpuppet.pipeline.footage_rig import open_rig
+from shadowpuppet.pipeline.look_rig import RigLook, look_at_rig
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import json_text
+from shadowpuppet.pipeline.track import look_at, track_recording
 
 MASKS = Options(masks=True)
 

@@ -15,11 +15,11 @@ from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetW
 from shadowpuppet.evaluation import evaluate_run
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
-from shadowpuppet.options import Options, make_options
-from shadowpuppet.pipeline import look_at
-from shadowpuppet.rig_overlay import TALLEST, WIDEST, grid_of
-from shadowpuppet.rig_run import Puppet, track_rig
-from shadowpuppet.running import RIG_STAGES, Listener
+from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
+from shadowpuppet.pipeline.progress import RIG_STAGES, Listener
+from shadowpuppet.pipeline.track import look_at
+from shadowpuppet.pipeline.track_rig import Puppet, track_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import open_frames
 

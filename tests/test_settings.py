@@ -13,7 +13,7 @@ from shadowpuppet.body.models import ALL
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.options import Options, make_options
+from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.settings import validate
 from shadowpuppet.silhouette import SilhouetteSettings
 from shadowpuppet.tracking.monocular.settings import PRESETS, InitializationSettings, MonocularSettings, PartSettings, make_settings

@@ -14,8 +14,8 @@ import acclaim
 from shadowpuppet.errors import RecordingError, SettingsError
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.making import make_recording
-from shadowpuppet.pipeline import Listener
+from shadowpuppet.pipeline.synthesize import make_recording
+from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.synthetic import (
     Bystander,
     Gesture,

@@ -31,7 +31,7 @@ from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.curves import AROUND, data_around, limits
 from shadowpuppet.viewer.figures import of_animation, of_poses, of_table
 from shadowpuppet.viewer.of_prior import body_of as body_of_prior
@@ -55,8 +55,8 @@ def tracked(tmp_path_factory):
     """A tiny recording of one camera, tracked."""
     folder = tmp_path_factory.mktemp("tracked")
     recording = made.make(folder / "tiny")
-    from shadowpuppet.options import make_options
-    from shadowpuppet.pipeline import track_recording
+    from shadowpuppet.pipeline.options import make_options
+    from shadowpuppet.pipeline.track import track_recording
 
     track_recording(recording, folder / "run", make_options({"seed": 1}))
     return folder / "run"
@@ -366,10 +366,10 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
 
 
 def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
-    from shadowpuppet.footage import opened
     from shadowpuppet.io.motion.truth import read_truth
     from shadowpuppet.motion.inverse_kinematics import fit_poses
     from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
+    from shadowpuppet.pipeline.footage import opened
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.viewer.of_recording import eyes_of
     from shadowpuppet.viewer.particles import Rerun

@@ -18,8 +18,8 @@ import pytest
 
 import made
 from shadowpuppet.display.view import Angle, View
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import track_recording
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.viewer.opening import between, show_of
 
 pytest.importorskip("viser")

@@ -14,8 +14,8 @@ from shadowpuppet.body.segments import steady
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.options import Options
-from shadowpuppet.rig_fitting import prepare_puppet
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.person_rig import prepare_puppet
 from shadowpuppet.tracking.monocular.initialization import Fit, as_whole, find_person
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
 from shadowpuppet.tracking.monocular.size_search import Guess

@@ -11,7 +11,7 @@ import sys
 
 from dask_jobqueue import SLURMCluster  # pyright: ignore[reportMissingImports]
 
-from shadowpuppet.batch import BatchListener, make_grid, run_batch
+from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 
 
 class Lines(BatchListener):

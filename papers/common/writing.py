@@ -13,7 +13,7 @@ from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import save_picture
 from shadowpuppet.bench.machine import environment
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.running import json_text
+from shadowpuppet.pipeline.progress import json_text
 
 
 def write_outcome(paper: str, experiment: Experiment, request: Request, outcome: Outcome, seconds: float, number: int = 0) -> None:

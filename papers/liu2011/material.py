@@ -20,11 +20,11 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.plain import plain
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.look import Prepared, check, prepare
-from shadowpuppet.making import make_recording
 from shadowpuppet.motion.metrics import match
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import Options, make_options, plain_options
+from shadowpuppet.pipeline.look import Prepared, check, prepare
+from shadowpuppet.pipeline.options import Options, make_options, plain_options
+from shadowpuppet.pipeline.synthesize import make_recording
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.movement.gestures import LEAD
 from shadowpuppet.synthetic.shorthand import gestures_from

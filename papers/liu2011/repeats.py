@@ -15,12 +15,12 @@ import shadowpuppet
 from papers.common.experiment import Request
 from papers.common.many import shown_progress
 from papers.liu2011.material import Case, seen
-from shadowpuppet.batch import BatchListener, make_grid, run_batch
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.run import write_metrics
-from shadowpuppet.options import Options, plain_options
-from shadowpuppet.running import Listener
+from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
+from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

@@ -22,9 +22,9 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import make_options
-from shadowpuppet.rig import follow, open_rig
-from shadowpuppet.rig_look import check_rig, look_at_rig
+from shadowpuppet.pipeline.footage_rig import follow, open_rig
+from shadowpuppet.pipeline.look_rig import check_rig, look_at_rig
+from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings

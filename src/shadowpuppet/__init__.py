@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
     from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
-    from shadowpuppet.footage import open_footage, read_masks
     from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
     from shadowpuppet.io.export import convert_motion, export_run
     from shadowpuppet.io.humaneva import read_humaneva
@@ -26,15 +25,16 @@ if TYPE_CHECKING:
     from shadowpuppet.io.prior import read_prior, write_prior
     from shadowpuppet.io.recording import Recording, read_recording
     from shadowpuppet.io.run import Run, read_run
-    from shadowpuppet.look import Look
     from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
     from shadowpuppet.motion.metrics import evaluate
     from shadowpuppet.motion.motion import JointTable, Motion
     from shadowpuppet.motion.prior.motion_prior import MotionPrior
     from shadowpuppet.motion.prior.settings import PriorSettings
     from shadowpuppet.motion.prior.vqpca import choose_regions, fit_prior
-    from shadowpuppet.options import Options, make_options
-    from shadowpuppet.pipeline import Listener, look_at, track_recording
+    from shadowpuppet.pipeline.footage import open_footage, read_masks
+    from shadowpuppet.pipeline.look import Look
+    from shadowpuppet.pipeline.options import Options, make_options
+    from shadowpuppet.pipeline.track import Listener, look_at, track_recording
     from shadowpuppet.report.page import write_report
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
@@ -54,11 +54,11 @@ _HOMES = {
     "read_calibration": "io.calibration.calibration_files", "write_calibration": "io.calibration.calibration_files",
     "read_joints": "io.motion.table", "write_joints": "io.motion.table", "Person": "io.person", "read_person": "io.person",
     "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording", "Run": "io.run", "read_run": "io.run",
-    "Look": "look", "evaluate": "motion.metrics", "JointTable": "motion.motion", "Motion": "motion.motion", "Options": "options",
-    "make_options": "options", "Listener": "pipeline", "look_at": "pipeline", "track_recording": "pipeline",
-    "Picture": "camera.rasterize", "MonocularSettings": "tracking.monocular.settings", "make_settings": "tracking.monocular.settings",
-    "SilhouetteSettings": "silhouette", "learn_background": "silhouette", "synthesize": "synthetic",
-    "MonocularTracker": "tracking.monocular.tracker", "open_frames": "video", "write_frames": "video",
+    "Look": "pipeline.look", "evaluate": "motion.metrics", "JointTable": "motion.motion", "Motion": "motion.motion",
+    "Options": "pipeline.options", "make_options": "pipeline.options", "Listener": "pipeline.track", "look_at": "pipeline.track",
+    "track_recording": "pipeline.track", "Picture": "camera.rasterize", "MonocularSettings": "tracking.monocular.settings",
+    "make_settings": "tracking.monocular.settings", "SilhouetteSettings": "silhouette", "learn_background": "silhouette",
+    "synthesize": "synthetic", "MonocularTracker": "tracking.monocular.tracker", "open_frames": "video", "write_frames": "video",
     "MotionPrior": "motion.prior.motion_prior", "PriorSettings": "motion.prior.settings", "choose_regions": "motion.prior.vqpca",
     "fit_prior": "motion.prior.vqpca", "read_prior": "io.prior", "write_prior": "io.prior",
     "HullSettings": "tracking.multiview.settings", "SurfacePoints": "tracking.multiview.surface.visual_hull",
@@ -67,8 +67,8 @@ _HOMES = {
     "read_humaneva": "io.humaneva", "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
     "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation", "Evaluation": "evaluation",
-    "measure_run": "evaluation", "read_truth": "io.motion.truth", "write_report": "report.page", "open_footage": "footage",
-    "read_masks": "footage",
+    "measure_run": "evaluation", "read_truth": "io.motion.truth", "write_report": "report.page", "open_footage": "pipeline.footage",
+    "read_masks": "pipeline.footage",
 }  # fmt: skip
 """Where each public name lives."""
 

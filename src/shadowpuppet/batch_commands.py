@@ -40,10 +40,10 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
 
     Begun again, it does what is missing or failed. Exit code 3: some runs failed, the others are done.
     """
-    from shadowpuppet.batch.grid import make_grid, read_grid, seeds_of
-    from shadowpuppet.batch.picture import can_plot, plot_batch
-    from shadowpuppet.batch.run import run_batch
     from shadowpuppet.batch_terminal import batch_table, batch_terminal
+    from shadowpuppet.pipeline.batch.grid import make_grid, read_grid, seeds_of
+    from shadowpuppet.pipeline.batch.plot import can_plot, plot_batch
+    from shadowpuppet.pipeline.batch.run import run_batch
     from shadowpuppet.terminal import show
 
     grid = read_grid(config, given(flags)) if config is not None else make_grid(flags=given(flags))

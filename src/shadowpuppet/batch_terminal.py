@@ -13,11 +13,11 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from shadowpuppet.batch.crew import BatchListener, Outcome
-from shadowpuppet.batch.picture import MEASURES, measured, rows_of
-from shadowpuppet.batch.plan import Task
-from shadowpuppet.batch.run import Batch
-from shadowpuppet.batch.summary import BatchRun
+from shadowpuppet.pipeline.batch.plot import MEASURES, measured, rows_of
+from shadowpuppet.pipeline.batch.run import Batch
+from shadowpuppet.pipeline.batch.summary import BatchRun
+from shadowpuppet.pipeline.batch.tasks import Task
+from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome
 from shadowpuppet.tables import pairs, plain_table
 from shadowpuppet.terminal import Terminal, terminal
 

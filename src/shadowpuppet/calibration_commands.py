@@ -19,8 +19,8 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
     turned; and by how many frames each film is late."""
     from shadowpuppet.calibration_tables import check_table
-    from shadowpuppet.rig import open_rig
-    from shadowpuppet.rig_check import check_rig
+    from shadowpuppet.pipeline.check_calibration import check_rig
+    from shadowpuppet.pipeline.footage_rig import open_rig
     from shadowpuppet.terminal import show, show_json, terminal
 
     if recording.is_file() and is_explained(recording):

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from shadowpuppet.calibration.overview import SIDE, CalibrationLook, Standpoint
-from shadowpuppet.rig_check import RigCheck
+from shadowpuppet.pipeline.check_calibration import RigCheck
 from shadowpuppet.tables import pairs, plain_table
 
 ARROWS = "→↗↑↖←↙↓↘"

@@ -76,7 +76,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     First prints what it found, as `info` does.
     More settings are listed by `shadowpuppet settings`; each is a flag, such as --tracker.arm.particles 300.
     """
-    from shadowpuppet.pipeline import track_recording
+    from shadowpuppet.pipeline.track import track_recording
     from shadowpuppet.terminal import terminal
 
     options = options_from(flags, config)
@@ -131,7 +131,7 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
     if calibration_commands.is_explained(recording):
         return calibration_commands.explain(recording, to, unit, up, as_json)
     calibration_commands.refuse_for_recordings(recording, to, unit, up)
-    from shadowpuppet.pipeline import look_at
+    from shadowpuppet.pipeline.track import look_at
     from shadowpuppet.terminal import show_json, terminal
 
     with terminal(quiet=as_json) as shown:
@@ -153,7 +153,7 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
     """
     from dataclasses import replace
 
-    from shadowpuppet.demo import run_demo
+    from shadowpuppet.pipeline.demo import run_demo
     from shadowpuppet.terminal import terminal
 
     options = replace(options_from(flags, config), overlay=True)
@@ -169,8 +169,8 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
                    config: Config = None, quiet: Quiet = False, flags: ForLook = None) -> None:
     """Measure a person once, from reference pictures or the film, or from several cameras' first seconds; `track --person` uses the sizes
     again."""
-    from shadowpuppet.fitting import Found
-    from shadowpuppet.pipeline import fit_person
+    from shadowpuppet.pipeline.person import Found
+    from shadowpuppet.pipeline.track import fit_person
     from shadowpuppet.tables import curves_table, fit_table, measured_table, sizes_table
     from shadowpuppet.terminal import show, terminal
 
@@ -205,7 +205,7 @@ def synthesize(spec: SpecPath = None, /, *,
     made = spec_of(spec, like, seed, flags)
     if show_spec:
         return print(spec_text(made), end="")
-    from shadowpuppet.making import make_recording
+    from shadowpuppet.pipeline.synthesize import make_recording
     from shadowpuppet.tables import made_table
 
     folder = folder or Path(made.name)
@@ -224,7 +224,7 @@ def settings(*, preset: str = "default") -> None:
     preset
         Settings to begin with: default, liu2011 or ni2008.
     """
-    from shadowpuppet.options import make_options, options_text
+    from shadowpuppet.pipeline.options import make_options, options_text
 
     print("# Settings of `shadowpuppet track`; a setting particles in the table [tracker.arm] is the flag --tracker.arm.particles.\n")
     print(options_text(make_options({"preset": preset})))

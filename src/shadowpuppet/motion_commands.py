@@ -33,7 +33,7 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .c
     """
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.motion.prior.settings import PriorSettings
-    from shadowpuppet.priors import prior_from_files
+    from shadowpuppet.pipeline.learn_prior import prior_from_files
     from shadowpuppet.settings import validate
     from shadowpuppet.tables import prior_tables
     from shadowpuppet.terminal import show, terminal

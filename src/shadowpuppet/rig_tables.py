@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Group, RenderableType
 
-from shadowpuppet.rig_look import CameraLook, RigLook
+from shadowpuppet.pipeline.look_rig import CameraLook, RigLook
 from shadowpuppet.tables import pairs, plain_table
 
 

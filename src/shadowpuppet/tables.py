@@ -12,13 +12,13 @@ from rich.table import Table
 from rich.text import Text
 
 from shadowpuppet.body.sizes import CardboxSizes, Sizes
-from shadowpuppet.fitting import Found
 from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.look import Look
 from shadowpuppet.motion.metrics import FAR, LOST
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.training import Trained
+from shadowpuppet.pipeline.look import Look
+from shadowpuppet.pipeline.person import Found
 from shadowpuppet.synthetic.spec import Spec
 
 BARS = "▁▂▃▄▅▆▇█"

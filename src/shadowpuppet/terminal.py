@@ -14,9 +14,9 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
-from shadowpuppet.look import Look
+from shadowpuppet.pipeline.look import Look
+from shadowpuppet.pipeline.look_rig import RigLook
 from shadowpuppet.printing import show
-from shadowpuppet.rig_look import RigLook
 from shadowpuppet.rig_tables import rig_look_table
 from shadowpuppet.tables import look_table
 
@@ -120,6 +120,6 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
 
 def show_json(value: Any) -> None:
     """Print a value as JSON."""
-    from shadowpuppet.pipeline import json_text
+    from shadowpuppet.pipeline.track import json_text
 
     print(json_text(value))

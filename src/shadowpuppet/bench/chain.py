@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.options import make_options
-from shadowpuppet.pipeline import Listener, track_recording
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.track import Listener, track_recording
 from shadowpuppet.synthetic import Gesture, Scene, Spec, synthesize
 from shadowpuppet.video import open_frames, write_frames
 

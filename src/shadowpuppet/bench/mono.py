@@ -15,7 +15,7 @@ from shadowpuppet.bench.curves import curves
 from shadowpuppet.bench.rivals import OpenCV, one_thread
 from shadowpuppet.bench.startup import start_times
 from shadowpuppet.bench.timing import Contender, Times, in_turns
-from shadowpuppet.pipeline import Listener
+from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.tracking.monocular.settings import make_settings
 
 ROUNDS, FEW = 41, 7

@@ -15,7 +15,7 @@ from shadowpuppet.bench.ring import Around, RingFollower
 from shadowpuppet.bench.ring_film import ring_recording
 from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.geometry import Array
-from shadowpuppet.pipeline import Listener
+from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings
 
 ROUNDS, FEW = 21, 3

@@ -7,7 +7,7 @@ from typing import Any
 from shadowpuppet.bench.machine import environment
 from shadowpuppet.bench.mono import run_mono
 from shadowpuppet.bench.multi import run_multi
-from shadowpuppet.pipeline import Listener
+from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.threads import one_blas_thread
 
 

@@ -27,9 +27,9 @@ from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.vigil import Vigil
 from shadowpuppet.live.warming import warm_up
 from shadowpuppet.motion.metrics import evaluate
-from shadowpuppet.options import Options, plain_options
 from shadowpuppet.outlets.outlet import Outlets, Subject
-from shadowpuppet.pipeline import Listener, named_body
+from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.track import Listener, named_body
 from shadowpuppet.settings import validate
 from shadowpuppet.video.capture import Capture
 from shadowpuppet.video.live_source import Feed, open_feed

@@ -12,7 +12,6 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.display.view import Angle, View
-from shadowpuppet.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.learning import Learner
 from shadowpuppet.live.settings import LiveSettings
@@ -20,8 +19,9 @@ from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.vigil import Vigil
 from shadowpuppet.live.waiting import Waiter, unfit
 from shadowpuppet.motion.motion import BLANK, MotionFrame
-from shadowpuppet.options import Options
-from shadowpuppet.pipeline import motion_frame, named_body, next_state
+from shadowpuppet.pipeline.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.track import motion_frame, named_body, next_state
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import Fit, find_person
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State

@@ -8,11 +8,11 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
-from shadowpuppet.footage import worked_size
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.live.learning import KEPT
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.footage import worked_size
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette.background import spread
 from shadowpuppet.video import Image, Size, open_frames
 

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from shadowpuppet.footage import Mask
+from shadowpuppet.pipeline.footage import Mask
 from shadowpuppet.silhouette.quality import CONTACT, NEARLY_ALL
 
 NOBODY, TOO_NEAR = 0.015, 0.6

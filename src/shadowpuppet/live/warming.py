@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import Guess, find_person
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

@@ -15,14 +15,14 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation
-from shadowpuppet.footage import footage_of, opened
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import LOST
 from shadowpuppet.motion.motion import BLANK, JointTable
 from shadowpuppet.motion.synchronization import at_times, match, step_of
-from shadowpuppet.options import Options, make_options
-from shadowpuppet.rig import chosen_views
-from shadowpuppet.rig_overlay import grid_of
+from shadowpuppet.pipeline.footage import footage_of, opened
+from shadowpuppet.pipeline.footage_rig import chosen_views
+from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.pipeline.overlay_video import grid_of
 
 if TYPE_CHECKING:
     from shadowpuppet.video import Image

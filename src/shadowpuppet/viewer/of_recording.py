@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.footage import Footage, footage_of, opened
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.truth import read_truth
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.options import Options
-from shadowpuppet.rig import chosen_views
+from shadowpuppet.pipeline.footage import Footage, footage_of, opened
+from shadowpuppet.pipeline.footage_rig import chosen_views
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.figures import of_table
 from shadowpuppet.viewer.seen import FilmSeen, hull_of

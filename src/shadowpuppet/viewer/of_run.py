@@ -13,7 +13,6 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation import Evaluation, measure_run
-from shadowpuppet.footage import opened
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.motion.motion_table import dof_unit
@@ -22,7 +21,8 @@ from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.body_animation import motion_animation
 from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.options import Options, make_options
+from shadowpuppet.pipeline.footage import opened
+from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.viewer.figures import of_animation, of_table
 from shadowpuppet.viewer.of_recording import eyes_of
 from shadowpuppet.viewer.particles import Rerun

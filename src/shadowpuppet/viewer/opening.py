@@ -11,7 +11,7 @@ from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
 from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
 from shadowpuppet.io.motion.motion_files import ENDINGS
 from shadowpuppet.io.prior import FORMAT
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.of_file import show_calibration, show_motion
 from shadowpuppet.viewer.of_prior import show_prior
 from shadowpuppet.viewer.of_recording import show_recording

@@ -11,7 +11,7 @@ import numpy as np
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.running import Listener
+from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.viewer.pictures import Look
 from shadowpuppet.viewer.server import POLICY, close_server, open_server
 from shadowpuppet.viewer.show import Show

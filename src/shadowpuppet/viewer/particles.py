@@ -14,7 +14,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.body_animation import fitted
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.multiview.observation import Evidence
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull

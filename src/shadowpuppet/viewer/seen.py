@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetWarning, SilhouetteError, VideoError
-from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Shot, Silhouettes, silhouettes, take_sample
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Mask, Shot, Silhouettes, silhouettes, take_sample
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image

@@ -18,10 +18,10 @@ from shadowpuppet.calibration.time_offset import Lateness, lateness
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
-from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
-from shadowpuppet.options import Options
-from shadowpuppet.rig import Rig, follow, usable_cores
-from shadowpuppet.running import Listener
+from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
+from shadowpuppet.pipeline.footage_rig import Rig, follow, usable_cores
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import Listener
 
 SETS, FEWEST, LONGEST = 240, 120, 3000
 """Sets of silhouettes that are compared, so many at least where the films are long enough, and among how many they are looked for."""

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.batch.crew import Alone, BatchListener, Crew, Outcome, Processes
-from shadowpuppet.batch.grid import PLAIN, Case, Grid
-from shadowpuppet.batch.plan import Task, Track, make_tasks
-from shadowpuppet.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
-from shadowpuppet.batch.task import PART, PLAN, RUNS
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, shown
 from shadowpuppet.io.files.plain import for_toml
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import reason, write_whole
 from shadowpuppet.io.run import versions
+from shadowpuppet.pipeline.batch.grid import PLAIN, Case, Grid
+from shadowpuppet.pipeline.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
+from shadowpuppet.pipeline.batch.task import PART, PLAN, RUNS
+from shadowpuppet.pipeline.batch.tasks import Task, Track, make_tasks
+from shadowpuppet.pipeline.batch.workers import Alone, BatchListener, Crew, Outcome, Processes
 from shadowpuppet.threads import usable_cores
 
 LOCK, FAILURES = ".lock", "failed"
@@ -157,7 +157,7 @@ class _Work:
 
 def _crew(out: Path, scheduler: str | None, workers: int, threads: int, reuse: bool, listener: BatchListener) -> Crew:
     if scheduler is not None:
-        from shadowpuppet.batch.cluster import Cluster
+        from shadowpuppet.pipeline.batch.cluster import Cluster
 
         return Cluster(scheduler, out, f"{time.time():.6f}", reuse, listener)
     return Processes(out, workers, threads, reuse, listener) if workers else Alone(out, reuse, listener)

@@ -15,10 +15,10 @@ from shadowpuppet.calibration.agreement import Agreement, agreement
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import ShadowPuppetWarning, TrackingError
-from shadowpuppet.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
-from shadowpuppet.look import GOOD, mean_overlap, quality_of
-from shadowpuppet.options import Options
-from shadowpuppet.rig import Rig, follow
+from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
+from shadowpuppet.pipeline.footage_rig import Rig, follow
+from shadowpuppet.pipeline.look import GOOD, mean_overlap, quality_of
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.silhouette.quality import MaskQuality
 from shadowpuppet.threads import usable_cores

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.batch.summary import BatchRun
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.files.text import reason
+from shadowpuppet.pipeline.batch.summary import BatchRun
 
 MEASURES = ((("errors", "mean_mm"), "mean joint error, mm"), (("overlap", "mean"), "mean overlap with the silhouettes"))
 """What is drawn, where it was measured: places in metrics.json, and words."""

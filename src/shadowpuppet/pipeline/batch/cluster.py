@@ -6,9 +6,9 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from shadowpuppet.batch.crew import BatchListener, Outcome
-from shadowpuppet.batch.plan import Task
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.pipeline.batch.tasks import Task
+from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -21,8 +21,8 @@ _kept = threading.local()
 
 def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome:
     """One task, on a worker of a cluster; `start`: of the batch, at which recordings may have changed."""
-    from shadowpuppet.batch.task import do
-    from shadowpuppet.repeats import Repeats
+    from shadowpuppet.pipeline.batch.task import do
+    from shadowpuppet.pipeline.silhouette_cache import Repeats
     from shadowpuppet.threads import limit_threads
 
     limit_threads()

@@ -21,7 +21,7 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.training import RATE, Trained, matched, train_prior
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.threads import one_blas_thread
 
 CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)

@@ -11,16 +11,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.batch.grid import MOST, Case
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.io.files.plain import plain
-from shadowpuppet.options import PATHS, make_options, plain_options
-from shadowpuppet.repeats import film_of
+from shadowpuppet.pipeline.batch.grid import MOST, Case
+from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
+from shadowpuppet.pipeline.silhouette_cache import film_of
 
 Track = Callable[..., Any]
 """Makes a run folder, as `pipeline.track_recording` does: of a recording, a folder, `Options`, a `Listener` or none, `Repeats` or none."""
-TRACK = "shadowpuppet.pipeline:track_recording"
+TRACK = "shadowpuppet.pipeline.track:track_recording"
 """What makes a run unless something else is to."""
 PARTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
 """What of a recording's folder a run depends on; other files may come and go."""

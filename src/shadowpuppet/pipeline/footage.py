@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices
 from shadowpuppet.io.recording import Recording, View, read_recording
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
 

@@ -14,11 +14,11 @@ from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.options import Options
-from shadowpuppet.priors import familiar
-from shadowpuppet.rig import Rig
-from shadowpuppet.rig_look import Opening
-from shadowpuppet.rig_run import Puppet
+from shadowpuppet.pipeline.footage_rig import Rig
+from shadowpuppet.pipeline.learn_prior import familiar
+from shadowpuppet.pipeline.look_rig import Opening
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.track_rig import Puppet
 from shadowpuppet.tracking.multiview.size_estimation import likely_height, measure, spread_of
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker

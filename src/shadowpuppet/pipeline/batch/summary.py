@@ -9,12 +9,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.batch.plan import Task
-from shadowpuppet.batch.task import RUNS, read_mark
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.files.table import csv_line
 from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.io.motion.parquet import write_lists
+from shadowpuppet.pipeline.batch.task import RUNS, read_mark
+from shadowpuppet.pipeline.batch.tasks import Task
 
 TABLES = ("csv", "parquet")
 """Formats of the summary."""

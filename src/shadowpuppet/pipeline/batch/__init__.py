@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shadowpuppet.batch.grid import Case, Grid, make_grid, read_grid
-    from shadowpuppet.batch.run import Batch, BatchListener, run_batch
+    from shadowpuppet.pipeline.batch.grid import Case, Grid, make_grid, read_grid
+    from shadowpuppet.pipeline.batch.run import Batch, BatchListener, run_batch
 
 __all__ = ["Batch", "BatchListener", "Case", "Grid", "make_grid", "read_grid", "run_batch"]
 _HOMES = {"Batch": "run", "BatchListener": "run", "run_batch": "run", "Case": "grid", "Grid": "grid", "make_grid": "grid",
@@ -18,5 +18,5 @@ def __getattr__(name: str) -> object:
     from importlib import import_module
 
     if name not in _HOMES:
-        raise AttributeError(f"module 'shadowpuppet.batch' has no attribute {name!r}")
-    return getattr(import_module(f"shadowpuppet.batch.{_HOMES[name]}"), name)
+        raise AttributeError(f"module 'shadowpuppet.pipeline.batch' has no attribute {name!r}")
+    return getattr(import_module(f"shadowpuppet.pipeline.batch.{_HOMES[name]}"), name)

@@ -15,10 +15,10 @@ from collections import deque
 from pathlib import Path
 from typing import Any, Protocol, Self
 
-from shadowpuppet.batch.plan import Task
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.repeats import Repeats
-from shadowpuppet.running import Listener
+from shadowpuppet.pipeline.batch.tasks import Task
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.silhouette_cache import Repeats
 from shadowpuppet.threads import POOLS
 
 Outcome = dict[str, Any]
@@ -87,7 +87,7 @@ class Alone:
 
     def next(self) -> tuple[Task, Outcome]:
         """Do one."""
-        from shadowpuppet.batch.task import do
+        from shadowpuppet.pipeline.batch.task import do
 
         task = self._waiting.popleft()
         return task, do(task.wire(), self._out, self._repeats, _Told(self._listener, task))
@@ -115,7 +115,7 @@ class _Worker:
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
         path = os.pathsep.join([str(Path(__file__).parents[2]), *(entry or os.getcwd() for entry in sys.path)])
         environment = os.environ | dict.fromkeys(POOLS, str(threads)) | {"PYTHONPATH": path, "PYTHONUTF8": "1"}
-        self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.batch.worker", str(out)], env=environment,
+        self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.pipeline.batch.worker", str(out)], env=environment,
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors, text=True, encoding="utf-8")
         threading.Thread(target=self._listen, args=(said,), daemon=True).start()
 

@@ -14,11 +14,11 @@ from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
-from shadowpuppet.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, Guess, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

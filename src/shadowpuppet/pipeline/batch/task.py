@@ -15,13 +15,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.batch.plan import named
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.io.run import versions
-from shadowpuppet.options import make_options
-from shadowpuppet.repeats import Repeats
-from shadowpuppet.running import Listener
+from shadowpuppet.pipeline.batch.tasks import named
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.silhouette_cache import Repeats
 
 MARK, PART, PLAN, RUNS = "task.json", ".part", "batch.toml", "runs"
 """The file that says which task a run folder is of, written last; the end of the name of one that grows; what makes a folder a batch's;

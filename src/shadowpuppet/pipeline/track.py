@@ -14,22 +14,20 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.fitting import Found
-from shadowpuppet.footage import opened
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.look import Look, Prepared, check, prepare
 from shadowpuppet.motion.motion import BLANK, MotionFrame
-from shadowpuppet.options import Options, plain_options
-from shadowpuppet.repeats import Repeats
-from shadowpuppet.rig import chosen_views, open_rig
-from shadowpuppet.rig_fitting import prepare_puppet
-from shadowpuppet.rig_look import RigLook, check_rig, look_at_rig
-from shadowpuppet.rig_overlay import OverlayWriter
-from shadowpuppet.rig_run import Puppet, track_rig, training_of
-from shadowpuppet.running import (
+from shadowpuppet.pipeline.footage import opened
+from shadowpuppet.pipeline.footage_rig import chosen_views, open_rig
+from shadowpuppet.pipeline.look import Look, Prepared, check, prepare
+from shadowpuppet.pipeline.look_rig import RigLook, check_rig, look_at_rig
+from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.overlay_video import OverlayWriter
+from shadowpuppet.pipeline.person import Found
+from shadowpuppet.pipeline.person_rig import prepare_puppet
+from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
     Listener,
     Summary,
@@ -41,6 +39,8 @@ from shadowpuppet.running import (
     tracked,
     warn_of_losses,
 )
+from shadowpuppet.pipeline.silhouette_cache import Repeats
+from shadowpuppet.pipeline.track_rig import Puppet, track_rig, training_of
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from shadowpuppet.camera.drawing import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, overlay_frame, write_text
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion.motion import MotionFrame
-from shadowpuppet.rig import FrameSet
+from shadowpuppet.pipeline.footage_rig import FrameSet
 from shadowpuppet.video import FrameWriter, Image
 
 if TYPE_CHECKING:  # both bring much with them

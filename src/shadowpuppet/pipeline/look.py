@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.fitting import Found, find, told_scale
-from shadowpuppet.footage import Footage, Mask, Sample, Silhouettes, clear_silhouettes, open_footage, silhouettes, take_sample
 from shadowpuppet.motion.metrics import overlap
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.footage import Footage, Mask, Sample, Silhouettes, clear_silhouettes, open_footage, silhouettes, take_sample
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.person import Found, find, told_scale
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 

@@ -22,11 +22,22 @@ from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
-from shadowpuppet.options import Options, plain_options
-from shadowpuppet.rig import FrameSet, Rig, follow, open_rig
-from shadowpuppet.rig_look import Opening, PreparedRig, RigLook, check_rig, look_at_rig
-from shadowpuppet.rig_overlay import RigOverlayWriter
-from shadowpuppet.running import RIG_STAGES, Listener, Summary, Watch, evaluated, generators, json_text, timings, tracked, warn_of_losses
+from shadowpuppet.pipeline.footage_rig import FrameSet, Rig, follow, open_rig
+from shadowpuppet.pipeline.look_rig import Opening, PreparedRig, RigLook, check_rig, look_at_rig
+from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.overlay_video import RigOverlayWriter
+from shadowpuppet.pipeline.progress import (
+    RIG_STAGES,
+    Listener,
+    Summary,
+    Watch,
+    evaluated,
+    generators,
+    json_text,
+    timings,
+    tracked,
+    warn_of_losses,
+)
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 

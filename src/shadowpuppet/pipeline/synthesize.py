@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.errors import RecordingError, SettingsError
 from shadowpuppet.io.recording import POSTURES, Recording, read_recording
-from shadowpuppet.pipeline import Listener
+from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.synthetic import Spec, synthesize
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.spec_file import HEAD, SPEC_FILE, read_spec

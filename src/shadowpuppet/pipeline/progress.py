@@ -18,11 +18,11 @@ from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.motion.truth import read_truth
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.look import Look
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.options import Options
-from shadowpuppet.rig_look import RigLook
+from shadowpuppet.pipeline.look import Look
+from shadowpuppet.pipeline.look_rig import RigLook
+from shadowpuppet.pipeline.options import Options
 
 Item = TypeVar("Item")
 STAGES = ("decode", "segment", "track", "write")

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.footage import Footage, Mask, Shot, Silhouettes
-from shadowpuppet.look import Prepared, survey, with_person
-from shadowpuppet.options import Options, plain_options
+from shadowpuppet.pipeline.footage import Footage, Mask, Shot, Silhouettes
+from shadowpuppet.pipeline.look import Prepared, survey, with_person
+from shadowpuppet.pipeline.options import Options, plain_options
 
 SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "max_size", "every", "silhouette")
 """Options that survey and silhouettes depend on."""

@@ -1,4 +1,4 @@
-"""A worker process: `python -m shadowpuppet.batch.worker OUT`. Tasks come as lines of JSON, and what comes of them goes so."""
+"""A worker process: `python -m shadowpuppet.pipeline.batch.worker OUT`. Tasks come as lines of JSON, and what comes of them goes so."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def _say(out: TextIO, said: dict[str, Any]) -> None:
 
 
 def _work(folder: str, get: Callable[[], dict[str, Any]], say: Callable[..., None]) -> None:
-    from shadowpuppet.batch.task import do
-    from shadowpuppet.repeats import Repeats
-    from shadowpuppet.running import Listener
+    from shadowpuppet.pipeline.batch.task import do
+    from shadowpuppet.pipeline.progress import Listener
+    from shadowpuppet.pipeline.silhouette_cache import Repeats
     from shadowpuppet.threads import limit_threads
 
     class Tell(Listener):

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 from shadowpuppet.errors import SettingsError, shown
 from shadowpuppet.io.calibration.calibration_files import read_toml
-from shadowpuppet.options import PATHS, make_options, over, settings_in
+from shadowpuppet.pipeline.options import PATHS, make_options, over, settings_in
 
 MOST = 100_000
 """Combinations, or seeds, beyond which a grid is taken for a mistake."""

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError, VideoError, choices
-from shadowpuppet.footage import Footage, Mask, Shot, footage_of, opened
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.options import Options
+from shadowpuppet.pipeline.footage import Footage, Mask, Shot, footage_of, opened
+from shadowpuppet.pipeline.options import Options
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video import Image
 from shadowpuppet.video.frames import ASSUMED_RATE

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import VideoError
-from shadowpuppet.making import Drawing
-from shadowpuppet.options import Options
-from shadowpuppet.pipeline import Listener, Summary, track_recording
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.synthesize import Drawing
+from shadowpuppet.pipeline.track import Listener, Summary, track_recording
 from shadowpuppet.synthetic import Spec, demo_ring_spec, demo_spec, synthesize
 from shadowpuppet.video import open_frames, write_image
 
