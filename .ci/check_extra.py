@@ -37,9 +37,9 @@ def live(folder: Path) -> None:
     from websockets.sync.client import connect
 
     from shadowpuppet.body.models import average_sizes, make_body
-    from shadowpuppet.outlets.choice import open_outlets
-    from shadowpuppet.outlets.outlet import Subject
-    from shadowpuppet.outlets.settings import OutletSettings
+    from shadowpuppet.live.stream.choice import open_outlets
+    from shadowpuppet.live.stream.outlet import Subject
+    from shadowpuppet.live.stream.settings import OutletSettings
 
     with open_outlets(OutletSettings(websocket="0")) as outlets:
         outlets.begin(Subject(make_body("rounded", average_sizes("rounded", 1.75)), np.eye(4)))
@@ -50,7 +50,7 @@ def live(folder: Path) -> None:
 def lsl(folder: Path) -> None:
     """A stream is announced; where pylsl brings no liblsl, that is said."""
     from shadowpuppet.errors import SettingsError
-    from shadowpuppet.outlets.lsl import LslOutlet
+    from shadowpuppet.live.stream.lsl import LslOutlet
 
     try:
         LslOutlet("check")

@@ -17,13 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import people
-from shadowpuppet.display import choice, window
-from shadowpuppet.display.choice import open_display
-from shadowpuppet.display.drawing import drawn
-from shadowpuppet.display.view import Angle, Display, View
-from shadowpuppet.display.web import PORT, WebDisplay
-from shadowpuppet.display.window import WindowDisplay
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
+from shadowpuppet.live.display import choice, window
+from shadowpuppet.live.display.choice import open_display
+from shadowpuppet.live.display.drawing import drawn
+from shadowpuppet.live.display.view import Angle, Display, View
+from shadowpuppet.live.display.web import PORT, WebDisplay
+from shadowpuppet.live.display.window import WindowDisplay
 from shadowpuppet.network import is_loopback, known_host
 from shadowpuppet.video import read_image
 

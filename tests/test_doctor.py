@@ -112,7 +112,7 @@ def test_what_is_not_there_is_told_with_what_would_bring_it(monkeypatch):
 
 
 def test_a_window_that_cannot_be_opened_is_told(monkeypatch):
-    from shadowpuppet.display import choice, window
+    from shadowpuppet.live.display import choice, window
 
     monkeypatch.setattr(choice, "has_screen", lambda: True)
     monkeypatch.setattr(window, "no_window", lambda: "Python's tkinter is not installed")

@@ -25,11 +25,11 @@ import made
 from listeners import OscEar
 from live_film import EMPTY, FLAGS, FOV, HEIGHT, QUICK, RATE, frames
 from shadowpuppet import cli
-from shadowpuppet.display.view import Display
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.live import run as live_run
+from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.run import LiveListener, run_live
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.pipeline.options import make_options

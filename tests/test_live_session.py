@@ -12,13 +12,13 @@ import pytest
 from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.live.background import in_background
-from shadowpuppet.live.learning import Learner, moved
+from shadowpuppet.live.background_phase import in_background
+from shadowpuppet.live.learning_phase import Learner, moved
+from shadowpuppet.live.phases import Waiter, unfit
 from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
-from shadowpuppet.live.vigil import FIRST_PATIENCE, Vigil
-from shadowpuppet.live.waiting import Waiter, unfit
+from shadowpuppet.live.watchdog import FIRST_PATIENCE, Vigil
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.settings import validate
 from shadowpuppet.video.live_source import Snapshot

@@ -29,19 +29,19 @@ from shadowpuppet import cli
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import inverse, transform
 from shadowpuppet.io.run import read_run
+from shadowpuppet.live.play import play_run
 from shadowpuppet.live.run import LiveListener
+from shadowpuppet.live.stream import websocket
+from shadowpuppet.live.stream.avatar import Avatar
+from shadowpuppet.live.stream.choice import open_outlets
+from shadowpuppet.live.stream.json_messages import beginning, framed
+from shadowpuppet.live.stream.osc import Message, Sender, bundles, encoded
+from shadowpuppet.live.stream.outlet import Outlet, Outlets, Subject
+from shadowpuppet.live.stream.settings import OutletSettings
+from shadowpuppet.live.stream.vmc import VmcOutlet, messages
+from shadowpuppet.live.stream.websocket import WebSocketOutlet
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.network import host_and_port
-from shadowpuppet.outlets import websocket
-from shadowpuppet.outlets.avatar import Avatar
-from shadowpuppet.outlets.choice import open_outlets
-from shadowpuppet.outlets.json_messages import beginning, framed
-from shadowpuppet.outlets.osc import Message, Sender, bundles, encoded
-from shadowpuppet.outlets.outlet import Outlet, Outlets, Subject
-from shadowpuppet.outlets.settings import OutletSettings
-from shadowpuppet.outlets.vmc import VmcOutlet, messages
-from shadowpuppet.outlets.websocket import WebSocketOutlet
-from shadowpuppet.playing import play_run
 
 JOINTS = {"Hips": "pelvis", "Neck": "neck", "Head": "head"}
 for _Side, _side in (("Left", "left"), ("Right", "right")):

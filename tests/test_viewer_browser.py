@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import made
-from shadowpuppet.display.view import Angle, View
+from shadowpuppet.live.display.view import Angle, View
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.viewer.opening import between, show_of

@@ -97,11 +97,11 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     """
     from time import strftime
 
-    from shadowpuppet.display.choice import open_display
+    from shadowpuppet.live.display.choice import open_display
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.settings import LiveSettings
-    from shadowpuppet.outlets.choice import open_outlets
-    from shadowpuppet.outlets.settings import OutletSettings
+    from shadowpuppet.live.stream.choice import open_outlets
+    from shadowpuppet.live.stream.settings import OutletSettings
     from shadowpuppet.settings import validate
     from shadowpuppet.terminal import terminal
 

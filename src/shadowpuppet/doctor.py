@@ -180,8 +180,8 @@ def _extras() -> Iterator[Finding]:
 
 
 def _window() -> Iterator[Finding]:
-    from shadowpuppet.display.choice import has_screen
-    from shadowpuppet.display.window import no_window
+    from shadowpuppet.live.display.choice import has_screen
+    from shadowpuppet.live.display.window import no_window
 
     why = no_window() if has_screen() else "no screen"
     if why:

@@ -13,8 +13,8 @@ from pydantic import BeforeValidator
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.outlets.settings import OutletSettings
 from shadowpuppet.pipeline.options import PATHS, Options, make_options, over, read_options
 from shadowpuppet.settings import default_of, settings_of, validate
 from shadowpuppet.synthetic.collection import named_specs

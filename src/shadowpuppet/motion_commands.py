@@ -152,9 +152,9 @@ def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made
         Begin again at the end, until Ctrl-C.
     """
     from shadowpuppet.errors import SettingsError
-    from shadowpuppet.outlets.choice import open_outlets
-    from shadowpuppet.outlets.settings import OutletSettings
-    from shadowpuppet.playing import play_run
+    from shadowpuppet.live.play import play_run
+    from shadowpuppet.live.stream.choice import open_outlets
+    from shadowpuppet.live.stream.settings import OutletSettings
     from shadowpuppet.settings import validate
     from shadowpuppet.terminal import terminal
 

@@ -90,7 +90,7 @@ def _serve(show: Show, listen: str, port: int | None, opening: bool, quiet: bool
     import contextlib
     import webbrowser
 
-    from shadowpuppet.display.choice import has_screen
+    from shadowpuppet.live.display.choice import has_screen
     from shadowpuppet.viewer.looking import look
 
     def told(address: str) -> None:

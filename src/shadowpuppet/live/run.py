@@ -12,22 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.display.view import Display
 from shadowpuppet.geometry import inverse
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.live.background import in_background
-from shadowpuppet.live.keeping import Keeper
+from shadowpuppet.live.background_phase import in_background
+from shadowpuppet.live.display.view import Display
+from shadowpuppet.live.interrupt import Stop
+from shadowpuppet.live.recorder import Keeper
 from shadowpuppet.live.session import Outcome, Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
-from shadowpuppet.live.stopping import Stop
+from shadowpuppet.live.stream.outlet import Outlets, Subject
 from shadowpuppet.live.timing import Timing
-from shadowpuppet.live.vigil import Vigil
-from shadowpuppet.live.warming import warm_up
+from shadowpuppet.live.warm_up import warm_up
+from shadowpuppet.live.watchdog import Vigil
 from shadowpuppet.motion.metrics import evaluate
-from shadowpuppet.outlets.outlet import Outlets, Subject
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.track import Listener, named_body
 from shadowpuppet.settings import validate

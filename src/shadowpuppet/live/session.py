@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.display.view import Angle, View
 from shadowpuppet.io.person import Person
-from shadowpuppet.live.learning import Learner
+from shadowpuppet.live.display.view import Angle, View
+from shadowpuppet.live.learning_phase import Learner
+from shadowpuppet.live.phases import Waiter, unfit
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
-from shadowpuppet.live.vigil import Vigil
-from shadowpuppet.live.waiting import Waiter, unfit
+from shadowpuppet.live.watchdog import Vigil
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
 from shadowpuppet.pipeline.options import Options

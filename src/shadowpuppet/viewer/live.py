@@ -10,10 +10,10 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.display.choice import FOOTERS
-from shadowpuppet.display.drawing import drawn
-from shadowpuppet.display.view import Display, View
 from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.live.display.choice import FOOTERS
+from shadowpuppet.live.display.drawing import drawn
+from shadowpuppet.live.display.view import Display, View
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.viewer.pictures import Plain

@@ -16,11 +16,11 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
+from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.run import LiveListener
-from shadowpuppet.live.stopping import Stop
+from shadowpuppet.live.stream.outlet import Outlets, Subject
 from shadowpuppet.motion.body_animation import base_in_world
 from shadowpuppet.motion.motion import Motion, MotionFrame
-from shadowpuppet.outlets.outlet import Outlets, Subject
 
 NAP = 0.05
 """Seconds after which Ctrl-C is heeded."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shadowpuppet.camera.drawing import SILHOUETTE_ONLY, draw_skeleton
-from shadowpuppet.display.view import View
+from shadowpuppet.live.display.view import View
 
 if TYPE_CHECKING:
     from shadowpuppet.camera.rasterize import Picture

@@ -6,8 +6,8 @@ import os
 import sys
 import warnings
 
-from shadowpuppet.display.view import Display
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
+from shadowpuppet.live.display.view import Display
 
 FOOTERS = {
     False: "Pictures stay in this machine's memory; joints and angles alone are saved.",
@@ -20,14 +20,14 @@ def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, 
     if show == "none":
         return Display()
     if show in ("auto", "window"):
-        from shadowpuppet.display.window import WindowDisplay, no_window
+        from shadowpuppet.live.display.window import WindowDisplay, no_window
 
         why = no_window() if show == "window" or has_screen() else "no screen"
         if not why:
             return WindowDisplay(FOOTERS[record])
         if show == "window":
             raise SettingsError(f"show: no window can be opened ({why}); --show browser shows the same on a page")
-    from shadowpuppet.display.web import WebDisplay
+    from shadowpuppet.live.display.web import WebDisplay
     from shadowpuppet.network import is_loopback
 
     display = WebDisplay(listen, port, FOOTERS[record])

@@ -10,9 +10,9 @@ from http import HTTPStatus
 from typing import Any, Self
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.live.stream.json_messages import beginning, framed
+from shadowpuppet.live.stream.outlet import Outlet, Subject, Told
 from shadowpuppet.network import host_of, is_loopback, known_host, shown_host
-from shadowpuppet.outlets.json_messages import beginning, framed
-from shadowpuppet.outlets.outlet import Outlet, Subject, Told
 
 KEPT = 16384
 """Bytes that may wait in this machine for who is slow, about as the system takes it: a few frames. They get the newest frame after that."""

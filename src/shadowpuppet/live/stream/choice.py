@@ -7,9 +7,9 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.live.stream.outlet import Outlet, Outlets
+from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.network import host_and_port, is_loopback
-from shadowpuppet.outlets.outlet import Outlet, Outlets
-from shadowpuppet.outlets.settings import OutletSettings
 
 
 def open_outlets(settings: OutletSettings) -> Outlets:
@@ -21,7 +21,7 @@ def open_outlets(settings: OutletSettings) -> Outlets:
 
 
 def _osc(settings: OutletSettings) -> Outlet:
-    from shadowpuppet.outlets.vmc import VmcOutlet
+    from shadowpuppet.live.stream.vmc import VmcOutlet
 
     made = VmcOutlet(*host_and_port(settings.osc or "", "osc"))
     if not made.sender.loopback:
@@ -30,7 +30,7 @@ def _osc(settings: OutletSettings) -> Outlet:
 
 
 def _websocket(settings: OutletSettings) -> Outlet:
-    from shadowpuppet.outlets.websocket import WebSocketOutlet
+    from shadowpuppet.live.stream.websocket import WebSocketOutlet
 
     host, port = host_and_port(settings.websocket or "", "websocket")
     made = WebSocketOutlet(host, port, [origin.strip() for origin in (settings.origin or "").split(",")])
@@ -40,7 +40,7 @@ def _websocket(settings: OutletSettings) -> Outlet:
 
 
 def _lsl(settings: OutletSettings) -> Outlet:
-    from shadowpuppet.outlets.lsl import LslOutlet
+    from shadowpuppet.live.stream.lsl import LslOutlet
 
     made = LslOutlet(settings.lsl or "", settings.lsl_scope)
     if settings.lsl_scope == "machine":

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.geometry import Array, inverse, rotation_about
-from shadowpuppet.outlets.outlet import Subject, Told
+from shadowpuppet.live.stream.outlet import Subject, Told
 
 TO_UNITY = np.array([[0.0, -1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From axes forward, left, up to Unity's right, up, forward: a mirror, for hands change."""

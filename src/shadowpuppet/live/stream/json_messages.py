@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.outlets.outlet import Subject, Told
+from shadowpuppet.live.stream.outlet import Subject, Told
 
 VERSION = 1
 """Of the messages: it grows where a program that reads them must be changed."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from shadowpuppet.display.drawing import drawn
-from shadowpuppet.display.view import Angle, Display, View
+from shadowpuppet.live.display.drawing import drawn
+from shadowpuppet.live.display.view import Angle, Display, View
 
 if TYPE_CHECKING:
     from shadowpuppet.video import Image

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.outlets.outlet import Outlet, Subject, Told
+from shadowpuppet.live.stream.outlet import Outlet, Subject, Told
 
 CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
 """Of liblsl: how far the stream is announced; and that it logs nothing."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from shadowpuppet.live.stream.avatar import Avatar
+from shadowpuppet.live.stream.osc import Message, Sender, bundles
+from shadowpuppet.live.stream.outlet import Outlet, Subject, Told
 from shadowpuppet.network import shown_host
-from shadowpuppet.outlets.avatar import Avatar
-from shadowpuppet.outlets.osc import Message, Sender, bundles
-from shadowpuppet.outlets.outlet import Outlet, Subject, Told
 
 LOADED, CALIBRATED, NORMAL = 1, 3, 0
 """What /VMC/Ext/OK tells: that there is a model, that it is calibrated, and in which mode; last whether the person is seen."""

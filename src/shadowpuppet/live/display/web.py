@@ -12,9 +12,9 @@ from importlib.resources import files
 from typing import Any, Self
 from urllib.parse import urlsplit
 
-from shadowpuppet.display.drawing import drawn, jpeg
-from shadowpuppet.display.view import WISHES, Display, View
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.live.display.drawing import drawn, jpeg
+from shadowpuppet.live.display.view import WISHES, Display, View
 from shadowpuppet.network import is_loopback, known_host, shown_host
 
 PORT = 8600
@@ -125,7 +125,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         if path in PAGE:
             name, kind = PAGE[path]
-            self._answer(files("shadowpuppet.display").joinpath(name).read_bytes(), f"{kind}; charset=utf-8")
+            self._answer(files("shadowpuppet.live.display").joinpath(name).read_bytes(), f"{kind}; charset=utf-8")
         elif path == "/picture.jpg":
             self._answer(self.server.display.picture(*self.server.display.next(0, 0.0)), "image/jpeg")
         elif path == "/picture.mjpeg":
