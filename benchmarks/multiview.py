@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.bench.chain import ONE_EACH
+from shadowpuppet.evaluation.bench.chain import ONE_EACH
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import Recording, read_recording

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from multiview import BUILD, made, measures
 
-from shadowpuppet.bench.chain import ONE_EACH
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.evaluation.bench.chain import ONE_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable

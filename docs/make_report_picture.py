@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from PIL import Image  # which Matplotlib brings
 
-from shadowpuppet.evaluation import measure_run
-from shadowpuppet.report.page import write_report
+from shadowpuppet.evaluation.evaluation import measure_run
+from shadowpuppet.evaluation.report.page import write_report
 from shadowpuppet.video import read_image
 
 TARGET = Path(__file__).parent / "assets" / "report.png"

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.bench.whole import run_bench
+from shadowpuppet.evaluation.bench.run import run_bench
 from shadowpuppet.plots import plot_curves
 from shadowpuppet.tables import BENCHED, BENCHED_SEVERAL
 

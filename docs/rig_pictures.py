@@ -11,12 +11,12 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 
 import naive_limbs
-from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import Array
 
 

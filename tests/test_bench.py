@@ -12,14 +12,14 @@ import pytest
 import made
 from people import random_poses
 from shadowpuppet import cli
-from shadowpuppet.bench import chain, curves, mono, multi, naive, ring_film, whole
-from shadowpuppet.bench.cases import Case, Follower
-from shadowpuppet.bench.files import check_plans, write_figures
-from shadowpuppet.bench.ring import Around
-from shadowpuppet.bench.rivals import OpenCV, one_thread
-from shadowpuppet.bench.timing import Contender, Times, in_turns
 from shadowpuppet.camera import rasterize
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation.bench import chain, curves, mono, multi, multi_film, naive_mono, run
+from shadowpuppet.evaluation.bench.files import check_plans, write_figures
+from shadowpuppet.evaluation.bench.mono_cases import Case, Follower
+from shadowpuppet.evaluation.bench.multi_cases import Around
+from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
+from shadowpuppet.evaluation.bench.timing import Contender, Times, in_turns
 from shadowpuppet.plots import plot_curves
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.stages import FilterStage
@@ -39,7 +39,7 @@ def test_the_naive_filter_has_the_kernels_costs(body, rng):
     case = Case(body)
     poses = random_poses(rng, case.picture.body.skeleton, 8) * 0.5
     every = np.arange(len(case.picture.body.parts))
-    found = [naive.cost(case.picture, pose, every, case.mask) for pose in poses]
+    found = [naive_mono.cost(case.picture, pose, every, case.mask) for pose in poses]
     np.testing.assert_array_equal(found, silhouette_costs(case.picture, Observation.of(case.mask), poses))
 
 
@@ -50,16 +50,16 @@ def test_the_naive_filter_draws_what_a_stage_draws(name, rng):
     poses = np.repeat(case.pose[None], 5, axis=0)
     poses[:, stage.dofs] += 0.2 * rng.standard_normal((5, 4))
     shapes = np.concatenate([stage.partial.moving, stage.partial.still])
-    found = [naive.cost(case.picture, pose, shapes, case.mask) for pose in poses]
+    found = [naive_mono.cost(case.picture, pose, shapes, case.mask) for pose in poses]
     np.testing.assert_array_equal(found, stage.partial.costs(Observation.of(case.mask), case.pose)(poses))
 
 
 def test_the_naive_filter_follows(rng):
     case = Case()
     pose = case.picture.body.skeleton.clamp(0.93 * case.pose[None])[0]
-    before = naive.cost(case.picture, pose, np.arange(15), case.picture.mask(case.pose))
-    after = naive.frame(rng, case.picture, make_settings("liu2011", {"torso_arms": "last"}), pose, case.picture.mask(case.pose), 12)
-    assert naive.cost(case.picture, after, np.arange(15), case.picture.mask(case.pose)) < before
+    before = naive_mono.cost(case.picture, pose, np.arange(15), case.picture.mask(case.pose))
+    after = naive_mono.frame(rng, case.picture, make_settings("liu2011", {"torso_arms": "last"}), pose, case.picture.mask(case.pose), 12)
+    assert naive_mono.cost(case.picture, after, np.arange(15), case.picture.mask(case.pose)) < before
 
 
 @pytest.mark.parametrize("stage", ["full", "arm"])
@@ -111,7 +111,7 @@ def test_a_frame_is_hundreds_of_times_faster_than_the_naive_one():
     case, paper, settings = Case(), Follower("liu2011"), make_settings("liu2011")
     spent = in_turns({
         "step": Contender(paper.run, 10),
-        "naive": Contender(lambda: naive.frame(np.random.default_rng(0), case.picture, settings, case.pose, case.mask, 2), 2 / 200),
+        "naive": Contender(lambda: naive_mono.frame(np.random.default_rng(0), case.picture, settings, case.pose, case.mask, 2), 2 / 200),
     }, 5)  # fmt: skip
     assert spent["naive"].least > 75 * spent["step"].least, spent
 
@@ -125,8 +125,8 @@ def tiny(monkeypatch):
     for module in (mono, multi):
         monkeypatch.setattr(module, "FEW", 1)
     monkeypatch.setattr(multi, "Around", lambda **said: Around(**{"points": 100, "particles": 3} | said, size=(160, 120)))
-    ring = ring_film.ring_spec((160, 120), 5)
-    monkeypatch.setattr(multi, "ring_recording", lambda folder, frames: ring_film.ring_recording(folder, 24, ring, drawn=12))
+    ring = multi_film.ring_spec((160, 120), 5)
+    monkeypatch.setattr(multi, "ring_recording", lambda folder, frames: multi_film.ring_recording(folder, 24, ring, drawn=12))
     monkeypatch.setattr(chain, "long_recording", lambda folder, frames: made.make(folder))
 
 
@@ -137,7 +137,7 @@ def forbidden(monkeypatch):
     def begun(*_):
         raise AssertionError("the work has begun")
 
-    monkeypatch.setattr(whole, "run_bench", begun)
+    monkeypatch.setattr(run, "run_bench", begun)
 
 
 def test_the_command_writes_all_figures(tiny, tmp_path, capsys):

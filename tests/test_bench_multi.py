@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import made
-from shadowpuppet.bench import multi, naive_multi, ring_film
-from shadowpuppet.bench.ring import Around, RingFollower
-from shadowpuppet.bench.timing import Times, in_turns
+from shadowpuppet.evaluation.bench import multi, multi_film, naive_multi
+from shadowpuppet.evaluation.bench.multi_cases import Around, RingFollower
+from shadowpuppet.evaluation.bench.timing import Times, in_turns
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.plots import plot_curves
@@ -135,7 +135,7 @@ def test_the_exponent_of_a_line_is_one():
 
 
 def test_the_films_of_a_ring_go_on_and_on(tmp_path):
-    recording = read_recording(ring_film.ring_recording(tmp_path, 9, ring_film.ring_spec((80, 60), 2), drawn=3))
+    recording = read_recording(multi_film.ring_recording(tmp_path, 9, multi_film.ring_spec((80, 60), 2), drawn=3))
     assert len(recording.views) == 2
     assert recording.truth is None
     for view in recording.views:

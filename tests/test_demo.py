@@ -13,7 +13,7 @@ import pytest
 import made
 from shadowpuppet import cli
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
-from shadowpuppet.evaluation import angle_errors
+from shadowpuppet.evaluation.evaluation import angle_errors
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run

@@ -12,7 +12,7 @@ import pytest
 import biovision
 from measured import NAMES, moved, person, write_run
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.evaluation import Comparison, evaluate_run, measure_run
+from shadowpuppet.evaluation.evaluation import Comparison, evaluate_run, measure_run
 from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.table import write_joints
@@ -215,7 +215,7 @@ def test_another_world_is_said_not_scored_in_silence(shell, folder, tmp_path):
 
 def test_a_run_in_the_truth_s_world_is_not_warned_of(folder):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shadowpuppet.evaluation.warn", lambda *_, **__: pytest.fail("warned"))
+        patch.setattr("shadowpuppet.evaluation.evaluation.warn", lambda *_, **__: pytest.fail("warned"))
         assert not evaluate_run(folder / "run")["world"]["apart"]
 
 

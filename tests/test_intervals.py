@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.intervals import LEVELS, coverage
+from shadowpuppet.evaluation.interval_coverage import LEVELS, coverage
 
 
 def test_the_widths_are_those_of_a_normal_distribution():

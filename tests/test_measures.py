@@ -12,9 +12,7 @@ from numpy.testing import assert_allclose
 
 from measured import NAMES, moved, person
 from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.geometry import rotation_from_vector
-from shadowpuppet.joint_angles import dof_errors, wrapped
-from shadowpuppet.measures import (
+from shadowpuppet.evaluation.error_metrics import (
     aligned_distances,
     aligned_errors,
     axis_errors,
@@ -25,6 +23,8 @@ from shadowpuppet.measures import (
     motion_errors,
     worlds,
 )
+from shadowpuppet.evaluation.joint_angles import dof_errors, wrapped
+from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.motion.metrics import LIMBS, joint_errors
 from shadowpuppet.motion.motion import JointTable, Motion
 

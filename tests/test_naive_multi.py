@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import naive_limbs
 from scans import make_body, scan, some_pose
-from shadowpuppet.bench import naive_multi as naive
+from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)

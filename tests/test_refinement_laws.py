@@ -13,13 +13,13 @@ import actor
 import naive_limbs
 from scans import make_body as random_tree
 from scans import scan, some_pose
-from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.jacobian import place_one
 from shadowpuppet.body.models import average_sizes
 from shadowpuppet.body.models import make_body as make_named
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import rotation_about
 from shadowpuppet.tracking.multiview.refinement import refiner
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud

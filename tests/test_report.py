@@ -16,15 +16,15 @@ from measured import NAMES, moved, person, write_run
 from shadowpuppet import cli
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evaluation import Comparison, measure_run
+from shadowpuppet.evaluation.evaluation import Comparison, measure_run
+from shadowpuppet.evaluation.report.charts import by_joint_and_time
+from shadowpuppet.evaluation.report.page import page, write_report
+from shadowpuppet.evaluation.report.pictures import chosen_frames, draw_bones, pictures
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.overlay_video import grid_of
-from shadowpuppet.report.charts import by_joint_and_time
-from shadowpuppet.report.page import page, write_report
-from shadowpuppet.report.pictures import chosen_frames, draw_bones, pictures
 
 TRUTH = person(4, 15)
 SIZE = (160, 120)
@@ -84,7 +84,7 @@ def images(text: str) -> list[np.ndarray]:
 def quick(monkeypatch):
     """Pages without their plots, where those are not what is tested."""
     for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "honesty"):
-        monkeypatch.setattr(f"shadowpuppet.report.charts.{name}", lambda *_: "<svg></svg>")
+        monkeypatch.setattr(f"shadowpuppet.evaluation.report.charts.{name}", lambda *_: "<svg></svg>")
 
 
 # The page as a whole

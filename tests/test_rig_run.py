@@ -12,7 +12,7 @@ import made
 import made_rig
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
-from shadowpuppet.evaluation import evaluate_run
+from shadowpuppet.evaluation.evaluation import evaluate_run
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.options import Options, make_options

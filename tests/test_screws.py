@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 from people import random_poses
 from scans import make_body as random_tree
 from scans import some_pose
-from shadowpuppet.bench import naive_multi as naive
 from shadowpuppet.body.jacobian import ROTATION, SMALL, TRANSLATION, VECTOR, exponential, make_chain, place_one
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.evaluation.bench import naive_multi as naive
 
 pytestmark = pytest.mark.kernels
 BODIES = {"tree": random_tree(), **{name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}}

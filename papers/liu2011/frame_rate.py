@@ -13,8 +13,8 @@ from papers.common.plotting import COLOURS, label, new_figure
 from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import with_method
 from papers.liu2011.shown import stem, told
-from shadowpuppet.bench.rivals import one_thread
-from shadowpuppet.bench.timing import Contender
+from shadowpuppet.evaluation.bench.opencv import one_thread
+from shadowpuppet.evaluation.bench.timing import Contender
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

@@ -8,11 +8,11 @@ import numpy as np
 from papers.common.experiment import Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from papers.ni2008.inputs import BODY
-from shadowpuppet.bench import naive_multi as plain
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Limbs
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.evaluation.bench import naive_multi as plain
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import Viewpoint
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from shadowpuppet.camera.camera import Camera
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-    from shadowpuppet.evaluation import Comparison, Evaluation, measure_run
+    from shadowpuppet.evaluation.evaluation import Comparison, Evaluation, measure_run
+    from shadowpuppet.evaluation.report.page import write_report
     from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
     from shadowpuppet.io.export import convert_motion, export_run
     from shadowpuppet.io.humaneva import read_humaneva
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from shadowpuppet.pipeline.look import Look
     from shadowpuppet.pipeline.options import Options, make_options
     from shadowpuppet.pipeline.track import Listener, look_at, track_recording
-    from shadowpuppet.report.page import write_report
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking.monocular.initialization import find_person, fit_references
@@ -66,9 +66,9 @@ _HOMES = {
     "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes",
     "read_humaneva": "io.humaneva", "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
-    "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation", "Evaluation": "evaluation",
-    "measure_run": "evaluation", "read_truth": "io.motion.truth", "write_report": "report.page", "open_footage": "pipeline.footage",
-    "read_masks": "pipeline.footage",
+    "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation.evaluation",
+    "Evaluation": "evaluation.evaluation", "measure_run": "evaluation.evaluation", "read_truth": "io.motion.truth",
+    "write_report": "evaluation.report.page", "open_footage": "pipeline.footage", "read_masks": "pipeline.footage",
 }  # fmt: skip
 """Where each public name lives."""
 

@@ -263,8 +263,8 @@ def bench(*, json: Path | None = None, picture: Path | None = None,
     quick
         Fewer rounds, a shorter film, nothing compiled anew.
     """
-    from shadowpuppet.bench.files import check_plans, write_figures
-    from shadowpuppet.bench.whole import run_bench
+    from shadowpuppet.evaluation.bench.files import check_plans, write_figures
+    from shadowpuppet.evaluation.bench.run import run_bench
     from shadowpuppet.tables import bench_tables
     from shadowpuppet.terminal import show, terminal
 

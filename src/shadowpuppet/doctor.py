@@ -153,7 +153,7 @@ def _has_codec(av: object, name: str) -> bool:
 
 
 def _processor() -> Iterator[Finding]:
-    from shadowpuppet.bench.machine import environment
+    from shadowpuppet.evaluation.bench.machine import environment
     from shadowpuppet.threads import LIMIT, thread_limit, usable_cores
 
     known = environment()

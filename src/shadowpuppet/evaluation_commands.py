@@ -43,9 +43,9 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     angles
         Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
     """
-    from shadowpuppet.evaluation import Comparison, check_output, measure_run, update_metrics, write_evaluation
+    from shadowpuppet.evaluation.evaluation import Comparison, check_output, measure_run, update_metrics, write_evaluation
+    from shadowpuppet.evaluation.report.page import check_report, write_report
     from shadowpuppet.evaluation_tables import evaluation_tables
-    from shadowpuppet.report.page import check_report, write_report
     from shadowpuppet.terminal import show, show_json, terminal
 
     names = [name.strip() for name in joints.split(",")] if joints else None

@@ -12,7 +12,7 @@ import numpy as np
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evaluation import Evaluation, measure_run
+from shadowpuppet.evaluation.evaluation import Evaluation, measure_run
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.motion.motion_table import dof_unit

@@ -9,15 +9,15 @@ from importlib.resources import files
 from pathlib import Path
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evaluation import Evaluation, check_output
-from shadowpuppet.evaluation_words import coverage_words
-from shadowpuppet.intervals import LEVELS
+from shadowpuppet.evaluation.error_metrics import aligned_distances
+from shadowpuppet.evaluation.evaluation import Evaluation, check_output
+from shadowpuppet.evaluation.interval_coverage import LEVELS
+from shadowpuppet.evaluation.report import charts
+from shadowpuppet.evaluation.report.html import figure, plain, rows, table
+from shadowpuppet.evaluation.report.pictures import Chosen, chosen_frames, pictures
+from shadowpuppet.evaluation.report.sections import axes_table, body_tables, cards, facts, joint_table, meanings, notes, ways
+from shadowpuppet.evaluation.summary_text import coverage_words
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.measures import aligned_distances
-from shadowpuppet.report import charts
-from shadowpuppet.report.html import figure, plain, rows, table
-from shadowpuppet.report.pictures import Chosen, chosen_frames, pictures
-from shadowpuppet.report.sections import axes_table, body_tables, cards, facts, joint_table, meanings, notes, ways
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 """What a browser may fetch for this page: nothing."""

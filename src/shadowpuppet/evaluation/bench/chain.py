@@ -1,6 +1,6 @@
 """From a film to poses: a long film tracked in a process of its own, its speed and its memory.
 
-`python -m shadowpuppet.bench.chain RECORDING RUN [CORES]` does it and prints JSON.
+`python -m shadowpuppet.evaluation.bench.chain RECORDING RUN [CORES]` does it and prints JSON.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def measure_chain(folder: Path, frames: int) -> dict[str, Any]:
 
 def apart(recording: Path, run: Path, cores: int = 1) -> dict[str, Any]:
     """What `track_long` tells, from a new process. Raises `ShadowPuppetError` where it fails."""
-    done = subprocess.run([sys.executable, "-m", "shadowpuppet.bench.chain", str(recording), str(run), str(cores)], capture_output=True,
+    done = subprocess.run([sys.executable, "-m", "shadowpuppet.evaluation.bench.chain", str(recording), str(run), str(cores)], capture_output=True,
                           text=True, env=os.environ | ONE_EACH)
     if done.returncode:
         raise ShadowPuppetError(f"bench: tracking the made film failed: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
@@ -63,7 +63,7 @@ class _Memory(Listener):
         self.held: list[float] = []
 
     def advance(self, frames: int) -> None:
-        from shadowpuppet.bench.machine import resident_mb
+        from shadowpuppet.evaluation.bench.machine import resident_mb
 
         self.held.append(resident_mb() or np.nan)
 
@@ -71,7 +71,7 @@ class _Memory(Listener):
 def track_long(recording: str, run: str, cores: str = "1") -> dict[str, Any]:
     """Frames/s of the whole chain with the default preset, ms a frame by stage, peak memory and its growth (10^6 bytes), and how so many
     cores were kept to."""
-    from shadowpuppet.bench.machine import peak_mb, use_cores
+    from shadowpuppet.evaluation.bench.machine import peak_mb, use_cores
 
     how, memory = use_cores(int(cores)), _Memory()
     metrics = track_recording(recording, run, make_options({"seed": 1}), memory).metrics

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.bench.cases import Case
+from shadowpuppet.evaluation.bench.mono_cases import Case
 from shadowpuppet.geometry import Array
 
 Polygons = list[list[NDArray[np.int32]]]

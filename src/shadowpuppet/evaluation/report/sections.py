@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from shadowpuppet.evaluation import Evaluation
-from shadowpuppet.evaluation_words import WAYS, bones_words, clock_words, losses_words, said_root, world_words
+from shadowpuppet.evaluation.evaluation import Evaluation
+from shadowpuppet.evaluation.report.html import definitions, plain, rows, table
+from shadowpuppet.evaluation.summary_text import WAYS, bones_words, clock_words, losses_words, said_root, world_words
 from shadowpuppet.motion.metrics import FAR, LOST
-from shadowpuppet.report.html import definitions, plain, rows, table
 
 
 def cards(of: Evaluation) -> str:

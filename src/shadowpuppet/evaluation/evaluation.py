@@ -13,14 +13,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.intervals import coverage
-from shadowpuppet.io.calibration.calibration_files import read_calibration
-from shadowpuppet.io.files.plain import for_json, plain
-from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.motion.truth import names_in, read_truth
-from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
-from shadowpuppet.joint_angles import angle_errors, compared_poses, dof_errors, turn_errors
-from shadowpuppet.measures import (
+from shadowpuppet.evaluation.error_metrics import (
     aligned_errors,
     axis_errors,
     bend_errors,
@@ -31,6 +24,13 @@ from shadowpuppet.measures import (
     whole_alignment,
     worlds,
 )
+from shadowpuppet.evaluation.interval_coverage import coverage
+from shadowpuppet.evaluation.joint_angles import angle_errors, compared_poses, dof_errors, turn_errors
+from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.files.plain import for_json, plain
+from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.truth import names_in, read_truth
+from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.synchronization import at_times, find_offset, in_step, step_of

@@ -14,7 +14,7 @@ from shadowpuppet.body.segments import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evaluation import Evaluation
+from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import LOST
 from shadowpuppet.motion.motion import BLANK, JointTable

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.bench import naive_multi
-from shadowpuppet.bench.chain import apart
-from shadowpuppet.bench.ring import Around, RingFollower
-from shadowpuppet.bench.ring_film import ring_recording
-from shadowpuppet.bench.timing import Contender, Times, in_turns
+from shadowpuppet.evaluation.bench import naive_multi
+from shadowpuppet.evaluation.bench.chain import apart
+from shadowpuppet.evaluation.bench.multi_cases import Around, RingFollower
+from shadowpuppet.evaluation.bench.multi_film import ring_recording
+from shadowpuppet.evaluation.bench.timing import Contender, Times, in_turns
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings

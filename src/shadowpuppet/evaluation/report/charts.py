@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.evaluation import Evaluation
+from shadowpuppet.evaluation.error_metrics import runs_of
+from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
-from shadowpuppet.measures import runs_of
 from shadowpuppet.motion.metrics import accelerations
 
 # Colours that people who see colours differently tell apart: Okabe & Ito 2008.

@@ -1,4 +1,4 @@
-"""From nothing to the first pose, in a process of its own: `python -m shadowpuppet.bench.startup`."""
+"""From nothing to the first pose, in a process of its own: `python -m shadowpuppet.evaluation.bench.startup`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def start_times() -> tuple[float, float]:
 
 def _start(cache: str) -> float:
     begin = time.perf_counter()
-    done = subprocess.run([sys.executable, "-m", "shadowpuppet.bench.startup"], capture_output=True, text=True,
+    done = subprocess.run([sys.executable, "-m", "shadowpuppet.evaluation.bench.startup"], capture_output=True, text=True,
                           env=os.environ | {"NUMBA_CACHE_DIR": cache})
     if done.returncode:
         raise ShadowPuppetError(f"bench: the process that starts anew failed: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
@@ -27,6 +27,6 @@ def _start(cache: str) -> float:
 
 
 if __name__ == "__main__":
-    from shadowpuppet.bench.cases import Follower
+    from shadowpuppet.evaluation.bench.mono_cases import Follower
 
     Follower("default").run(1)

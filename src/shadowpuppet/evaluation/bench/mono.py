@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.bench import naive
-from shadowpuppet.bench.cases import Case, Follower
-from shadowpuppet.bench.chain import measure_chain
-from shadowpuppet.bench.curves import curves
-from shadowpuppet.bench.rivals import OpenCV, one_thread
-from shadowpuppet.bench.startup import start_times
-from shadowpuppet.bench.timing import Contender, Times, in_turns
+from shadowpuppet.evaluation.bench import naive_mono
+from shadowpuppet.evaluation.bench.chain import measure_chain
+from shadowpuppet.evaluation.bench.curves import curves
+from shadowpuppet.evaluation.bench.mono_cases import Case, Follower
+from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
+from shadowpuppet.evaluation.bench.startup import start_times
+from shadowpuppet.evaluation.bench.timing import Contender, Times, in_turns
 from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.tracking.monocular.settings import make_settings
 
@@ -61,7 +61,7 @@ def contenders() -> dict[str, Contender]:
         "opencv_arm": Contender(OpenCV(arm).run, arm.particles),
         "step": Contender(paper.run, 10),
         "default": Contender(default.run, 10),
-        "naive_frame": Contender(lambda: naive.frame(rng, full.picture, settings, full.pose, full.mask, NAIVE_PARTICLES), share),
+        "naive_frame": Contender(lambda: naive_mono.frame(rng, full.picture, settings, full.pose, full.mask, NAIVE_PARTICLES), share),
     }
 
 

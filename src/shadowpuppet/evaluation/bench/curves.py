@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.bench.cases import SIZE, Case
-from shadowpuppet.bench.timing import Contender, in_turns
 from shadowpuppet.camera.rasterize import pack
+from shadowpuppet.evaluation.bench.mono_cases import SIZE, Case
+from shadowpuppet.evaluation.bench.timing import Contender, in_turns
 
 PARTICLES = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 WIDTHS = (80, 160, 320, 640, 1280, 1920)

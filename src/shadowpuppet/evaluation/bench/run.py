@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from shadowpuppet.bench.machine import environment
-from shadowpuppet.bench.mono import run_mono
-from shadowpuppet.bench.multi import run_multi
+from shadowpuppet.evaluation.bench.machine import environment
+from shadowpuppet.evaluation.bench.mono import run_mono
+from shadowpuppet.evaluation.bench.multi import run_multi
 from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.threads import one_blas_thread
 

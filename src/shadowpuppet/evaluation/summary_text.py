@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.intervals import LEVELS
+from shadowpuppet.evaluation.interval_coverage import LEVELS
 
 WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved",
         "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled"}
