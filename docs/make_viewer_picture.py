@@ -17,12 +17,12 @@ from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.looking import first_wish, served
-from shadowpuppet.viewer.opening import show_of
-from shadowpuppet.viewer.panel import Panel
-from shadowpuppet.viewer.pictures import Look
-from shadowpuppet.viewer.show import Show
-from shadowpuppet.viewer.stage import Wish
+from shadowpuppet.viewer.scene.open_any import show_of
+from shadowpuppet.viewer.scene.show import Show
+from shadowpuppet.viewer.web.panel import Panel
+from shadowpuppet.viewer.web.pictures import Look
+from shadowpuppet.viewer.web.serve import first_wish, served
+from shadowpuppet.viewer.web.stage import Wish
 
 ASSETS = Path(__file__).parent / "assets"
 SIZE, COLOURS, LARGEST = (1280, 760), (255, 160, 96, 64), 150_000

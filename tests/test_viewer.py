@@ -32,17 +32,17 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.curves import AROUND, data_around, limits
-from shadowpuppet.viewer.figures import of_animation, of_poses, of_table
-from shadowpuppet.viewer.of_prior import body_of as body_of_prior
-from shadowpuppet.viewer.of_prior import drawn_motion, resting, show_prior
-from shadowpuppet.viewer.of_run import beside
-from shadowpuppet.viewer.opening import between, show_of
-from shadowpuppet.viewer.page import closed, kept_frames
-from shadowpuppet.viewer.pictures import Look, Plain, shown
-from shadowpuppet.viewer.seen import hull_of
-from shadowpuppet.viewer.show import Chart, Eye, Figure, Show
-from shadowpuppet.viewer.timeline import Timeline
+from shadowpuppet.viewer.scene.figures import of_animation, of_poses, of_table
+from shadowpuppet.viewer.scene.footage import hull_of
+from shadowpuppet.viewer.scene.of_prior import body_of as body_of_prior
+from shadowpuppet.viewer.scene.of_prior import drawn_motion, resting, show_prior
+from shadowpuppet.viewer.scene.of_run import beside
+from shadowpuppet.viewer.scene.open_any import between, show_of
+from shadowpuppet.viewer.scene.show import Chart, Eye, Figure, Show
+from shadowpuppet.viewer.web.curves import AROUND, data_around, limits
+from shadowpuppet.viewer.web.page import closed, kept_frames
+from shadowpuppet.viewer.web.pictures import Look, Plain, shown
+from shadowpuppet.viewer.web.timeline import Timeline
 
 
 @pytest.fixture(scope="module")
@@ -371,8 +371,8 @@ def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
     from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
     from shadowpuppet.pipeline.footage import opened
     from shadowpuppet.synthetic import synthesize
-    from shadowpuppet.viewer.of_recording import eyes_of
-    from shadowpuppet.viewer.particles import Rerun
+    from shadowpuppet.viewer.scene.of_recording import eyes_of
+    from shadowpuppet.viewer.scene.particles import Rerun
 
     options = Options()
     eyes = eyes_of(opened(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
@@ -497,9 +497,9 @@ def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
 
 def test_what_is_wished_for_is_drawn(tracked, rig):
     pytest.importorskip("viser")
-    from shadowpuppet.viewer.nodes import ball
-    from shadowpuppet.viewer.server import close_server, open_server
-    from shadowpuppet.viewer.stage import POINTS, Stage, Wish
+    from shadowpuppet.viewer.web.nodes import ball
+    from shadowpuppet.viewer.web.server import close_server, open_server
+    from shadowpuppet.viewer.web.stage import POINTS, Stage, Wish
 
     points, faces = ball()
     corners = points[faces]
@@ -566,7 +566,7 @@ def test_other_sites_pages_and_names_are_refused():
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
 
-    from shadowpuppet.viewer.server import address_of, close_server, open_server
+    from shadowpuppet.viewer.web.server import address_of, close_server, open_server
 
     server = open_server(port=0)
     try:
@@ -603,7 +603,7 @@ def test_a_library_that_cannot_be_guarded_is_not_used(monkeypatch):
     pytest.importorskip("viser")
     import websockets.asyncio.server as library
 
-    from shadowpuppet.viewer import server
+    from shadowpuppet.viewer.web import server
 
     plain = library.serve
     with server.guarded(True) as installed:

@@ -20,7 +20,7 @@ import made
 from shadowpuppet.live.display.view import Angle, View
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
-from shadowpuppet.viewer.opening import between, show_of
+from shadowpuppet.viewer.scene.open_any import between, show_of
 
 pytest.importorskip("viser")
 playwright = pytest.importorskip("playwright.sync_api")
@@ -108,8 +108,8 @@ def greenish(image):
 
 
 def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_program(browser, run):
-    from shadowpuppet.viewer.looking import served
-    from shadowpuppet.viewer.stage import Wish
+    from shadowpuppet.viewer.web.serve import served
+    from shadowpuppet.viewer.web.stage import Wish
 
     show = replace(show_of(run), charts=())  # which are canvases, too
     with served(show, Wish(glass=True, cameras=False)) as (address, panel), page_of(browser, address) as page:
@@ -142,8 +142,8 @@ def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_pr
 
 
 def test_the_file_plays_alone(browser, run, tmp_path):
-    from shadowpuppet.viewer.looking import first_wish
-    from shadowpuppet.viewer.page import write_page
+    from shadowpuppet.viewer.web.page import write_page
+    from shadowpuppet.viewer.web.serve import first_wish
 
     show = between(show_of(run), 0.0, 2.5)
     path = write_page(tmp_path / "run.html", show, first_wish(show, pictures=False))
@@ -159,8 +159,8 @@ def test_the_file_plays_alone(browser, run, tmp_path):
 
 def test_a_file_has_pictures_only_where_they_are_asked_for(run, tmp_path):
     """What is in the file: silhouettes are as good as transparent pictures of one colour."""
-    from shadowpuppet.viewer import page as pages
-    from shadowpuppet.viewer.looking import first_wish
+    from shadowpuppet.viewer.web import page as pages
+    from shadowpuppet.viewer.web.serve import first_wish
 
     show, seen = between(show_of(run), 0.0, 0.5), []
     eye = show.eyes[0].seen
@@ -197,7 +197,7 @@ def test_a_live_session_is_shown_and_its_buttons_are_wishes(browser, run):
     from shadowpuppet.io.calibration.calibration_files import read_calibration
     from shadowpuppet.io.person import read_person
     from shadowpuppet.io.run import read_run
-    from shadowpuppet.viewer.live import ViewerDisplay
+    from shadowpuppet.viewer.web.live import ViewerDisplay
 
     motion, body = read_run(run).motion, make_body("rounded", read_person(run / "person.toml", "rounded").sizes)
     camera = read_calibration(run / "calibration.toml")[0]

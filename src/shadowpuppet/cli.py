@@ -110,7 +110,7 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     with terminal(quiet, folder) as shown:
         told = open_outlets(validate(OutletSettings, given(outlets), "flags"))
         if chosen.show == "viewer":
-            from shadowpuppet.viewer.live import open_viewer
+            from shadowpuppet.viewer.web.live import open_viewer
 
             display = open_viewer(chosen.listen, chosen.port, chosen.record)
         else:

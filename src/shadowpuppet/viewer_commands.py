@@ -11,7 +11,7 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.flags import OTHER, RUN, ViewFlags, options_from
 
 if TYPE_CHECKING:
-    from shadowpuppet.viewer.show import Show
+    from shadowpuppet.viewer.scene.show import Show
 
 PAGE = Group("Page", sort_key=5.5)
 
@@ -47,16 +47,16 @@ def view(what: What, other: Other = None, /, *, beside: Beside = None, apart: Ap
     """Look at a run, a recording, a prior or a file in space and time, on a page for a browser: the puppet, the truth, cameras and what
     they saw, hull points, particles, angles and errors. Ctrl-C ends it."""
     from shadowpuppet.terminal import terminal
-    from shadowpuppet.viewer.server import check_viser
+    from shadowpuppet.viewer.web.server import check_viser
 
     check_viser()
     _check(other, beside, html, pictures, port)
     options = options_from(flags, config)
     with terminal(quiet) as shown:
-        from shadowpuppet.viewer.looking import first_wish
-        from shadowpuppet.viewer.of_run import beside as side_by_side
-        from shadowpuppet.viewer.opening import between, show_of
-        from shadowpuppet.viewer.page import check_page, write_page
+        from shadowpuppet.viewer.scene.of_run import beside as side_by_side
+        from shadowpuppet.viewer.scene.open_any import between, show_of
+        from shadowpuppet.viewer.web.page import check_page, write_page
+        from shadowpuppet.viewer.web.serve import first_wish
 
         if html is not None:
             check_page(html)
@@ -91,7 +91,7 @@ def _serve(show: Show, listen: str, port: int | None, opening: bool, quiet: bool
     import webbrowser
 
     from shadowpuppet.live.display.choice import has_screen
-    from shadowpuppet.viewer.looking import look
+    from shadowpuppet.viewer.web.serve import look
 
     def told(address: str) -> None:
         if not quiet:

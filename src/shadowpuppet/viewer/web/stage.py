@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.viewer.nodes import BY_CAMERA, GLASS, Frustum, Puppet, ball, clean, three
-from shadowpuppet.viewer.pictures import Look, Plain
-from shadowpuppet.viewer.show import Cloud, Show, Spread
+from shadowpuppet.viewer.scene.show import Cloud, Show, Spread
+from shadowpuppet.viewer.web.nodes import BY_CAMERA, GLASS, Frustum, Puppet, ball, clean, three
+from shadowpuppet.viewer.web.pictures import Look, Plain
 
 if TYPE_CHECKING:
     import viser

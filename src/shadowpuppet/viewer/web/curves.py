@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.viewer.show import Chart
+from shadowpuppet.viewer.scene.show import Chart
 
 if TYPE_CHECKING:
     import viser

@@ -12,11 +12,11 @@ from shadowpuppet.io.calibration.calibration_files import find_calibration, is_c
 from shadowpuppet.io.motion.motion_files import ENDINGS
 from shadowpuppet.io.prior import FORMAT
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.of_file import show_calibration, show_motion
-from shadowpuppet.viewer.of_prior import show_prior
-from shadowpuppet.viewer.of_recording import show_recording
-from shadowpuppet.viewer.of_run import show_run
-from shadowpuppet.viewer.show import Show
+from shadowpuppet.viewer.scene.of_file import show_calibration, show_motion
+from shadowpuppet.viewer.scene.of_prior import show_prior
+from shadowpuppet.viewer.scene.of_recording import show_recording
+from shadowpuppet.viewer.scene.of_run import show_run
+from shadowpuppet.viewer.scene.show import Show
 
 
 def show_of(path: str | Path, options: Options | None = None, truth: Path | None = None, recording: Path | None = None) -> Show:

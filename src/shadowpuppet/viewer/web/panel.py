@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shadowpuppet.viewer.curves import Window
-from shadowpuppet.viewer.pictures import Look
-from shadowpuppet.viewer.show import Chart
-from shadowpuppet.viewer.stage import Stage
-from shadowpuppet.viewer.timeline import SPEEDS, Timeline
+from shadowpuppet.viewer.scene.show import Chart
+from shadowpuppet.viewer.web.curves import Window
+from shadowpuppet.viewer.web.pictures import Look
+from shadowpuppet.viewer.web.stage import Stage
+from shadowpuppet.viewer.web.timeline import SPEEDS, Timeline
 
 if TYPE_CHECKING:
     import viser

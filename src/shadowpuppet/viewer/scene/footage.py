@@ -16,7 +16,7 @@ from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image
 from shadowpuppet.video.seeking import Seeker
-from shadowpuppet.viewer.show import Eye, Surface
+from shadowpuppet.viewer.scene.show import Eye, Surface
 
 SAMPLED = 40
 """Frames that are looked at before silhouettes are made, where the empty scene is known by a film of its own."""

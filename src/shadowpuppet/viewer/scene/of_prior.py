@@ -14,8 +14,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.prior import read_prior
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.video.frames import ASSUMED_RATE
-from shadowpuppet.viewer.figures import of_poses
-from shadowpuppet.viewer.show import Figure, Show
+from shadowpuppet.viewer.scene.figures import of_poses
+from shadowpuppet.viewer.scene.show import Figure, Show
 
 SECONDS = 10.0
 """Of the motion that is drawn."""

@@ -21,7 +21,7 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate
 from shadowpuppet.tracking.resampling import normalise
-from shadowpuppet.viewer.show import Cloud, Eye, Spread
+from shadowpuppet.viewer.scene.show import Cloud, Eye, Spread
 
 SEED = 0
 """The same frame has the same particles whenever it is looked at."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.viewer.pictures import Look, Plain, shown
-from shadowpuppet.viewer.show import Eye, Figure
+from shadowpuppet.viewer.scene.show import Eye, Figure
+from shadowpuppet.viewer.web.pictures import Look, Plain, shown
 
 if TYPE_CHECKING:
     import viser

@@ -16,9 +16,9 @@ from shadowpuppet.pipeline.footage import Footage, footage_of, opened
 from shadowpuppet.pipeline.footage_rig import chosen_views
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.frames import ASSUMED_RATE
-from shadowpuppet.viewer.figures import of_table
-from shadowpuppet.viewer.seen import FilmSeen, hull_of
-from shadowpuppet.viewer.show import Eye, Figure, Show
+from shadowpuppet.viewer.scene.figures import of_table
+from shadowpuppet.viewer.scene.footage import FilmSeen, hull_of
+from shadowpuppet.viewer.scene.show import Eye, Figure, Show
 
 
 def show_recording(path: str | Path, options: Options) -> Show:

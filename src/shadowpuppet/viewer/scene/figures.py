@@ -13,7 +13,7 @@ from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.viewer.show import Figure
+from shadowpuppet.viewer.scene.show import Figure
 
 DOT = 0.06
 """Metres; length of what marks a joint on which no bone ends."""

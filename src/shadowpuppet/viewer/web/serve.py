@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from shadowpuppet.viewer.panel import Panel
-from shadowpuppet.viewer.pictures import Look
-from shadowpuppet.viewer.server import address_of, close_server, open_server
-from shadowpuppet.viewer.show import Show
-from shadowpuppet.viewer.stage import Stage, Wish
+from shadowpuppet.viewer.scene.show import Show
+from shadowpuppet.viewer.web.panel import Panel
+from shadowpuppet.viewer.web.pictures import Look
+from shadowpuppet.viewer.web.server import address_of, close_server, open_server
+from shadowpuppet.viewer.web.stage import Stage, Wish
 
 
 def look(show: Show, listen: str = "127.0.0.1", port: int | None = None, wish: Wish | None = None,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.video import Image
-from shadowpuppet.viewer.show import Seen
+from shadowpuppet.viewer.scene.show import Seen
 
 WIDEST = 1.9
 """Tangent of half the angle across which pictures are shown: fisheye pictures are cut there."""

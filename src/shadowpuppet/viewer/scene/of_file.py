@@ -12,8 +12,8 @@ from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETONS
 from shadowpuppet.io.motion.skeletons import read_animation
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.viewer.figures import of_animation, of_table
-from shadowpuppet.viewer.show import Eye, Show
+from shadowpuppet.viewer.scene.figures import of_animation, of_table
+from shadowpuppet.viewer.scene.show import Eye, Show
 
 
 def show_motion(path: Path, rate: float | None = None) -> Show:

@@ -16,10 +16,10 @@ from shadowpuppet.live.display.drawing import drawn
 from shadowpuppet.live.display.view import Display, View
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.mesh import body_mesh
-from shadowpuppet.viewer.pictures import Plain
-from shadowpuppet.viewer.server import address_of, close_server, open_server
-from shadowpuppet.viewer.show import Eye, Figure, Show
-from shadowpuppet.viewer.stage import Stage, Wish
+from shadowpuppet.viewer.scene.show import Eye, Figure, Show
+from shadowpuppet.viewer.web.pictures import Plain
+from shadowpuppet.viewer.web.server import address_of, close_server, open_server
+from shadowpuppet.viewer.web.stage import Stage, Wish
 
 MOST_A_SECOND = 10.0
 """Views that are drawn a second; more cost the tracker time."""

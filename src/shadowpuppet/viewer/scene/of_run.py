@@ -23,11 +23,11 @@ from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.footage import opened
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.viewer.figures import of_animation, of_table
-from shadowpuppet.viewer.of_recording import eyes_of
-from shadowpuppet.viewer.particles import Rerun
-from shadowpuppet.viewer.seen import hull_of
-from shadowpuppet.viewer.show import Chart, Eye, Figure, Show
+from shadowpuppet.viewer.scene.figures import of_animation, of_table
+from shadowpuppet.viewer.scene.footage import hull_of
+from shadowpuppet.viewer.scene.of_recording import eyes_of
+from shadowpuppet.viewer.scene.particles import Rerun
+from shadowpuppet.viewer.scene.show import Chart, Eye, Figure, Show
 
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "leg": ("hip", "knee", "ankle", "leg")}

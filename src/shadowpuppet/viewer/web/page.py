@@ -12,10 +12,10 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.viewer.pictures import Look
-from shadowpuppet.viewer.server import POLICY, close_server, open_server
-from shadowpuppet.viewer.show import Show
-from shadowpuppet.viewer.stage import Stage, Wish
+from shadowpuppet.viewer.scene.show import Show
+from shadowpuppet.viewer.web.pictures import Look
+from shadowpuppet.viewer.web.server import POLICY, close_server, open_server
+from shadowpuppet.viewer.web.stage import Stage, Wish
 
 if TYPE_CHECKING:
     import viser

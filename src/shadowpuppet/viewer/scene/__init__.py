@@ -1,0 +1,1 @@
+"""What there is to be shown of runs, recordings, priors and files, as plain data."""

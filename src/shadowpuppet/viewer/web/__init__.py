@@ -1,0 +1,1 @@
+"""The viewer's page: server, timeline, panel, drawing with viser."""
