@@ -25,7 +25,7 @@ def formats(folder: Path) -> None:
 
 def report(folder: Path) -> None:
     """A plot is drawn."""
-    from shadowpuppet.plots import AXES, COLOURS, plot_curves
+    from shadowpuppet.cli.plots import AXES, COLOURS, plot_curves
 
     plot_curves({axis: {"values": [1, 2]} | {body: [3.0, 4.0] for body in COLOURS} for axis in AXES}, folder / "curves.png")
     assert (folder / "curves.png").stat().st_size > 1000

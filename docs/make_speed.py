@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from shadowpuppet.cli.plots import plot_curves
+from shadowpuppet.cli.tables import BENCHED, BENCHED_SEVERAL
 from shadowpuppet.evaluation.bench.run import run_bench
-from shadowpuppet.plots import plot_curves
-from shadowpuppet.tables import BENCHED, BENCHED_SEVERAL
 
 PAGE = Path(__file__).parent / "speed.md"
 PICTURE = PAGE.parent / "assets" / "speed.png"

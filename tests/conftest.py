@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from shadowpuppet import cli
+from shadowpuppet.cli import app as cli
 
 
 @pytest.fixture

@@ -21,8 +21,9 @@ import pytest
 from rich.console import Console
 
 import made
-from shadowpuppet import cli
-from shadowpuppet.batch_terminal import LINES, BatchTerminal, _pace
+from shadowpuppet.cli import app as cli
+from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _pace
+from shadowpuppet.cli.terminal import Terminal
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.pipeline.batch import Batch, BatchListener, make_grid, run_batch
@@ -32,7 +33,6 @@ from shadowpuppet.pipeline.batch.task import _put, do
 from shadowpuppet.pipeline.batch.tasks import make_tasks, named
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
-from shadowpuppet.terminal import Terminal
 
 SETTINGS = {"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 QUICK = make_grid(SETTINGS)
@@ -394,7 +394,7 @@ def columns() -> int:
 
 
 def test_batch_tells_what_came_of_it(shell, recording, tmp_path, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.batch_terminal.PAUSE", 1e9)  # on a busy machine this takes longer
+    monkeypatch.setattr("shadowpuppet.cli.batch_terminal.PAUSE", 1e9)  # on a busy machine this takes longer
     (tmp_path / "grid.toml").write_text('seeds = "0:2"\n[case.drs]\n[case.srs]\ntracker.resampling = "stratified"\n')
     command = ["batch", recording, "gone", "-o", "out", "--config", "grid.toml", "--workers", 0, *FLAGS]
     code, out, err = shell(*command)

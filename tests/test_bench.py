@@ -11,8 +11,9 @@ import pytest
 
 import made
 from people import random_poses
-from shadowpuppet import cli
 from shadowpuppet.camera import rasterize
+from shadowpuppet.cli import app as cli
+from shadowpuppet.cli.plots import plot_curves
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.bench import chain, curves, mono, multi, multi_film, naive_mono, run
 from shadowpuppet.evaluation.bench.files import check_plans, write_figures
@@ -20,7 +21,6 @@ from shadowpuppet.evaluation.bench.mono_cases import Case, Follower
 from shadowpuppet.evaluation.bench.multi_cases import Around
 from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
 from shadowpuppet.evaluation.bench.timing import Contender, Times, in_turns
-from shadowpuppet.plots import plot_curves
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import made
+from shadowpuppet.cli.plots import plot_curves
 from shadowpuppet.evaluation.bench import multi, multi_film, naive_multi
 from shadowpuppet.evaluation.bench.multi_cases import Around, RingFollower
 from shadowpuppet.evaluation.bench.timing import Times, in_turns
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
-from shadowpuppet.plots import plot_curves
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.refinement.forces import push
 from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings

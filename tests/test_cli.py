@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import made
-from shadowpuppet import cli
+from shadowpuppet.cli import app as cli
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import UPPER
 from shadowpuppet.pipeline.options import Options, make_options, options_text
@@ -239,7 +239,7 @@ def test_every_setting_is_explained(shell):
 
 
 def test_flags_go_before_the_file_and_the_file_before_the_preset(monkeypatch, tmp_path):
-    from shadowpuppet.flags import Flags, options_from
+    from shadowpuppet.cli.flags import Flags, options_from
 
     file = tmp_path / "mine.toml"
     file.write_text('preset = "liu2011"\nseed = 3\nperson = "me.toml"\n[tracker.arm]\nparticles = 30\n[silhouette]\nclean = false\n')

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import made
-from shadowpuppet import cli
 from shadowpuppet.body.whole_sizes import AnatomicalSizes
+from shadowpuppet.cli import app as cli
 from shadowpuppet.evaluation.evaluation import angle_errors
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person

@@ -8,8 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from shadowpuppet import cli, doctor
-from shadowpuppet.doctor import Finding, examine, works
+from shadowpuppet.cli import app as cli
+from shadowpuppet.cli import doctor
+from shadowpuppet.cli.doctor import Finding, examine, works
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from shadowpuppet import cli
+from shadowpuppet.cli import app as cli
 
 INTERRUPTING = """
 import os, signal, sys
@@ -28,7 +28,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("name", ["shadowpuppet.cli", "cyclopts", "numpy", "shadowpuppet.pipeline.options", "shadowpuppet.pipeline.track", "numba"])
+@pytest.mark.parametrize("name", ["shadowpuppet.cli.app", "cyclopts", "numpy", "shadowpuppet.pipeline.options", "shadowpuppet.pipeline.track", "numba"])
 def test_control_c_while_the_program_is_loaded_is_no_traceback(name):
     done = subprocess.run([sys.executable, "-c", INTERRUPTING.format(name=name)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr.strip().startswith("interrupted")) == (130, "", True), done.stderr
@@ -36,7 +36,7 @@ def test_control_c_while_the_program_is_loaded_is_no_traceback(name):
 
 
 def test_a_library_that_cannot_be_loaded_is_said_in_a_line():
-    code = "import sys; sys.modules['pydantic'] = None; from shadowpuppet.entry import main; main()"
+    code = "import sys; sys.modules['pydantic'] = None; from shadowpuppet.cli.entry import main; main()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("error: a library cannot be loaded (import of pydantic halted")
@@ -46,11 +46,12 @@ def test_a_library_that_cannot_be_loaded_is_said_in_a_line():
 def test_the_entry_point_and_the_module_begin_there():
     from importlib.metadata import entry_points
 
-    from shadowpuppet import __main__, entry
+    from shadowpuppet import __main__
+    from shadowpuppet.cli import entry
 
     assert __main__.main is entry.main
     (script,) = entry_points(group="console_scripts", name="shadowpuppet")
-    assert script.value in ("shadowpuppet.entry:main", "shadowpuppet.cli:main")  # the latter from an older installation, editable
+    assert script.value in ("shadowpuppet.cli.entry:main", "shadowpuppet.cli.app:main")  # the latter from an older installation, editable
 
 
 # Completion

@@ -24,7 +24,7 @@ from websockets.sync.client import connect
 import made
 from listeners import OscEar
 from live_film import EMPTY, FLAGS, FOV, HEIGHT, QUICK, RATE, frames
-from shadowpuppet import cli
+from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run

@@ -25,7 +25,7 @@ from websockets.sync.client import connect
 
 import runs
 from listeners import OscEar, composed, osc_messages
-from shadowpuppet import cli
+from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import inverse, transform
 from shadowpuppet.io.run import read_run

@@ -39,14 +39,14 @@ def test_importing_the_package_loads_nothing_heavy():
 
 
 def test_help_and_reading_files_load_no_compiler_codec_or_plots():
-    for code in ("from shadowpuppet.cli import app; app.help_print",
+    for code in ("from shadowpuppet.cli.app import app; app.help_print",
                  "from shadowpuppet import read_run, read_recording, read_joints, read_motion, read_prior, read_humaneva"):
         assert not loaded_after(code) & {"numba", "cv2", "av", "matplotlib"}
 
 
 def test_tracking_loads_no_files_films_or_terminal():
     loaded = loaded_after("import shadowpuppet.tracking.monocular.tracker, shadowpuppet.tracking.monocular.initialization")
-    assert not loaded & {"cv2", "av", "matplotlib", "rich", "cyclopts", "shadowpuppet.io", "shadowpuppet.video", "shadowpuppet.cli"}
+    assert not loaded & {"cv2", "av", "matplotlib", "rich", "cyclopts", "shadowpuppet.io", "shadowpuppet.video", "shadowpuppet.cli.app"}
 
 
 @pytest.mark.parametrize("name", shadowpuppet.__all__)
@@ -153,7 +153,7 @@ def test_the_messages_that_the_manual_explains_are_those_of_the_code():
 
 
 def test_every_command_is_in_the_manual():
-    from shadowpuppet.cli import app
+    from shadowpuppet.cli.app import app
 
     commands = {name for name in app if not name.startswith("-")}
     assert commands == set(re.findall(r"<!-- help: (\S+) -->", docs("commands.md")))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from movers import walk
-from shadowpuppet.cli import run
+from shadowpuppet.cli.app import run
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.table import write_joints

@@ -13,8 +13,8 @@ import pytest
 
 from made import write_film
 from measured import NAMES, moved, person, write_run
-from shadowpuppet import cli
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.evaluation.report.charts import by_joint_and_time

@@ -14,7 +14,7 @@ from shadowpuppet.calibration.epipolar_tangency import Outlines
 from shadowpuppet.calibration.rotation_error import turning
 from shadowpuppet.calibration.time_offset import lateness
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.cli import run
+from shadowpuppet.cli.app import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import write_calibration

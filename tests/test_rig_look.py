@@ -11,7 +11,7 @@ import pytest
 
 import made
 import made_rig
-from shadowpuppet.cli import run
+from shadowpuppet.cli.app import run
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration

@@ -12,7 +12,7 @@ import pytest
 import calibrations
 import made_rig
 from shadowpuppet.calibration.overview import SIDE, cells, look_at_calibration, meeting_point
-from shadowpuppet.cli import run
+from shadowpuppet.cli.app import run
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import read_calibration, stood_up, write_calibration
 

@@ -19,7 +19,7 @@ import made_rig
 from runs import body_of, make_run, smooth_poses
 from shadowpuppet.body.shapes import Quads
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.cli import run as command
+from shadowpuppet.cli.app import run as command
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.calibration.calibration_files import write_calibration
@@ -616,7 +616,7 @@ def test_without_viser_the_command_says_how_to_get_it(tmp_path):
     code = ("import sys; sys.modules['viser'] = None\n"
             "import importlib.util as u; find = u.find_spec\n"
             "u.find_spec = lambda name, *a: None if name == 'viser' else find(name, *a)\n"
-            f"from shadowpuppet.cli import run; sys.exit(run(['view', {str(tmp_path)!r}]))")  # fmt: skip
+            f"from shadowpuppet.cli.app import run; sys.exit(run(['view', {str(tmp_path)!r}]))")  # fmt: skip
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert "pip install 'shadowpuppet[view]'" in done.stderr
@@ -632,6 +632,6 @@ def test_a_live_session_that_cannot_begin_leaves_no_words_of_the_library(tmp_pat
 
 
 def test_the_command_line_brings_no_viewer():
-    code = "import sys, json; import shadowpuppet.cli; print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))"
+    code = "import sys, json; import shadowpuppet.cli.app; print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
     assert json.loads(done.stdout) == []

@@ -1,6 +1,6 @@
 """`python -m shadowpuppet`."""
 
-from shadowpuppet.entry import main
+from shadowpuppet.cli.entry import main
 
 if __name__ == "__main__":
     main()

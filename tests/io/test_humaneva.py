@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.cli import run
+from shadowpuppet.cli.app import run
 from shadowpuppet.errors import CalibrationError, FormatError, RecordingError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.humaneva import PARTS, Sync, read_cal, read_humaneva, read_sync, timing_of, write_humaneva

@@ -11,9 +11,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from shadowpuppet import batch_commands, calibration_commands, evaluation_commands, machine_commands, motion_commands, viewer_commands
-from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
-from shadowpuppet.flags import (
+from shadowpuppet.cli import batch, calibration, evaluation, machine, motion, viewer
+from shadowpuppet.cli.flags import (
     CAMERAS,
     OTHER,
     RUN,
@@ -31,6 +30,7 @@ from shadowpuppet.flags import (
     output,
     spec_of,
 )
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
 
 
 def _version() -> str:
@@ -76,8 +76,8 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     First prints what it found, as `info` does.
     More settings are listed by `shadowpuppet settings`; each is a flag, such as --tracker.arm.particles 300.
     """
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.track import track_recording
-    from shadowpuppet.terminal import terminal
 
     options = options_from(flags, config)
     folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
@@ -97,13 +97,13 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     """
     from time import strftime
 
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.live.display.choice import open_display
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.settings import LiveSettings
     from shadowpuppet.live.stream.choice import open_outlets
     from shadowpuppet.live.stream.settings import OutletSettings
     from shadowpuppet.settings import validate
-    from shadowpuppet.terminal import terminal
 
     options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
@@ -128,11 +128,11 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
          flags: ForLook = None) -> None:  # fmt: skip
     """Look at a recording, as `track` does before it begins: cameras, scale, background, silhouettes, the person; or explain a calibration:
     where its cameras stand, what they look at and see together, from above; and write it as another kind of file."""
-    if calibration_commands.is_explained(recording):
-        return calibration_commands.explain(recording, to, unit, up, as_json)
-    calibration_commands.refuse_for_recordings(recording, to, unit, up)
+    if calibration.is_explained(recording):
+        return calibration.explain(recording, to, unit, up, as_json)
+    calibration.refuse_for_recordings(recording, to, unit, up)
+    from shadowpuppet.cli.terminal import show_json, terminal
     from shadowpuppet.pipeline.track import look_at
-    from shadowpuppet.terminal import show_json, terminal
 
     with terminal(quiet=as_json) as shown:
         shown.begin("looking")
@@ -153,8 +153,8 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
     """
     from dataclasses import replace
 
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.demo import run_demo
-    from shadowpuppet.terminal import terminal
 
     options = replace(options_from(flags, config), overlay=True)
     with terminal(quiet, folder) as shown:
@@ -169,10 +169,10 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
                    config: Config = None, quiet: Quiet = False, flags: ForLook = None) -> None:
     """Measure a person once, from reference pictures or the film, or from several cameras' first seconds; `track --person` uses the sizes
     again."""
+    from shadowpuppet.cli.tables import curves_table, fit_table, measured_table, sizes_table
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.pipeline.person import Found
     from shadowpuppet.pipeline.track import fit_person
-    from shadowpuppet.tables import curves_table, fit_table, measured_table, sizes_table
-    from shadowpuppet.terminal import show, terminal
 
     with terminal(quiet) as shown:
         shown.begin("looking")
@@ -195,18 +195,18 @@ def synthesize(spec: SpecPath = None, /, *,
                force: Annotated[bool, switch("Write into a folder that has other files in it.")] = False,
                quiet: Quiet = False, flags: ForSpec = None) -> None:  # fmt: skip
     """Make a recording with known truth: films, exact masks, joints, calibration, from a spec file or a few flags."""
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.synthetic import named_specs, spec_text
-    from shadowpuppet.terminal import show, terminal
 
     if list_specs:
-        from shadowpuppet.tables import specs_table
+        from shadowpuppet.cli.tables import specs_table
 
         return show(specs_table(named_specs()))
     made = spec_of(spec, like, seed, flags)
     if show_spec:
         return print(spec_text(made), end="")
+    from shadowpuppet.cli.tables import made_table
     from shadowpuppet.pipeline.synthesize import make_recording
-    from shadowpuppet.tables import made_table
 
     folder = folder or Path(made.name)
     with terminal(quiet, folder, f"no frame was made yet, and what {folder} has is no whole recording; make it again") as shown:
@@ -263,10 +263,10 @@ def bench(*, json: Path | None = None, picture: Path | None = None,
     quick
         Fewer rounds, a shorter film, nothing compiled anew.
     """
+    from shadowpuppet.cli.tables import bench_tables
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.evaluation.bench.files import check_plans, write_figures
     from shadowpuppet.evaluation.bench.run import run_bench
-    from shadowpuppet.tables import bench_tables
-    from shadowpuppet.terminal import show, terminal
 
     check_plans(json, picture)
     with terminal(quiet) as shown:
@@ -274,29 +274,29 @@ def bench(*, json: Path | None = None, picture: Path | None = None,
     if json is not None:
         write_figures(json, found)
     if picture is not None:
-        from shadowpuppet.plots import plot_curves
+        from shadowpuppet.cli.plots import plot_curves
 
         plot_curves(found["curves"], picture)
     if not quiet:
         show(*bench_tables(found))
 
 
-app.command(evaluation_commands.evaluate)
-app.command(calibration_commands.check)
-app.command(motion_commands.fit_prior, name="fit-prior")
-app.command(motion_commands.humaneva)
-app.command(motion_commands.export)
-app.command(motion_commands.convert)
-app.command(motion_commands.play)
-app.command(batch_commands.batch)
-app.command(machine_commands.doctor)
-app.command(viewer_commands.view)
+app.command(evaluation.evaluate)
+app.command(calibration.check)
+app.command(motion.fit_prior, name="fit-prior")
+app.command(motion.humaneva)
+app.command(motion.export)
+app.command(motion.convert)
+app.command(motion.play)
+app.command(batch.batch)
+app.command(machine.doctor)
+app.command(viewer.view)
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     """What came out, and where it lies."""
-    from shadowpuppet.tables import error_table, measures_table, pairs
-    from shadowpuppet.terminal import show
+    from shadowpuppet.cli.tables import error_table, measures_table, pairs
+    from shadowpuppet.cli.terminal import show
 
     stages = ", ".join(f"{stage} {value:.1f}" for stage, value in metrics["ms_per_frame"].items())
     names = [*pictures, *(name for name in ("overlay.mp4", "joints.csv", "angles.csv") if (folder / name).exists())]
@@ -306,8 +306,8 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
 
 
 def _show_live(folder: Path, metrics: Mapping[str, Any]) -> None:
-    from shadowpuppet.tables import live_rows, measures_table, pairs
-    from shadowpuppet.terminal import show
+    from shadowpuppet.cli.tables import live_rows, measures_table, pairs
+    from shadowpuppet.cli.terminal import show
 
     names = [name for name in ("joints.csv", "angles.csv", "recording") if (folder / name).exists()]
     show(measures_table(metrics), pairs([*live_rows(metrics["live"]), ("made", "\n".join(str(folder / name) for name in names))]))

@@ -8,8 +8,8 @@ from typing import Any
 
 from rich.console import RenderableType
 
+from shadowpuppet.cli.tables import angle_table, error_table, measures_table, pairs, plain_table
 from shadowpuppet.evaluation.summary_text import WAYS, bones_words, clock_words, coverage_words, losses_words, said_root, world_words
-from shadowpuppet.tables import angle_table, error_table, measures_table, pairs, plain_table
 
 FEW = 2
 """Degrees of freedom in a row of a list of them."""

@@ -8,7 +8,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from shadowpuppet.doctor import Finding, works
+from shadowpuppet.cli.doctor import Finding, works
 
 MARKS = {"works": ("yes", "green"), "missing": ("no", "yellow"), "broken": ("broken", "red")}
 

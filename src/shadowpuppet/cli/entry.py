@@ -20,7 +20,7 @@ def main() -> NoReturn:
 
 def _run() -> int:
     try:
-        from shadowpuppet.cli import run
+        from shadowpuppet.cli.app import run
     except ImportError as error:
         told = " ".join(str(error).split())
         print(f"error: a library cannot be loaded ({told}); `python -m pip install --force-reinstall shadowpuppet` gets them all anew",

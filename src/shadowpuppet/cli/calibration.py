@@ -7,8 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from shadowpuppet.cli.flags import OTHER, AsJson, LookFlags, options_from
 from shadowpuppet.errors import RecordingError, SettingsError
-from shadowpuppet.flags import OTHER, AsJson, LookFlags, options_from
 
 ForCheck = Annotated[LookFlags | None, Parameter(name="*")]
 Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it.")]
@@ -18,10 +18,10 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
           config: Config = None, as_json: AsJson = False, flags: ForCheck = None) -> None:
     """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
     turned; and by how many frames each film is late."""
-    from shadowpuppet.calibration_tables import check_table
+    from shadowpuppet.cli.calibration_tables import check_table
+    from shadowpuppet.cli.terminal import show, show_json, terminal
     from shadowpuppet.pipeline.check_calibration import check_rig
     from shadowpuppet.pipeline.footage_rig import open_rig
-    from shadowpuppet.terminal import show, show_json, terminal
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
@@ -47,9 +47,9 @@ def is_explained(path: Path) -> bool:
 def explain(path: Path, to: Path | None, unit: str | None, up: str | None, as_json: bool) -> None:
     """Tell what a calibration says, and write it as another file where that is asked for."""
     from shadowpuppet.calibration.overview import look_at_calibration
-    from shadowpuppet.calibration_tables import calibration_table
+    from shadowpuppet.cli.calibration_tables import calibration_table
+    from shadowpuppet.cli.terminal import show, show_json, terminal
     from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration, write_calibration
-    from shadowpuppet.terminal import show, show_json, terminal
 
     with terminal(quiet=as_json) as shown:
         path = path if is_calibration(path) else find_calibration(path) or path

@@ -9,8 +9,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from shadowpuppet.calibration.overview import SIDE, CalibrationLook, Standpoint
+from shadowpuppet.cli.tables import pairs, plain_table
 from shadowpuppet.pipeline.check_calibration import RigCheck
-from shadowpuppet.tables import pairs, plain_table
 
 ARROWS = "→↗↑↖←↙↓↘"
 """By eighths of a turn, counter-clockwise from +x."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from shadowpuppet.cli.flags import OTHER, RUN, ViewFlags, options_from
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.flags import OTHER, RUN, ViewFlags, options_from
 
 if TYPE_CHECKING:
     from shadowpuppet.viewer.scene.show import Show
@@ -46,7 +46,7 @@ def view(what: What, other: Other = None, /, *, beside: Beside = None, apart: Ap
          flags: ForView = None) -> None:  # fmt: skip
     """Look at a run, a recording, a prior or a file in space and time, on a page for a browser: the puppet, the truth, cameras and what
     they saw, hull points, particles, angles and errors. Ctrl-C ends it."""
-    from shadowpuppet.terminal import terminal
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.viewer.web.server import check_viser
 
     check_viser()

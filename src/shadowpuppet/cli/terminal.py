@@ -12,13 +12,13 @@ from typing import Any, TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from shadowpuppet.cli.look_tables import rig_look_table
+from shadowpuppet.cli.printing import show
+from shadowpuppet.cli.tables import look_table
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.pipeline.look import Look
 from shadowpuppet.pipeline.look_rig import RigLook
-from shadowpuppet.printing import show
-from shadowpuppet.rig_tables import rig_look_table
-from shadowpuppet.tables import look_table
 
 __all__ = ["Terminal", "show", "show_json", "terminal"]
 

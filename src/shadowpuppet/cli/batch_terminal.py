@@ -13,13 +13,13 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from shadowpuppet.cli.tables import pairs, plain_table
+from shadowpuppet.cli.terminal import Terminal, terminal
 from shadowpuppet.pipeline.batch.plot import MEASURES, measured, rows_of
 from shadowpuppet.pipeline.batch.run import Batch
 from shadowpuppet.pipeline.batch.summary import BatchRun
 from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome
-from shadowpuppet.tables import pairs, plain_table
-from shadowpuppet.terminal import Terminal, terminal
 
 LINES = 16
 """Workers that are shown."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from shadowpuppet.flags import OutletFlags, PriorFlags, Quiet, given, output
+from shadowpuppet.cli.flags import OutletFlags, PriorFlags, Quiet, given, output
 
 ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
 ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
@@ -31,12 +31,12 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .c
     seed
         Seed of all chance.
     """
+    from shadowpuppet.cli.tables import prior_tables
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.motion.prior.settings import PriorSettings
     from shadowpuppet.pipeline.learn_prior import prior_from_files
     from shadowpuppet.settings import validate
-    from shadowpuppet.tables import prior_tables
-    from shadowpuppet.terminal import show, terminal
 
     if not (regions == "choose" or (regions.isdecimal() and len(regions) < 10)):
         raise SettingsError(f"flags: regions: found {regions!r}, expected a number or choose")
@@ -68,9 +68,9 @@ def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, w
     training_frames
         Frames in a row that training.csv gets, of the training part of the same action; 0 for all.
     """
+    from shadowpuppet.cli.tables import trial_table
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
-    from shadowpuppet.tables import trial_table
-    from shadowpuppet.terminal import show, terminal
 
     with terminal(quiet) as shown:
         shown.begin("reading")
@@ -93,9 +93,9 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     unit
         Of BVH files, which do not tell it; Blender takes m.
     """
+    from shadowpuppet.cli.tables import pairs
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.io.export import EXPORTS, export_run
-    from shadowpuppet.tables import pairs
-    from shadowpuppet.terminal import show, terminal
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as shown:
@@ -125,10 +125,10 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
     unit
         Of a .bvh file that is written.
     """
+    from shadowpuppet.cli.tables import pairs
+    from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.io.export import UNITS, convert_motion
-    from shadowpuppet.tables import pairs
-    from shadowpuppet.terminal import show, terminal
 
     if rate is not None and not 0 < rate < 1e6:
         raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
@@ -151,12 +151,12 @@ def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made
     loop
         Begin again at the end, until Ctrl-C.
     """
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.live.play import play_run
     from shadowpuppet.live.stream.choice import open_outlets
     from shadowpuppet.live.stream.settings import OutletSettings
     from shadowpuppet.settings import validate
-    from shadowpuppet.terminal import terminal
 
     if not 0 < speed <= 100:
         raise SettingsError(f"flags: speed: found {speed}, expected more than 0, up to 100")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 
+from shadowpuppet.cli.flags import AsJson
 from shadowpuppet.errors import BROKEN
-from shadowpuppet.flags import AsJson
 
 
 def doctor(*, as_json: AsJson = False) -> int:
@@ -18,9 +18,9 @@ def doctor(*, as_json: AsJson = False) -> int:
 
     from rich.console import Console
 
-    from shadowpuppet.doctor import examine, works
-    from shadowpuppet.doctor_table import doctor_table
-    from shadowpuppet.printing import show
+    from shadowpuppet.cli.doctor import examine, works
+    from shadowpuppet.cli.doctor_table import doctor_table
+    from shadowpuppet.cli.printing import show
 
     told = Console(stderr=True, quiet=as_json)
     with told.status("trying what works") if told.is_terminal else nullcontext():  # not `terminal`, which needs what may be broken

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from shadowpuppet.flags import RUN, AsJson, Quiet
+from shadowpuppet.cli.flags import RUN, AsJson, Quiet
 
 Switch = Annotated[bool, Parameter(negative=(), show_default=False)]
 
@@ -43,10 +43,10 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     angles
         Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
     """
+    from shadowpuppet.cli.evaluation_tables import evaluation_tables
+    from shadowpuppet.cli.terminal import show, show_json, terminal
     from shadowpuppet.evaluation.evaluation import Comparison, check_output, measure_run, update_metrics, write_evaluation
     from shadowpuppet.evaluation.report.page import check_report, write_report
-    from shadowpuppet.evaluation_tables import evaluation_tables
-    from shadowpuppet.terminal import show, show_json, terminal
 
     names = [name.strip() for name in joints.split(",")] if joints else None
     if file is not None:

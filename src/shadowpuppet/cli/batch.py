@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
+from shadowpuppet.cli.flags import OTHER, RUN, BatchFlags, Quiet, given, output
 from shadowpuppet.errors import SOME_FAILED
-from shadowpuppet.flags import OTHER, RUN, BatchFlags, Quiet, given, output
 
 WORK = Group("Work", sort_key=0.5)
 ForBatch = Annotated[BatchFlags | None, Parameter(name="*")]
@@ -40,11 +40,11 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
 
     Begun again, it does what is missing or failed. Exit code 3: some runs failed, the others are done.
     """
-    from shadowpuppet.batch_terminal import batch_table, batch_terminal
+    from shadowpuppet.cli.batch_terminal import batch_table, batch_terminal
+    from shadowpuppet.cli.terminal import show
     from shadowpuppet.pipeline.batch.grid import make_grid, read_grid, seeds_of
     from shadowpuppet.pipeline.batch.plot import can_plot, plot_batch
     from shadowpuppet.pipeline.batch.run import run_batch
-    from shadowpuppet.terminal import show
 
     grid = read_grid(config, given(flags)) if config is not None else make_grid(flags=given(flags))
     with batch_terminal(quiet) as shown:
