@@ -171,7 +171,8 @@ def test_nothing_is_ever_made_worse_and_more_rounds_do_more():
         of = bundle_adjustment._model(anatomical(found.sizes))
         frames = [bundle_adjustment._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
         strain = (found.sizes.to_array() - MEAN.to_array()) / SPREAD
-        return bundle_adjustment.WORTH / bundle_adjustment.NOISE**2 * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
+        worth = bundle_adjustment.WORTH / bundle_adjustment.NOISE**2
+        return worth * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
 
     costs = [cost(found) for found in residuals]
     assert costs[3] <= costs[2] <= costs[1] <= costs[0]

@@ -28,7 +28,9 @@ main()
 """
 
 
-@pytest.mark.parametrize("name", ["shadowpuppet.cli.app", "cyclopts", "numpy", "shadowpuppet.pipeline.options", "shadowpuppet.pipeline.track", "numba"])
+@pytest.mark.parametrize(
+    "name", ["shadowpuppet.cli.app", "cyclopts", "numpy", "shadowpuppet.pipeline.options", "shadowpuppet.pipeline.track", "numba"]
+)
 def test_control_c_while_the_program_is_loaded_is_no_traceback(name):
     done = subprocess.run([sys.executable, "-c", INTERRUPTING.format(name=name)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr.strip().startswith("interrupted")) == (130, "", True), done.stderr

@@ -211,7 +211,8 @@ def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
     for odd in (np.asfortranarray(poses), np.repeat(poses, 2, 0)[::2], poses.tolist()):
         silhouette_costs(view, observation, odd)
     np.testing.assert_array_equal(cost(np.asfortranarray(poses)), cost(poses))
-    for kernel in (forward_kinematics.place_all, forward_kinematics.place_points, projection.project_quads, rasterize._compare, scanline.find_edges):
+    for kernel in (forward_kinematics.place_all, forward_kinematics.place_points, projection.project_quads, rasterize._compare,
+                   scanline.find_edges):
         for signature in getattr(kernel, "signatures", []):
             layouts = {kind.layout for kind in signature if hasattr(kind, "layout")}
             assert layouts <= {"C"}, (kernel, signature)

@@ -296,9 +296,9 @@ def test_points_that_are_nobody_s_do_not_draw_a_pose_away(rng):
 
 def test_all_stages_of_clouds_are_worked_through(rng):
     of, pose, cloud, starts = beside("anatomical", rng)
-    refiner, held = Refiner(of), np.full(len(pose), 1e-7)
+    made, held = Refiner(of), np.full(len(pose), 1e-7)
     few = make_cloud(*actor.surface(of, pose, rng, 8)[:3])
-    at_once = refiner.gauss_newton(starts, ((few, 3, 0.08), (cloud, 5, 0.05)), starts, held)
-    in_turn = refiner.gauss_newton(refiner.gauss_newton(starts, ((few, 3, 0.08),), starts, held), ((cloud, 5, 0.05),), starts, held)
+    at_once = made.gauss_newton(starts, ((few, 3, 0.08), (cloud, 5, 0.05)), starts, held)
+    in_turn = made.gauss_newton(made.gauss_newton(starts, ((few, 3, 0.08),), starts, held), ((cloud, 5, 0.05),), starts, held)
     np.testing.assert_array_equal(at_once, in_turn)
-    assert refiner.costs(at_once, cloud).mean() < 0.3 * refiner.costs(starts, cloud).mean()
+    assert made.costs(at_once, cloud).mean() < 0.3 * made.costs(starts, cloud).mean()

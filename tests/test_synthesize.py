@@ -35,7 +35,7 @@ from shadowpuppet.synthetic import (
     spec_text,
     synthesize,
 )
-from shadowpuppet.synthetic.movement import gestures
+from shadowpuppet.synthetic.movement.gestures import MOTIONS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.shorthand import Shorthand, expanded, gestures_from
 from shadowpuppet.synthetic.spec_file import HEAD, seed_of
@@ -72,7 +72,7 @@ views = st.builds(Viewpoint, size=st.tuples(sides, sides), fov_deg=st.floats(20,
                   distance=st.floats(2.5, 9), azimuth_deg=st.floats(-180, 180), pitch_deg=st.floats(-40, 40),
                   roll_deg=st.floats(-180, 180), yaw_deg=st.floats(-40, 40),
                   distortion=st.sampled_from([(), (-0.02, 0.01, 0.0, 0.0)]))  # fmt: skip
-gestures = st.builds(Gesture, motion=st.sampled_from(sorted(gestures.MOTIONS)), seconds=st.floats(2, 99))
+gestures = st.builds(Gesture, motion=st.sampled_from(sorted(MOTIONS)), seconds=st.floats(2, 99))
 specs = st.builds(
     Spec,
     name=st.from_regex(r"[A-Za-z0-9_-]{1,9}", fullmatch=True),

@@ -632,6 +632,7 @@ def test_a_live_session_that_cannot_begin_leaves_no_words_of_the_library(tmp_pat
 
 
 def test_the_command_line_brings_no_viewer():
-    code = "import sys, json; import shadowpuppet.cli.app; print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))"
+    code = ("import sys, json; import shadowpuppet.cli.app; "
+            "print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
     assert json.loads(done.stdout) == []

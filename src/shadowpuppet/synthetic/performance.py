@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.movement.gait import Walk
 from shadowpuppet.synthetic.movement.gait_cycle import smooth
+from shadowpuppet.synthetic.movement.gestures import LEAD, MOTIONS, compose, duration, involuntary, keys_of, settled, through
 from shadowpuppet.synthetic.movement.whole_body import ACTS
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, Figure, Stance, figure, planted, pose, turns
 from shadowpuppet.synthetic.person.mannequin import Mannequin
@@ -40,11 +40,11 @@ class Standing:
     def __init__(self, body: Mannequin, gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> None:
         """Of gestures `(name, seconds)` one after another."""
         self.body, self.seconds = body, sum(seconds for _, seconds in gestures)
-        self.keys = gestures.keys_of(gestures, rng)
+        self.keys = keys_of(gestures, rng)
 
     def at(self, t: Array) -> tuple[Array, Stance]:
         """As `Part.at`."""
-        postures = gestures.through(self.keys, np.clip(t + gestures.LEAD, 0, None))
+        postures = through(self.keys, np.clip(t + LEAD, 0, None))
         return postures, planted(self.body, postures)
 
 
@@ -62,13 +62,13 @@ def seconds_of(gestures: Sequence[Gesture]) -> float:
         from shadowpuppet.synthetic.movement.mocap import seconds_of as played
 
         return played(gestures)
-    return gestures.duration([(gesture.motion, gesture.seconds) for gesture in gestures])
+    return duration([(gesture.motion, gesture.seconds) for gesture in gestures])
 
 
 def perform(
     body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.random.Generator, still: float = 1.0, turn: float = 0.0
 ) -> Figure:
-    """The figure of `body` at times `t` (T,), s, `motions.LEAD` of which it stands before the first of `gestures`.
+    """The figure of `body` at times `t` (T,), s, `LEAD` of which it stands before the first of `gestures`.
 
     still: factor on sway and tremor. turn: heading at the beginning, rad to the left of -Y. Who goes somewhere does so about the
     origin: the middle of the area they cover lies there. A motion from a file stands alone (see `mocap.play`).
@@ -77,15 +77,15 @@ def perform(
         from shadowpuppet.synthetic.movement.mocap import play
 
         return play(body, gestures, t, turn)
-    if all(gesture.motion in gestures.MOTIONS for gesture in gestures):
-        postures = gestures.compose([(g.motion, g.seconds) for g in gestures], t, rng, still)
+    if all(gesture.motion in MOTIONS for gesture in gestures):
+        postures = compose([(g.motion, g.seconds) for g in gestures], t, rng, still)
         postures[:, CHANNELS.index("turn")] += turn
         return pose(body, postures)
     parts = _parts(body, gestures, rng)
     postures, stance = _joined(parts, t, turn)
-    restless = still * gestures.involuntary(t, rng)
+    restless = still * involuntary(t, rng)
     sway = restless[:, [CHANNELS.index("sway_x"), CHANNELS.index("sway_y")]]
-    postures = gestures.settled(postures + restless)
+    postures = settled(postures + restless)
     shift = _middle(parts, turn) if _goes(gestures) else np.zeros(3)
     moved = stance._replace(pelvis=stance.pelvis - shift + np.column_stack([sway, 0 * t]), ankles=stance.ankles - shift)
     return figure(body, postures, moved, SOFT)
@@ -93,7 +93,7 @@ def perform(
 
 def _middle(parts: Sequence[Part], turn: float) -> Array:
     """The middle (3,) of the area that the person covers, whatever times are shown."""
-    whole = np.arange(0, gestures.LEAD + sum(part.seconds for part in parts), 0.05)
+    whole = np.arange(0, LEAD + sum(part.seconds for part in parts), 0.05)
     places = _joined(parts, whole, turn)[1].pelvis[:, :2]
     return np.append((places.max(0) + places.min(0)) / 2, 0.0)
 
@@ -108,7 +108,7 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
     parts: list[Part] = []
     waiting: list[tuple[str, float]] = []
     for gesture in (*gestures, None):
-        if gesture is not None and gesture.motion in gestures.MOTIONS:
+        if gesture is not None and gesture.motion in MOTIONS:
             waiting.append((gesture.motion, gesture.seconds))
             continue
         if waiting:
@@ -124,7 +124,7 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
 
 def _joined(parts: Sequence[Part], t: Array, turn: float) -> tuple[Array, Stance]:
     """Postures and stance of `parts`, each from where the one before ended; trunk and arms go over from one to the next."""
-    begin, place = gestures.LEAD, Place(turn=turn)
+    begin, place = LEAD, Place(turn=turn)
     postures, pieces, of = np.zeros((len(t), len(CHANNELS))), [], np.zeros(len(t), int)
     for n, part in enumerate(parts):
         end = begin + part.seconds

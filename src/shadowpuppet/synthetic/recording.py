@@ -13,7 +13,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement import gestures
+from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.spec import Bystander, Spec
@@ -23,9 +23,9 @@ from shadowpuppet.synthetic.studio import Studio, body_of
 Tell = Callable[[int, int], None]
 
 REFERENCES = {
-    "front_t_pose": gestures.LEVEL,
-    "side_arms_hanging": gestures.HANGING_ARMS | gestures.trunk(turn=90),
-    "front_arms_t_pose": gestures.LEVEL,
+    "front_t_pose": LEVEL,
+    "side_arms_hanging": HANGING_ARMS | trunk(turn=90),
+    "front_arms_t_pose": LEVEL,
 }
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
 
@@ -174,7 +174,7 @@ def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
     """Reference pictures with masks and joints; none where a thing hides part of them: sizes are fitted to whole silhouettes."""
     from shadowpuppet.video import write_image
 
-    figures = {name: pose(spec.body, gestures.posture(**named)) for name, named in REFERENCES.items()}
+    figures = {name: pose(spec.body, posture(**named)) for name, named in REFERENCES.items()}
     if any(studio.hides(figure) for figure in figures.values()):
         return
     _folders(folder)

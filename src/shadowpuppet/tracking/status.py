@@ -10,3 +10,7 @@ uncertain. A cardbox that fits overlaps by 0.8 to 0.9."""
 def status_of(overlap: float) -> str:
     """What an overlap says of an estimate."""
     return "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
+
+
+SETTLE_CYCLES = 10
+"""Frames' worth of cycles on the first frame, after the search."""

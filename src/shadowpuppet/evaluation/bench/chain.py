@@ -49,8 +49,8 @@ def measure_chain(folder: Path, frames: int) -> dict[str, Any]:
 
 def apart(recording: Path, run: Path, cores: int = 1) -> dict[str, Any]:
     """What `track_long` tells, from a new process. Raises `ShadowPuppetError` where it fails."""
-    done = subprocess.run([sys.executable, "-m", "shadowpuppet.evaluation.bench.chain", str(recording), str(run), str(cores)], capture_output=True,
-                          text=True, env=os.environ | ONE_EACH)
+    done = subprocess.run([sys.executable, "-m", "shadowpuppet.evaluation.bench.chain", str(recording), str(run), str(cores)],
+                          capture_output=True, text=True, env=os.environ | ONE_EACH)
     if done.returncode:
         raise ShadowPuppetError(f"bench: tracking the made film failed: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
     return json.loads(done.stdout.splitlines()[-1])

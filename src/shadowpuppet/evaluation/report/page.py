@@ -39,7 +39,7 @@ def write_report(path: str | Path, of: Evaluation) -> None:
 def page(of: Evaluation) -> str:
     """The page's text (HTML)."""
     name = of.run.folder.resolve().name
-    css = files("shadowpuppet").joinpath("report/page.css").read_text("utf-8")
+    css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
     return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
             f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{plain(name)}: evaluation</title>\n'
             f"<style>\n{css}</style></head>\n<body>\n" + "\n".join(_parts(of, name)) + "\n</body></html>\n")

@@ -113,7 +113,7 @@ class _Worker:
     def __init__(self, number: int, out: Path, threads: int, said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
         self.number, self.task, self.film = number, None, ""
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
-        path = os.pathsep.join([str(Path(__file__).parents[2]), *(entry or os.getcwd() for entry in sys.path)])
+        path = os.pathsep.join([str(Path(__file__).parents[3]), *(entry or os.getcwd() for entry in sys.path)])
         environment = os.environ | dict.fromkeys(POOLS, str(threads)) | {"PYTHONPATH": path, "PYTHONUTF8": "1"}
         self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.pipeline.batch.worker", str(out)], env=environment,
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors, text=True, encoding="utf-8")

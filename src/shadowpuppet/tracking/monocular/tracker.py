@@ -18,10 +18,7 @@ from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.tracking.resampling import Scheme
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
-from shadowpuppet.tracking.status import ABSENT, status_of
-
-SETTLE = 10
-"""Frames' worth of cycles on the first frame, after the search."""
+from shadowpuppet.tracking.status import ABSENT, SETTLE_CYCLES, status_of
 
 
 class State(NamedTuple):
@@ -97,7 +94,7 @@ class MonocularTracker:
         state = self.judge(found.pose, particles, observation)
         if self.is_absent(mask, found.pose):
             return self.absent(state)
-        for _ in range(SETTLE):
+        for _ in range(SETTLE_CYCLES):
             state = self.cycle(rng, state, mask, also)
         return state
 

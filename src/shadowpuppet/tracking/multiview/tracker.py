@@ -14,7 +14,6 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
-from shadowpuppet.tracking.monocular.tracker import SETTLE
 from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import Evidence, Stage
 from shadowpuppet.tracking.multiview.posture_prior import Usual
@@ -25,7 +24,7 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.particle_filter import Particles, Refine, Weigh, step
 from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
-from shadowpuppet.tracking.status import status_of
+from shadowpuppet.tracking.status import SETTLE_CYCLES, status_of
 
 FEW, SMALLEST = 50, 0.5
 """Surface points, and their extent (m), from which on somebody may be there."""
@@ -107,7 +106,7 @@ class MultiviewTracker:
         weigh = self.weigh(evidence)
         found = pose_search.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
         state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
-        for _ in range(SETTLE):
+        for _ in range(SETTLE_CYCLES):
             state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)
         return state._replace(velocity=np.zeros_like(state.pose))
 
