@@ -3,8 +3,8 @@
     python benchmarks/ablations.py [STUDY...] [--seeds 2] [--workers 2] [--one FOLDER] [--rings FOLDER] [-o build/ablations]
 
 Each run is what `shadowpuppet track` does, through `shadowpuppet.pipeline.batch`: a second start does what is missing. Recordings are
-those of the proving grounds (`synthetic.proving_ground`, `synthetic.proving_rings`), made where they are missing. The error is that of joints
-in millimetres, a frame that is lost counting 500; `se` is the standard error of its difference from the study's first row, in pairs
+those of the proving grounds (`synthetic.proving_ground`, `synthetic.proving_rings`), made where they are missing. The error is that of
+joints in millimetres, a frame that is lost counting 500; `se` is the standard error of its difference from the study's first row, in pairs
 of recording and seed: what is within two of them is not told apart. Tables go into docs/ablations.md, and, once all studies are done,
 pictures into docs/assets.
 """

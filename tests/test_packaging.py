@@ -85,15 +85,35 @@ def docs(name: str) -> str:
     return (ROOT / "docs" / name).read_text("utf-8")
 
 
-def test_the_architecture_names_every_module():
-    modules = {path.name if path.is_dir() else path.stem for path in PACKAGE.iterdir() if not path.name.startswith(("_", "."))}
-    modules -= {"py.typed", "py"}
-    named = set(re.findall(r"`(\w+)(?:\.py|/)`", docs("architecture.md")))
-    assert modules - named == set()
-    assert {name for name in named if not (PACKAGE / name).is_dir() and not (PACKAGE / f"{name}.py").is_file()} <= OUTSIDE
+def test_the_architecture_names_every_room():
+    rooms = {str(path.parent.relative_to(PACKAGE)) for path in PACKAGE.rglob("__init__.py")} - {"."}
+    named = {name.rstrip("/") for name in re.findall(r"^\| `([\w/]+)/?` \|", docs("architecture.md"), re.MULTILINE)}
+    assert rooms == named - {"root"}
 
 
-OUTSIDE = {"tests", "benchmarks", "papers", "examples", "docs", "conftest", "src"}
+MOST_FILES = 16
+"""Modules in a folder, `__init__` not counted, above which it wants rooms of its own."""
+
+
+def test_no_room_is_a_hall():
+    crowded = {str(path.parent): len(list(path.parent.glob("*.py"))) - 1 for path in PACKAGE.rglob("__init__.py")}
+    assert {room: count for room, count in crowded.items() if count > MOST_FILES} == {}
+
+
+EXTRAS = {"distributed", "ezc3d", "matplotlib", "pyarrow", "pygltflib", "pylsl", "viser", "websockets"}
+"""Packages that no plain installation has."""
+
+
+def test_what_only_an_extra_installs_is_imported_where_it_is_used():
+    found = []
+    for path in PACKAGE.rglob("*.py"):
+        if "viewer" in path.parts or path.name == "websocket.py":
+            continue
+        for node in ast.parse(path.read_text("utf-8")).body:
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [f"{path.name}: {name}" for name in names if name.split(".")[0] in EXTRAS]
+    assert found == []
 
 
 def test_the_manual_documents_every_public_name():

@@ -146,9 +146,11 @@ def test_a_frame_that_does_not_fit_ends_the_run_but_keeps_it(tmp_path):
 
 
 CHILD = """
-import os, signal, sys
-sys.path.insert(0, {tests!r})
-from test_run import a_frame, writer
+import importlib.util, os, signal, sys
+spec = importlib.util.spec_from_file_location("run_tests", {tests!r})
+run_tests = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(run_tests)
+a_frame, writer = run_tests.a_frame, run_tests.writer
 {before}
 with writer({folder!r}) as run:
     for i in range({frames}):
@@ -158,7 +160,7 @@ with writer({folder!r}) as run:
 
 
 def child(folder: Path, frames: int, before: str = "", after: str = "") -> subprocess.CompletedProcess:
-    code = CHILD.format(tests=str(Path(__file__).parent), folder=str(folder), frames=frames, before=before, after=after)
+    code = CHILD.format(tests=__file__, folder=str(folder), frames=frames, before=before, after=after)
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 

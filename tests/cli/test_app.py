@@ -1,0 +1,473 @@
+"""The command line as a user types it."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import made
+import numpy as np
+import pytest
+
+from shadowpuppet.cli import app as cli
+from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.metrics import UPPER
+from shadowpuppet.pipeline.options import Options, make_options, options_text
+
+QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
+         "--initialization.sweeps", "2"]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return made.make(tmp_path_factory.mktemp("made") / "tiny")
+
+
+@pytest.fixture(scope="module")
+def run(recording, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run") / "run"
+    assert cli.run(["track", str(recording), "-o", str(folder), "--quiet", "--overlay", *QUICK]) == 0
+    return folder
+
+
+def process(*tokens: object, **more) -> subprocess.Popen:
+    command = [sys.executable, "-m", "shadowpuppet", *map(str, tokens)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
+
+
+def refused(shell, *tokens: object) -> str:
+    """The one line that a command which cannot be done ends with."""
+    code, _, err = shell(*tokens)
+    errors = [line for line in err.splitlines() if not line.startswith("warning: ")]
+    assert code == 2
+    assert len(errors) == 1, err
+    assert errors[0].startswith("error: ")
+    assert "Traceback" not in err
+    return errors[0]
+
+
+# Set-up
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    code = "import sys, shadowpuppet; print(sorted({'numba', 'cv2', 'av', 'matplotlib', 'scipy', 'pydantic'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_public_names_are_loaded_when_used():
+    import shadowpuppet
+
+    for name in shadowpuppet.__all__:
+        assert getattr(shadowpuppet, name) is not None
+    assert set(shadowpuppet.__all__) - {"__version__"} == set(shadowpuppet._HOMES)
+    assert set(shadowpuppet.__all__) <= set(dir(shadowpuppet))
+    with pytest.raises(AttributeError, match="no attribute 'track_film'"):
+        shadowpuppet.track_film  # noqa: B018
+
+
+def test_help_loads_no_kernels_and_fits_a_terminal():
+    code = ("import sys\nfrom shadowpuppet import cli\ncode = cli.run(['track', '--help'])\n"
+            "print(code, sorted({'numba', 'cv2', 'av', 'matplotlib', 'scipy'} & set(sys.modules)), file=sys.stderr)")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ | {"COLUMNS": "80"})
+    assert done.stderr == "0 []\n"
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    for flag in ("--output -o", "--preset", "--seed", "--overlay", "--height", "--region", "--config", "--quiet"):
+        assert flag in done.stdout
+
+
+def test_the_version_is_told_by_the_module_too():
+    child = process("--version")
+    out, err = child.communicate()
+    assert (child.returncode, err) == (0, "")
+    assert re.fullmatch(r"\d+\.\d+.*\n", out)
+
+
+@pytest.mark.parametrize(("tokens", "said"), [
+    (["trac"], 'Unknown command "trac"'),
+    (["track"], "requires an argument"),
+    (["track", "here", "--overlya"], "Unknown option: --overlya. Did you mean --overlay"),
+    (["track", "here", "--tracker.arm.particle", "3"], "Did you mean --tracker.arm.particles"),
+    (["track", "here", "--tracker.arm.particles", "many"], '--tracker.arm.particles: unable to convert "many" into int'),
+    (["track", "here", "--tracker.arm.particles", "1"], "tracker: arm.particles: found 1; "),
+    (["track", "here", "--preset", "liu"], "unknown preset 'liu'; there are: default, liu2011"),
+    (["track", "here", "--silhouette.method", "magic"], "magic"),
+    (["track", "here", "--height", "180"], "flags: height: found 180.0; expected 0.5 to 2.5 metres (180 cm are 1.8)"),
+    (["info", "here", "--distance", "nan"], "flags: distance: found nan; expected 0.2 to 30 metres"),
+    (["track", "here", "--tracker.motion-weight", "inf"], "tracker: motion_weight: found inf; input should be a finite number"),
+    (["track", "here", "--config", "none.toml"], "none.toml: cannot be read (no such file"),
+    (["track", "here"], "here: no such recording, expected a folder with video/ and calibration.toml, or a film"),
+    (["evaluate", "here"], "here: found no run.toml in it, expected the folder of a run"),
+    (["settings", "--preset", "liu"], "unknown preset 'liu'"),
+])  # fmt: skip
+def test_what_cannot_be_meant_is_said_in_a_line(shell, tokens, said):
+    assert said in refused(shell, *tokens)
+
+
+# Use
+
+
+def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path):
+    code, out, err = shell("track", recording, *QUICK)
+    assert (code, err) == (0, "")
+    assert "\x1b" not in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert not any(line.endswith(" ") for line in out.splitlines())
+    for word in ("camera       cam, 160 x 120 pixels, 60 degrees wide, calibrated",
+                 f"film         {made.FRAMES} frames, 8 frames/s", "scale",
+                 "exact masks", "person", f"frames   {made.FRAMES}", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
+        assert word in out
+    assert "run-tiny/joints.csv" in out
+    assert (tmp_path / "run-tiny" / "joints.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["track", "live", "demo", "fit-person", "synthesize", "bench", "evaluate", "fit-prior", "humaneva",
+                                  "export", "convert", "batch", "play"])
+def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
+    assert "--quiet" in shell(name, "--help")[1]
+
+
+def test_quiet_is_quiet(shell, recording):
+    assert shell("track", recording, "-o", "run", "--quiet", *QUICK) == (0, "", "")
+
+
+def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
+    code, out, err = shell("info", recording)
+    assert (code, err) == (0, "")
+    assert "these silhouettes overlap the ready ones by 0.9" in out
+    assert not list(tmp_path.iterdir())
+    code, out, _ = shell("info", recording, "--json")
+    assert (code, json.loads(out)["frames"]) == (0, made.FRAMES)
+
+
+def test_evaluate_measures_again_what_track_measured(shell, recording, run):
+    code, out, err = shell("evaluate", run)
+    assert (code, err) == (0, "")
+    for name in ("left_shoulder", "right_hand", "all", "overlap", "jitter"):
+        assert name in out
+    code, out, _ = shell("evaluate", run, "--json")
+    metrics, kept = json.loads(out), read_run(run).metrics
+    assert metrics["errors"].pop("joints").keys() == kept["errors"].pop("joints").keys()
+    assert metrics["errors"] == pytest.approx(kept["errors"])
+    assert metrics["truth"] == str(recording / "truth.csv")
+    assert f"{metrics['errors']['mean_mm']:.1f}" in shell("evaluate", run, recording / "truth.trc")[1]
+
+
+def test_evaluate_takes_joints_and_a_first_frame(shell, run):
+    code, out, _ = shell("evaluate", run, "--joints", "neck,head", "--start", "10", "--json")
+    errors = json.loads(out)["errors"]
+    assert (code, list(errors["joints"]), errors["frames"]) == (0, ["neck", "head"], made.FRAMES - 10)
+    group = json.loads(shell("evaluate", run, "--joints", "upper", "--json")[1])["errors"]
+    assert list(group["joints"]) == list(UPPER)
+    assert "the run lacks" in refused(shell, "evaluate", run, "--joints", "left_knee")
+    assert f"start: found 99, expected 0 to {made.FRAMES - 1}, a frame of" in refused(shell, "evaluate", run, "--start", "99")
+
+
+def test_evaluate_says_when_the_truth_is_gone(shell, run, tmp_path):
+    moved = made.copied(run, tmp_path / "run")
+    info = tomllib.loads((run / "run.toml").read_text())
+    made.replace_text(moved / "run.toml", info["truth"], "/nowhere/truth.csv")
+    code, out, err = shell("evaluate", moved)
+    assert code == 0
+    assert "/nowhere/truth.csv: the recording's truth is not there any more; give it as TRUTH" in err
+    assert "overlap" in out
+    assert "joint errors" not in out
+
+
+def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, tmp_path):
+    code, out, err = shell("track", recording, "--silhouette.method", "averaging", "-o", tmp_path / "plain", *QUICK)
+    assert code == 0
+    assert "Traceback" not in err
+    said = " ".join(out.split())
+    assert "key averaging: as set" in said
+    assert "all this in clean silhouettes by both: plain ones show no posture" in said
+    assert read_run(tmp_path / "plain").info["settings"]["silhouette"]["method"] == "averaging"
+
+
+def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording, tmp_path):
+    code, out, err = shell("fit-person", recording, "-o", "me.toml")
+    assert (code, err) == (0, "")
+    for word in ("a1  head_width", "a18  shoulder_inset", "O1", "O2", "O3", "front_t_pose 0.", "saved    me.toml"):
+        assert word in out
+    assert (tmp_path / "me.toml").exists()
+    code, out, _ = shell("track", recording, "--person", "me.toml", *QUICK)
+    assert code == 0
+    assert "sizes from me.toml" in out
+
+
+def test_a_whole_body_is_tracked_with_one_camera_and_its_sizes_are_kept(shell, recording, tmp_path):
+    code, out, err = shell("track", recording, "-o", "run", "--body", "cylinders", *QUICK)
+    assert (code, err) == (0, "")
+    assert "frames" in out
+    header = (tmp_path / "run" / "angles.csv").read_text().splitlines()[0].split(",")
+    assert {"root_bow", "left_shoulder_abduction", "right_knee_flexion"} <= set(header)
+    assert "left_ankle_x" in (tmp_path / "run" / "joints.csv").read_text().splitlines()[0]
+    person = tmp_path / "run" / "person.toml"
+    assert 'body = "cylinders"' in person.read_text()
+    assert shell("track", recording, "-o", "again", "--body", "cylinders", "--person", person, "--quiet", *QUICK)[0] == 0
+    assert (tmp_path / "again" / "person.toml").read_text().split("[sizes]")[1] == person.read_text().split("[sizes]")[1]
+    assert "sizes: found those of the body 'cylinders', expected those of 'rou" in refused(shell, "track", recording, "--person", person)
+    assert 'Invalid value "ball" for --body. Choose from: "cardbox"' in refused(shell, "track", recording, "--body", "ball")
+
+
+# Settings
+
+
+def test_settings_are_a_file_of_settings(shell, recording, tmp_path):
+    code, out, _ = shell("settings", "--preset", "liu2011")
+    assert code == 0
+    assert make_options(tomllib.loads(out)) == make_options({"preset": "liu2011"})
+    (tmp_path / "mine.toml").write_text(out)
+    assert shell("track", recording, "-o", "run", "--quiet", "--config", "mine.toml", "--seed", "5", *QUICK)[0] == 0
+    info = read_run(tmp_path / "run").info
+    assert info["settings"]["seed"] == 5
+    assert info["settings"]["tracker"]["body"] == make_options({"preset": "liu2011"}).tracker.body
+    assert info["settings"]["tracker"]["explore"] == 20
+
+
+def test_every_setting_is_explained(shell):
+    lines = options_text(Options()).splitlines()
+    bare = [line for before, line in zip(["", *lines], lines) if re.match(r"(# )?\w+ =", line) and not before.startswith("# ")]
+    assert bare == []
+
+
+def test_flags_go_before_the_file_and_the_file_before_the_preset(monkeypatch, tmp_path):
+    from shadowpuppet.cli.flags import Flags, options_from
+
+    file = tmp_path / "mine.toml"
+    file.write_text('preset = "liu2011"\nseed = 3\nperson = "me.toml"\n[tracker.arm]\nparticles = 30\n[silhouette]\nclean = false\n')
+    paper, flags = make_options({"preset": "liu2011"}), Flags(seed=4)
+    options = options_from(flags, file)
+    assert options.seed == 4
+    assert options.tracker.arm.particles == 30
+    assert options.tracker.torso == paper.tracker.torso
+    assert options.silhouette.clean is False
+    assert options.person == tmp_path / "me.toml"  # beside the file
+    assert options_from(None, None) == Options()
+
+
+def test_a_run_can_be_made_again_from_its_own_file(shell, recording, run, tmp_path):
+    assert shell("track", recording, "-o", "again", "--quiet", "--config", run / "run.toml")[0] == 0
+    assert (tmp_path / "again" / "joints.csv").read_bytes() == (run / "joints.csv").read_bytes()
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("particles = 3", "mine.toml: unknown setting 'particles'; there are: background, body, calibration"),
+    ("[tracker]\narms = 3", "mine.toml: tracker: unknown setting 'arms'; there are: arm, body"),
+    ("[tracker.arm]\nparticles = -3", "mine.toml: tracker: arm.particles: found -3"),
+    ("seed = ", "mine.toml: not valid TOML"),
+])  # fmt: skip
+def test_a_wrong_file_of_settings_is_said_by_name(shell, recording, tmp_path, text, said):
+    (tmp_path / "mine.toml").write_text(text)
+    assert said in refused(shell, "track", recording, "--config", "mine.toml")
+
+
+# Bad input
+
+
+@pytest.fixture
+def spoilt(recording, tmp_path):
+    return made.copied(recording, tmp_path / "spoilt")
+
+
+def test_a_missing_film(shell, spoilt):
+    (spoilt / "video" / "cam.mp4").unlink()
+    assert "spoilt: no films in it, expected video/<camera>.mp4, a folder of pictures" in refused(shell, "track", spoilt)
+
+
+def test_an_unreadable_film(shell, spoilt):
+    (spoilt / "video" / "cam.mp4").write_bytes(b"no film" * 100)
+    assert "video/cam.mp4: no film that can be read" in refused(shell, "track", spoilt)
+
+
+def test_a_film_of_another_size_than_its_calibration(shell, spoilt):
+    made.write_film(spoilt / "video" / "cam.mp4", [np.zeros((240, 320, 3), np.uint8)] * 3)
+    said = refused(shell, "track", spoilt)
+    assert "found pictures of 320 x 240 pixels, the calibration of camera 'cam' is for 160 x 120; they have the same shape" in said
+
+
+def test_a_rotation_that_is_none(shell, spoilt):
+    rotation = next(line for line in (spoilt / "calibration.toml").read_text().splitlines() if line.startswith("rotation"))
+    made.replace_text(spoilt / "calibration.toml", rotation, "rotation = [[1.0, 0.2, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]")
+    said = refused(shell, "track", spoilt)
+    assert "calibration.toml: [cam]: camera 'cam': rotation: found" in said
+    assert "expected an orthonormal, right-handed matrix" in said
+
+
+def test_what_is_not_a_number(shell, spoilt):
+    translation = next(line for line in (spoilt / "calibration.toml").read_text().splitlines() if line.startswith("translation"))
+    made.replace_text(spoilt / "calibration.toml", translation, "translation = [0.0, nan, 2.0]")
+    said = refused(shell, "track", spoilt)
+    assert "calibration.toml: [cam]: translation: found [0.0, nan, 2.0], expected 3 finite numbers" in said
+
+
+def test_an_unknown_camera(shell, spoilt):
+    made.replace_text(spoilt / "calibration.toml", "cam", "left")
+    assert "found cam, but the calibration knows no such camera; cameras known: left" in refused(shell, "track", spoilt)
+
+
+def test_an_unknown_camera_that_is_asked_for(shell, recording):
+    assert "camera: found 'left', expected one of cam" in refused(shell, "track", recording, "--camera", "left")
+
+
+def test_no_calibration(shell, spoilt):
+    (spoilt / "calibration.toml").unlink()
+    assert "no calibration: give the camera's horizontal field of view (--fov DEGREES" in refused(shell, "track", spoilt)
+
+
+def test_nobody_in_the_film(shell, spoilt, tmp_path):
+    made.write_film(spoilt / "video" / "cam.mp4", made.images(spoilt / "background" / "cam.mp4") * 4)
+    code, out, err = shell("track", spoilt, "-o", "run")
+    assert code == 2
+    assert "silhouettes  0.0 % of the picture" in out  # what was seen is shown
+    assert err.startswith("error: ")
+    assert "the silhouette is empty in 100 % of the frames: nobody is in the picture" in err
+    assert not (tmp_path / "run").exists()
+    assert "the silhouette is empty" in refused(shell, "info", spoilt)
+
+
+def test_silhouettes_of_everything(shell, spoilt):
+    made.write_film(spoilt / "masks" / "cam.mkv", [np.full(made.SIZE[::-1], 255, np.uint8)] * made.FRAMES, lossless=True)
+    assert "nearly all of the picture is silhouette in 100 % of the frames" in refused(shell, "track", spoilt, "--masks")
+
+
+def test_a_person_partly_outside(shell, spoilt, tmp_path):
+    shifted = [np.pad(mask[:, 40:], [(0, 0), (0, 40), (0, 0)][: mask.ndim]) for mask in made.images(spoilt / "masks" / "cam.mkv")]
+    made.write_film(spoilt / "masks" / "cam.mkv", shifted, lossless=True)
+    code, _, err = shell("track", spoilt, "-o", "run", "--masks", *QUICK)
+    assert code == 0
+    assert "warning: the silhouette touches the left border in" in err
+    assert len(read_run(tmp_path / "run").motion) == made.FRAMES
+
+
+def test_no_references_no_height_no_distance(shell, recording, tmp_path):
+    bare = made.copied(recording, tmp_path / "bare", without=["references", "recording.toml"])
+    code, out, err = shell("track", bare, "-o", "run", "--preset", "liu2011", *QUICK)
+    assert code == 0
+    assert "average height of 1.70 m, assumed" in out
+    assert err.count("warning: neither height nor distance is known") == 1
+    assert len(read_run(tmp_path / "run").motion) == made.FRAMES
+
+
+def test_a_distance_that_the_references_do_not_bear_out(shell, recording):
+    said = refused(shell, "info", recording, "--distance", "18", "--height", "1.75")
+    assert "tiny: distance: found 18 metres, expected at most 2." in said
+    assert "np.float64" not in said
+
+
+def test_references_in_the_wrong_posture(shell, spoilt):
+    for name in ("front_t_pose", "front_arms_t_pose"):
+        source = spoilt / "references" / "side_arms_hanging.png"
+        (spoilt / "references" / f"{name}.png").write_bytes(source.read_bytes())
+    assert "references/front_t_pose.png: not the posture front_t_pose, it seems: " in refused(shell, "track", spoilt)
+
+
+def test_an_unknown_reference(shell, spoilt):
+    (spoilt / "references" / "front_t_pose.png").rename(spoilt / "references" / "t_pose.png")
+    assert "found t_pose; postures known: front_t_pose, side_arms_hanging" in refused(shell, "track", spoilt)
+
+
+def test_a_truncated_film_gives_what_it_has(shell, spoilt, tmp_path):
+    frames = made.images(spoilt / "video" / "cam.mp4")
+    (spoilt / "video" / "cam.mp4").unlink()
+    made.write_film(spoilt / "video" / "cam.mkv", frames)
+    data = (spoilt / "video" / "cam.mkv").read_bytes()
+    (spoilt / "video" / "cam.mkv").write_bytes(data[: len(data) // 2])
+    code, _, err = shell("track", spoilt, "-o", "run", *QUICK)
+    assert code == 0
+    assert err.count("broken off") == 1  # though the film is read more than once
+    assert 5 < len(read_run(tmp_path / "run").motion) < made.FRAMES
+
+
+def test_a_full_disk(shell, recording, monkeypatch, tmp_path):
+    import shadowpuppet.io.run
+
+    lines, real = [], shadowpuppet.io.run.csv_line
+
+    def full(cells):
+        lines.append(cells)
+        if len(lines) > 2 + 2 * 9:
+            raise OSError(28, "No space left on device")
+        return real(cells)
+
+    monkeypatch.setattr(shadowpuppet.io.run, "csv_line", full)
+    said = refused(shell, "track", recording, "-o", "run", *QUICK)
+    assert "run: the run cannot be written (no space left on device); the 10 frames so far are in joints.csv" in said
+    assert 9 <= len(read_run(tmp_path / "run").motion) <= 10
+
+
+def test_a_folder_that_holds_something_else(shell, recording, tmp_path):
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "thesis.tex").touch()
+    assert "found thesis.tex in it but no run.toml of a run" in refused(shell, "track", recording, "-o", "thesis")
+
+
+def test_control_c_leaves_a_run_that_can_be_read(recording, tmp_path):
+    folder = tmp_path / "run"
+    # Who starts the tests in the background has them, and so their children, ignore Ctrl-C.
+    heeding = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", preexec_fn=heeding)
+    rows, end = folder / "joints.csv", time.monotonic() + 60
+    while child.poll() is None and time.monotonic() < end and (not rows.exists() or rows.read_text().count("\n") < 4):
+        time.sleep(0.01)
+    child.send_signal(signal.SIGINT)
+    _, err = child.communicate()
+    assert child.returncode == 130
+    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}\n", err)
+    left = read_run(folder)
+    assert not left.complete
+    assert 2 <= len(left.motion) < made.FRAMES
+
+
+def test_control_c_before_the_first_frame(shell, recording, monkeypatch, tmp_path):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", stop)
+    assert shell("track", recording, "-o", "run") == (130, "", "interrupted: nothing was written\n")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_closed_pipe_is_no_error(recording):
+    child = process("settings")
+    assert child.stdout is not None
+    child.stdout.close()
+    assert child.wait() == 0
+    assert child.stderr is not None
+    assert child.stderr.read() == ""
+    child.stderr.close()
+
+
+def test_a_bug_is_not_hidden(shell, recording, monkeypatch):
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        shell("track", recording, "-o", "run")
+
+
+@pytest.mark.shared
+def test_the_errors_are_those_of_the_projects_own_script(shell, recording, run, shared):
+    score = Path(shared) / "tools" / "score.py"
+    command = [sys.executable, str(score), str(run / "joints.csv"), str(recording / "truth.csv"), "--joints", "upper", "--json"]
+    theirs = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    ours = json.loads(shell("evaluate", run, "--json")[1])["errors"]
+    for key in ("mean_mm", "rmse_mm", "plane_mm", "far", "p95_mm", "aligned_mean_mm"):
+        assert ours[key] == pytest.approx(theirs[key], abs=0.01)
+
+
+def test_plane_and_depth_are_those_of_the_runs_camera(shell, run, tmp_path):
+    """Seen from the side, what was depth lies in the picture."""
+    turned = made.copied(run, tmp_path / "run")
+    rotation = next(line for line in (turned / "calibration.toml").read_text().splitlines() if line.startswith("rotation"))
+    side = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]
+    made.replace_text(turned / "calibration.toml", rotation, f"rotation = {side}")
+    before, after = (json.loads(shell("evaluate", folder, "--json")[1])["errors"] for folder in (run, turned))
+    assert after["mean_mm"] == pytest.approx(before["mean_mm"])
+    assert after["depth_mm"] < 0.9 * before["depth_mm"]
+    assert after["plane_mm"] > before["plane_mm"]

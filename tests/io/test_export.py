@@ -1,0 +1,205 @@
+"""Runs exported and files converted, as a user types it."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+
+import acclaim
+import biovision
+import numpy as np
+import pytest
+import runs
+
+from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.io.export import CONVERSIONS, EXPORTS, export_run
+from shadowpuppet.io.motion.bvh import read_bvh
+from shadowpuppet.io.motion.c3d import read_c3d, read_header
+from shadowpuppet.io.motion.mot import read_mot
+from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.animation import Y_UP
+
+LOST = (0, 6, 7)
+
+
+@pytest.fixture(scope="module", params=["rounded", "anatomical", "cylinders"])
+def run(request, tmp_path_factory):
+    return runs.make_run(tmp_path_factory.mktemp("runs") / "walk", request.param, lost=LOST, spread=True)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return runs.make_run(tmp_path_factory.mktemp("runs") / "walk", "anatomical", frames=25)
+
+
+@pytest.fixture
+def columns() -> int:
+    return 100
+
+
+def refused(shell, *tokens: object) -> str:
+    code, _, err = shell(*tokens)
+    assert code == 2
+    assert "Traceback" not in err
+    return next(line for line in err.splitlines() if line.startswith("error: "))
+
+
+def test_every_format_of_a_run_has_the_runs_joints(shell, run, tmp_path):
+    code, out, err = shell("export", run, "--to", "all", "-o", tmp_path / "out")
+    assert code == 0, err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {f"walk.{name}" for name in EXPORTS}
+    assert "walk.glb" in out
+    motion = read_run(run).motion
+    known = np.delete(np.arange(len(motion)), LOST)
+    bvh = read_bvh(tmp_path / "out" / "walk.bvh").joints().select(motion.joint_names).positions @ Y_UP
+    assert np.abs(bvh[known] - motion.joints[known]).max() < 1e-4
+    for name in ("c3d", "csv", "npz", "parquet"):
+        found = read_motion(tmp_path / "out" / f"walk.{name}").select(motion.joint_names)
+        np.testing.assert_allclose(found.positions, motion.joints, atol=1e-6, err_msg=name)
+    trc = read_joints(tmp_path / "out" / "walk.trc").positions @ Y_UP
+    np.testing.assert_allclose(trc, motion.joints, atol=1e-6)
+    np.testing.assert_allclose(read_mot(tmp_path / "out" / "walk.mot").times, motion.times[known])
+    assert "3 of 40 frames are not known, which this format cannot tell" in err
+    assert "3 of 40 frames are not known: the puppet is hidden" in err
+
+
+def test_by_default_files_lie_in_the_run_and_a_new_run_may_replace_it(shell, whole, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(whole, folder)
+    assert shell("export", folder, "--to", "csv, BVH")[0] == 0
+    assert sorted(path.name for path in (folder / "export").iterdir()) == ["run.bvh", "run.csv"]
+    runs.make_run(folder)  # is not refused
+
+
+def test_a_killed_run_is_exported_as_far_as_it_came(shell, whole, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(whole, folder)
+    (folder / "motion.npz").unlink()
+    (folder / "metrics.json").unlink()
+    text = (folder / "run.toml").read_text()
+    (folder / "run.toml").write_text(text.replace("complete = true", "complete = false"))
+    for name in ("joints.csv", "angles.csv"):
+        lines = (folder / name).read_text().splitlines(keepends=True)
+        (folder / name).write_text("".join(lines[:12]) + lines[12][:20])
+    assert shell("export", folder, "--to", "bvh,c3d,mot,glb")[0] == 0
+    motion = read_run(whole).motion
+    found = read_bvh(folder / "export" / "run.bvh").joints().select(motion.joint_names).positions @ Y_UP
+    assert len(found) == 11
+    np.testing.assert_allclose(found, motion.joints[:11], atol=1e-4)
+
+
+def test_without_pyarrow_all_others_are_written(shell, whole, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "Parquet needs pyarrow" in refused(shell, "export", whole, "--to", "all", "-o", tmp_path / "out")
+    assert {path.suffix[1:] for path in (tmp_path / "out").iterdir()} == set(EXPORTS) - {"parquet"}
+
+
+def test_units_of_bvh(shell, whole, tmp_path):
+    assert shell("export", whole, "--to", "bvh", "--unit", "cm", "-o", tmp_path)[0] == 0
+    hips = read_bvh(tmp_path / "walk.bvh").joints().select(["pelvis"]).positions
+    assert 80 < hips[:, 0, 1].mean() < 110
+
+
+def test_angles_are_analog_channels_in_degrees(shell, whole, tmp_path):
+    assert shell("export", whole, "--to", "c3d", "-o", tmp_path)[0] == 0
+    header = read_header(tmp_path / "walk.c3d")
+    units = dict(zip(header.words("ANALOG:LABELS"), header.words("ANALOG:UNITS")))
+    assert units["left_knee_flexion"] == "deg"
+    assert units["root_x"] == "m"
+    assert len(units) == 32
+
+
+def test_what_cannot_be_exported_is_said(shell, whole, tmp_path):
+    assert "formats: found 'fbx', expected some of bvh, c3d, csv, glb, mot, npz, " in refused(shell, "export", whole, "--to", "fbx")
+    assert "formats: found ''" in refused(shell, "export", whole, "--to", "")
+    assert "found no run.toml" in refused(shell, "export", tmp_path)
+    bare = runs.make_run(tmp_path / "bare", frames=5, person=False)
+    assert "person.toml: found no such file, expected the person's sizes" in refused(shell, "export", bare, "--to", "csv,bvh")
+    assert (bare / "export" / "bare.csv").exists()
+    assert shell("export", bare, "--to", "trc,c3d,npz,csv,parquet")[0] == 0
+    nobody = runs.make_run(tmp_path / "nobody", frames=3, lost=(0, 1, 2))
+    assert "found no frame with a known joint" in refused(shell, "export", nobody, "--to", "csv")
+    (tmp_path / "file").touch()
+    assert "cannot be made" in refused(shell, "export", whole, "--to", "csv", "-o", tmp_path / "file" / "out")
+    other = tmp_path / "other"
+    shutil.copytree(whole, other)
+    shutil.copy(runs.make_run(tmp_path / "upper", "rounded", 3) / "person.toml", other / "person.toml")
+    assert "sizes: found those of the body 'rounded'" in refused(shell, "export", other, "--to", "glb")
+
+
+def test_a_person_measured_anew_is_said(tmp_path, whole):
+    folder = tmp_path / "run"
+    shutil.copytree(whole, folder)
+    text = (folder / "person.toml").read_text()
+    line = next(line for line in text.splitlines() if line.startswith("upper_arm_length"))
+    (folder / "person.toml").write_text(text.replace(line, "upper_arm_length = 0.36"))
+    with pytest.warns(ShadowPuppetWarning, match=r"the body in person\.toml lie up to \d+ mm off the run's"):
+        export_run(folder, ["bvh"])
+
+
+@pytest.mark.filterwarnings("ignore:.*Y points up:shadowpuppet.errors.ShadowPuppetWarning")
+@pytest.mark.parametrize("target", CONVERSIONS)
+def test_joints_become_any_other_file(shell, whole, tmp_path, target):
+    code, out, err = shell("convert", whole / "joints.csv", tmp_path / f"made{target}")
+    assert code == 0, err
+    assert f"made{target}" in out
+    motion = read_run(whole).motion
+    if target in (".bvh", ".glb", ".mot"):
+        assert "a body's poses fitted to 17 joints, 25 frames" in out
+    if target == ".bvh":
+        found = read_bvh(tmp_path / "made.bvh").joints().select(motion.joint_names).positions @ Y_UP
+        assert np.sqrt(((found - motion.joints) ** 2).sum(2).mean()) < 0.02
+    elif target not in (".glb", ".mot"):
+        found = read_motion(tmp_path / f"made{target}").select(motion.joint_names)
+        np.testing.assert_allclose(found.positions, motion.joints, atol=2e-6)
+
+
+def test_skeletons_stay_skeletons(shell, tmp_path):
+    (tmp_path / "a.bvh").write_text(biovision.person(6))
+    assert shell("convert", "a.bvh", "b.bvh", "--unit", "cm")[0] == 0
+    before, after = read_bvh(tmp_path / "a.bvh"), read_bvh(tmp_path / "b.bvh")
+    assert {node.name for node in after.nodes} == {node.name for node in before.nodes}
+    names = [node.name for node in before.nodes]
+    np.testing.assert_allclose(after.joints().select(names).positions, before.joints().positions, atol=2e-3)
+    acclaim.write(tmp_path)
+    code, out, err = shell("convert", "01_01.amc", "c.glb", "--rate", "60")
+    assert code == 0, err
+    assert "a skeleton of 29 joints, 3 frames" in out
+
+
+def test_all_keeps_every_point_under_its_own_name(shell, tmp_path):
+    (tmp_path / "a.bvh").write_text(biovision.person(6))
+    assert shell("convert", "a.bvh", "ours.c3d")[0] == 0
+    assert shell("convert", "a.bvh", "all.c3d", "--all")[0] == 0
+    assert "left_elbow" in read_c3d(tmp_path / "ours.c3d").names
+    found = read_c3d(tmp_path / "all.c3d")
+    assert found.names == tuple(read_bvh(tmp_path / "a.bvh").joints().names)
+    np.testing.assert_allclose(found.select(["LeftForeArm"]).positions, read_c3d(tmp_path / "ours.c3d").select(["left_elbow"]).positions)
+
+
+def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
+    joints = whole / "joints.csv"
+    assert "found the ending '.fbx', expected one of .bvh, .c3d, .csv, .glb, .mot" in refused(shell, "convert", joints, "a.fbx")
+    assert "found the ending '.mp4'" in refused(shell, "convert", "a.mp4", "a.csv")
+    assert "a run's folder by `shadowpuppet export`" in refused(shell, "convert", whole, "a.csv")
+    assert "a.csv: cannot be read (no such file" in refused(shell, "convert", "a.csv", "b.csv")
+    shutil.copy(joints, tmp_path / "a.csv")
+    assert "found the file that is to be read" in refused(shell, "convert", "a.csv", "a.csv")
+    assert (tmp_path / "a.csv").read_bytes() == joints.read_bytes()
+    assert "rate: found 0.0, expected frames a second" in refused(shell, "convert", "a.csv", "b.csv", "--rate", "0")
+    (tmp_path / "m.csv").write_text("time,LASI_x,LASI_y,LASI_z\n0,1,2,3\n")
+    assert "found no joint of a known name" in refused(shell, "convert", "m.csv", "b.csv")
+    assert shell("convert", "m.csv", "b.trc", "--all")[0] == 0
+    (tmp_path / "arm.csv").write_text("time,neck_x,neck_y,neck_z\n0,1,2,3\n")
+    assert "needs a skeleton, and none can be fitted" in refused(shell, "convert", "arm.csv", "b.bvh")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    said = refused(shell, "convert", "a.csv", "b.parquet")
+    assert "Parquet needs pyarrow, which is not installed: pip install 'shadowpuppet[formats]'" in said
+    assert not (tmp_path / "b.parquet").exists()
+
+
+def test_help_names_the_formats(shell):
+    assert "bvh, c3d, csv, glb, mot, npz, parquet, trc" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
+    assert "--source-unit" in shell("convert", "--help")[1]

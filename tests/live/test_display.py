@@ -1,0 +1,353 @@
+"""What a session shows: drawn pictures, the page and who may see it, the window."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import shutil
+import socket
+import subprocess
+import threading
+import time
+
+import numpy as np
+import people
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
+from shadowpuppet.live.display import choice, window
+from shadowpuppet.live.display.choice import open_display
+from shadowpuppet.live.display.drawing import drawn
+from shadowpuppet.live.display.view import Angle, Display, View
+from shadowpuppet.live.display.web import PORT, WebDisplay
+from shadowpuppet.live.display.window import WindowDisplay
+from shadowpuppet.network import is_loopback, known_host
+from shadowpuppet.video import read_image
+
+ROOM = np.full((120, 160, 3), 90, np.uint8)
+
+
+def tracked(**more) -> View:
+    picture = people.picture("rounded")
+    pose = np.zeros(len(picture.body.skeleton.dofs))
+    angles = tuple(Angle(f"{part} {name}", 20.0, -40, 90) for part in ("torso", "left", "right") for name in ("bend", "twist"))
+    known = {"phase": "tracking", "status": "tracked", "overlap": 0.91, "angles": angles, "latency": 0.012, "rate": 15.0,
+             "interval": 1 / 15, "image": ROOM, "mask": picture.mask(pose), "picture": picture, "pose": pose}
+    return View(**known | more)
+
+
+# Pictures
+
+
+def test_a_small_picture_is_enlarged_and_the_person_drawn_where_they_are():
+    shown, bare = drawn(tracked()), drawn(tracked(mask=None, pose=None))
+    assert shown is not None
+    assert bare is not None
+    assert shown.shape == bare.shape == (480, 640, 3)
+    changed = (shown != bare).any(2)
+    body = tracked().mask
+    assert body is not None
+    inside = np.kron(body, np.ones((4, 4), bool))
+    assert changed[inside].mean() > 0.9
+    assert changed[:, :40].sum() == 0
+    assert (ROOM == 90).all()  # not written to
+
+
+@pytest.mark.parametrize(("more", "darker"), [({}, False), ({"phase": "learning"}, True), ({"trouble": "gone"}, True),
+                                              ({"phase": "waiting"}, False)])
+def test_what_is_not_tracked_is_dimmed(more, darker):
+    shown = drawn(tracked(mask=None, pose=None, **more))
+    assert shown is not None
+    assert (shown.mean() < 60) == darker
+
+
+def test_grey_and_large_pictures_and_none():
+    assert drawn(View(phase="waiting")) is None
+    grey = drawn(View(phase="waiting", image=ROOM[..., 0]))
+    assert grey is not None
+    assert grey.shape == (480, 640, 3)
+    large = drawn(View(phase="waiting", image=np.zeros((1080, 1920, 3), np.uint8)))
+    assert large is not None
+    assert large.shape == (540, 960, 3)
+
+
+@given(st.floats(allow_nan=True), st.floats(allow_nan=True), st.none() | st.floats(allow_nan=True))
+def test_figures_are_json_whatever_is_not_known(latency, overlap, countdown):
+    view = View(phase="waiting", latency=latency, overlap=overlap, countdown=countdown, angles=(Angle("a b", latency, 0, 1),))
+    json.dumps(view.figures(), allow_nan=False)
+
+
+def test_the_chip_says_what_matters():
+    assert tracked().chip == "tracked"
+    assert tracked(trouble="unplugged").chip == "paused"
+    assert View(phase="measuring").chip == "measuring"
+    assert tracked(status="").chip == "tracking"
+    assert tracked(trouble="unplugged").figures()["message"] == "unplugged"
+
+
+# The page
+
+
+@pytest.fixture
+def page():
+    with WebDisplay(port=0, footer="nothing is kept") as display:
+        yield display
+
+
+def ask(display, path, method="GET", headers=None, read=True):
+    connection = http.client.HTTPConnection("127.0.0.1", display.server.server_port, timeout=20)
+    connection.request(method, path, headers=headers or {})
+    answer = connection.getresponse()
+    return answer, answer.read() if read else b""
+
+
+def test_the_page_needs_nothing_from_elsewhere(page):
+    texts = []
+    assert ask(page, "/icon.svg")[1].startswith(b"<svg")
+    for path, kind in (("/", "text/html"), ("/page.css", "text/css"), ("/page.js", "text/javascript")):
+        answer, body = ask(page, path)
+        assert (answer.status, answer.headers["Content-Type"]) == (200, f"{kind}; charset=utf-8")
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+        assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        texts.append(body.decode())
+    assert "<!doctype html>" in texts[0]
+    assert not any(word in text for text in texts for word in ("http://", "https://", "//cdn", "@import", "style=", "onclick=\""))
+    assert page.where == f"at http://127.0.0.1:{page.server.server_port}/"
+    assert ask(page, "/../web.py")[0].status == 404
+
+
+def test_the_picture_is_a_jpeg_of_the_newest_view(page, tmp_path):
+    page.show(tracked())
+    answer, body = ask(page, "/picture.jpg")
+    (tmp_path / "a.jpg").write_bytes(body)
+    assert answer.headers["Content-Type"] == "image/jpeg"
+    assert np.abs(read_image(tmp_path / "a.jpg").astype(int) - drawn(tracked())).mean() < 4
+
+
+def test_pictures_are_pushed_and_each_ends_with_a_boundary(page):
+    page.show(tracked())
+    answer, _ = ask(page, "/picture.mjpeg", read=False)
+    assert answer.headers["Content-Type"] == "multipart/x-mixed-replace; boundary=shadowpuppet"
+    assert answer.readline() == b"--shadowpuppet\r\n"
+    for n in range(2):
+        assert answer.readline() == b"Content-Type: image/jpeg\r\n"
+        length = int(answer.readline().split()[1])
+        assert answer.readline() == b"\r\n"
+        data = answer.read(length)
+        assert data[:2] + data[-2:] == b"\xff\xd8\xff\xd9"
+        assert answer.readline() + answer.readline() == b"\r\n--shadowpuppet\r\n"
+        page.show(tracked(image=ROOM + 20 * n))
+    answer.close()
+
+
+def events(answer):
+    for line in iter(answer.readline, b""):
+        if line.startswith(b"data: "):
+            yield json.loads(line[6:])
+
+
+def test_figures_are_pushed_until_the_session_is_over():
+    with WebDisplay(port=0, footer="nothing is kept") as page:
+        page.show(tracked())
+        answer, _ = ask(page, "/events", read=False)
+        told = events(answer)
+        first = next(told)
+        assert (first["chip"], first["latency"], first["footer"]) == ("tracked", 12.0, "nothing is kept")
+        assert first["angles"][0] == ["torso bend", 20.0, -40, 90]
+        page.show(tracked(latency=0.02))
+        assert any(view["latency"] == 20.0 for view in told)
+    assert list(told)[-1] == {"over": True}
+
+
+def test_views_without_a_picture_do_not_blank_the_page(page):
+    page.show(tracked())
+    seen = page.next(0, 0.0)[0]
+    page.show(tracked(image=None, mask=None, pose=None))
+    assert page.next(0, 0.0)[0] == seen
+    page.show(tracked(image=None, trouble="unplugged"))
+    assert page.next(0, 0.0)[1].chip == "paused"
+
+
+def test_buttons_are_wishes_once(page):
+    for wish in ("learn", "measure", "stop"):
+        assert ask(page, f"/wish/{wish}", "POST", {"X-Shadowpuppet": "1"})[0].status == 200
+        assert (page.wish(), page.wish()) == (wish, "")
+    assert ask(page, "/wish/fly", "POST", {"X-Shadowpuppet": "1"})[0].status == 404
+
+
+def test_other_sites_cannot_press_buttons(page):
+    assert ask(page, "/wish/stop", "POST")[0].status == 403
+    assert ask(page, "/wish/stop", "POST", {"Host": "evil.example", "X-Shadowpuppet": "1"})[0].status == 421
+    assert page.wish() == ""
+
+
+@pytest.mark.parametrize("path", ["/", "/picture.jpg", "/picture.mjpeg", "/events"])
+def test_names_that_were_turned_to_this_machine_are_refused(page, path):
+    page.show(tracked())
+    answer, body = ask(page, path, headers={"Host": f"evil.example:{page.server.server_port}"})
+    assert answer.status == 421
+    assert b"\xff\xd8" not in body
+
+
+@pytest.mark.parametrize(("host", "loopback", "good"), [
+    ("127.0.0.1:8600", True, True), ("localhost:8600", True, True), ("LOCALHOST", True, True), ("[::1]:8600", True, True),
+    ("192.168.1.5:8600", True, False), ("192.168.1.5:8600", False, True), ("evil.example", False, False), ("", True, False),
+    ("localhost.evil.example", True, False), ("127.0.0.1.evil.example", False, False), ("[::1", True, False),
+])  # fmt: skip
+def test_hosts_that_are_known(host, loopback, good):
+    assert known_host(host, loopback) == good
+
+
+def test_this_machine_s_name_is_known_where_others_may_look():
+    assert known_host(f"{socket.gethostname()}:80", loopback=False)
+    assert known_host(socket.gethostname(), loopback=True) == (socket.gethostname().lower() == "localhost")
+
+
+@pytest.mark.parametrize(("address", "alone"), [("127.0.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False), ("::", False),
+                                                ("192.168.0.2", False), ("my.host", False)])
+def test_what_only_this_machine_reaches(address, alone):
+    assert is_loopback(address) == alone
+
+
+def test_the_page_listens_to_this_machine_alone_by_default(page):
+    assert page.server.server_address[0] == "127.0.0.1"
+    with WebDisplay("0.0.0.0", 0) as wide:
+        assert not wide.server.loopback
+        assert ask(wide, "/")[0].status == 200
+
+
+def test_a_taken_port_is_refused_and_without_one_another_is_found():
+    said = r"listen: 127.0.0.1, port: \d+: the page cannot be served there"
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(SettingsError, match=said):
+        WebDisplay(port=taken.getsockname()[1])
+    with WebDisplay() as one, WebDisplay() as other:
+        assert one.server.server_port != other.server.server_port
+        assert PORT in (one.server.server_port, other.server.server_port) or one.server.server_port > 1024
+
+
+# Where it is shown
+
+
+def test_where_nothing_is_to_be_shown_nothing_is():
+    display = open_display("none")
+    assert type(display) is Display
+    assert (display.where, display.wish()) == ("", "")
+    with display:
+        display.show(tracked())
+
+
+def test_without_a_screen_it_is_a_page(monkeypatch):
+    monkeypatch.setattr(choice, "has_screen", lambda: False)
+    display = open_display("auto", port=0)
+    assert isinstance(display, WebDisplay)
+    assert "joints and angles alone are saved" in display.footer
+    display.server.server_close()
+    recorded = open_display("browser", port=0, record=True)
+    assert isinstance(recorded, WebDisplay)
+    assert "recorded" in recorded.footer
+    recorded.server.server_close()
+
+
+def test_a_page_that_others_can_see_is_said():
+    with pytest.warns(ShadowPuppetWarning, match=r"the page is served at 0\.0\.0\.0: everybody who reaches this machine can see"):
+        display = open_display("browser", "0.0.0.0", 0)
+    assert isinstance(display, WebDisplay)
+    display.server.server_close()
+
+
+def test_a_window_that_cannot_be_opened_is_said(monkeypatch):
+    monkeypatch.setattr(window, "no_window", lambda: "no display name")
+    with pytest.raises(SettingsError, match=r"show: no window can be opened \(no display name\); --show browser"):
+        open_display("window")
+    monkeypatch.setattr(choice, "has_screen", lambda: True)
+    display = open_display("auto", port=0)
+    assert isinstance(display, WebDisplay)
+    display.server.server_close()
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    """A screen; one in memory where there is none."""
+    if not window.no_window():
+        yield
+        return
+    server = shutil.which("Xvfb")
+    if server is None:
+        pytest.skip(f"no screen ({window.no_window()}) and no Xvfb")
+    read, write = os.pipe()
+    command = [server, "-displayfd", str(write), "-screen", "0", "1280x800x24"]
+    with subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL) as child:
+        os.close(write)
+        with os.fdopen(read) as told:
+            monkeypatch.setenv("DISPLAY", f":{told.readline().strip()}")
+        if window.no_window():
+            child.terminate()
+            pytest.skip(window.no_window())
+        yield
+        child.terminate()
+
+
+def test_the_window_shows_the_view_and_takes_keys(screen):
+    with WindowDisplay("nothing is kept") as display:
+        for n in range(3):
+            display.show(tracked(latency=0.01 * n))
+        texts = {display.canvas.itemcget(item, "text") for item in display.canvas.find_all() if display.canvas.type(item) == "text"}
+        assert {"shadowpuppet", "tracked", "20 ms", "15.0 frames/s", "0.91", "left bend", "20°", "nothing is kept"} <= texts
+        photo = display._photo
+        shown = drawn(tracked())
+        assert shown is not None
+        assert (photo.width(), photo.height()) == (640, 480)
+        assert photo.get(320, 100) == tuple(shown[100, 320, ::-1].tolist())
+        display.show(tracked(trouble="the camera is gone"))
+        assert any(display.canvas.itemcget(item, "text") == "the camera is gone" for item in display.canvas.find_withtag("drawn")
+                   if display.canvas.type(item) == "text")
+        for key, wish in (("q", "stop"), ("b", "learn"), ("m", "measure")):
+            display.root.focus_force()
+            display.root.event_generate(f"<KeyPress-{key}>")
+            display.root.update()
+            assert (display.wish(), display.wish()) == (wish, "")
+        display.root.tk.call(*display.root.tk.splitlist(display.root.protocol("WM_DELETE_WINDOW")))
+        assert display.wish() == "stop"
+        display.root.destroy()  # as where the screen is gone
+        display.show(tracked())
+        assert display.wish() == "stop"
+
+
+def test_a_browser_shows_the_page(page, tmp_path):
+    """Chromium without a screen: the chip's and the skeleton's colours are in what it shows, and no script failed."""
+    browser = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+    if browser is None:
+        pytest.skip("no Chromium here")
+    done = threading.Event()
+
+    def play():
+        while not done.wait(0.05):
+            page.show(tracked())
+
+    threading.Thread(target=play, daemon=True).start()
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,760", "--timeout=4000",
+               "--disable-dev-shm-usage",
+               "--enable-logging=stderr", f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={tmp_path / 'page.png'}", page.address]
+    try:
+        said = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False).stderr
+    finally:
+        done.set()
+        time.sleep(0.1)
+    if not (tmp_path / "page.png").exists():
+        pytest.skip(f"Chromium cannot be run here: {said.strip()[-200:]}")
+    assert not [line for line in said.splitlines() if "CONSOLE" in line]
+    shown = read_image(tmp_path / "page.png").astype(int)
+    assert shown.shape == (760, 1280, 3)
+
+    def near(x, y, colour):
+        part = np.abs(shown[y, x] - np.array(colour[::-1])).max(-1)
+        return int((part < 30).sum())
+
+    right, left = (slice(880, 1270), slice(10, 750)), (slice(20, 860), slice(20, 740))
+    assert near(*right, (0x3F, 0xB6, 0x8B)) > 100  # the chip, and the left arm's bars
+    assert near(*right, (0xD0, 0x8C, 0xB8)) > 50  # the right arm's bars
+    assert near(*left, (0x56, 0xB4, 0xE9)) > 500  # the silhouette's outline
+    assert near(*left, (0xF0, 0xE4, 0x42)) > 100  # the spine

@@ -1,0 +1,255 @@
+"""Several films in step: what belongs together, cameras that differ in rate, start and length, films that break off."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from solids import looking
+
+from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.io.recording import Recording, View
+from shadowpuppet.pipeline.footage import Footage, Shot
+from shadowpuppet.pipeline.footage_rig import LATE, Rig, chosen_views, follow, open_rig
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.video import write_frames
+
+SIZE = (32, 16)
+in_tmp_path = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def numbered(n: int) -> np.ndarray:
+    """A picture that tells its number, whatever the codec does to it: eight bars."""
+    bits = 255 * np.repeat((n >> np.arange(8)) & 1, SIZE[0] // 8).astype(np.uint8)
+    return np.broadcast_to(bits[None, :, None], (*SIZE[::-1], 3)).copy()
+
+
+def number_of(image: np.ndarray) -> int:
+    bars = image[:, :, 1].reshape(SIZE[1], 8, -1).mean((0, 2)) > 127
+    return int((bars << np.arange(8)).sum())
+
+
+def film(path: Path, times: np.ndarray) -> Path:
+    with write_frames(path, 1 / float(np.median(np.diff(times))), lossless=path.suffix == ".mkv") as out:
+        for n, time in enumerate(times):
+            out.write(numbered(n), float(time))
+    return path
+
+
+def rig(folder: Path, *times: np.ndarray, starts=(), duration: float | None = None, suffix: str = ".mkv") -> Rig:
+    """A rig of films of frames at these times (s)."""
+    views = []
+    for k, shown in enumerate(times):
+        path = film(folder / f"cam{k + 1}{suffix}", shown)
+        views.append(View(looking((2.0, k, 1.0), size=SIZE, name=f"cam{k + 1}"), path, start=starts[k] if starts else 0.0))
+    recording = Recording(folder, "made", tuple(views), duration=duration)
+    return Rig(recording, tuple(Footage(recording, view, view.camera) for view in views))
+
+
+def bright(shot: Shot) -> np.ndarray:
+    return shot.image[:, :, 1] > 127
+
+
+def numbers(made: Rig, **more) -> list[tuple[int | None, ...]]:
+    """Of the frames of every set."""
+    sets = list(follow(made, [bright] * len(made.footage), **more))
+    for each in sets:
+        for image, mask in zip(each.images, each.masks):
+            assert (image is None) == (mask is None)
+            assert image is None or (mask == (image[:, :, 1] > 127)).all()
+    return [tuple(None if image is None else number_of(image) for image in each.images) for each in sets]
+
+
+def steady(count: int, rate: float = 10.0, start: float = 0.0) -> np.ndarray:
+    return start + np.arange(count) / rate
+
+
+def test_frames_of_one_number_belong_together(tmp_path):
+    made = rig(tmp_path, steady(7), steady(7), steady(7))
+    assert numbers(made) == [(n, n, n) for n in range(7)]
+    assert [each.time for each in follow(made, [bright] * 3)] == pytest.approx(steady(7))
+    assert made.rate == pytest.approx(10)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_sets_do_not_depend_on_threads(tmp_path, threads):
+    made = rig(tmp_path, steady(9), steady(5, 5.0), steady(8, 10.0))
+    assert numbers(made, threads=threads) == numbers(made)
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 20])
+def test_only_every_nth_set_is_looked_at(tmp_path, every):
+    looked = []
+
+    def see(shot: Shot) -> np.ndarray:
+        looked.append(number_of(shot.image))
+        return bright(shot)
+
+    made = rig(tmp_path, steady(11), steady(11))
+    sets = list(follow(made, [see] * 2, every=every))
+    assert [number_of(each.images[0]) for each in sets] == list(range(0, 11, every))
+    assert sorted(looked) == sorted(2 * list(range(0, 11, every)))
+    assert all(mask is not None for each in sets for mask in each.masks)
+
+
+def test_a_slower_camera_is_missing_between_its_frames(tmp_path):
+    made = rig(tmp_path, steady(8), steady(4, 5.0), steady(8))
+    assert numbers(made) == [(n, n // 2 if n % 2 == 0 else None, n) for n in range(8)]
+
+
+def test_a_faster_camera_gives_every_other_frame(tmp_path):
+    made = rig(tmp_path, steady(16, 20.0), steady(8), steady(8))
+    assert numbers(made) == [(2 * n, n, n) for n in range(8)]
+
+
+def test_of_two_rates_the_slower_one_counts(tmp_path):
+    assert numbers(rig(tmp_path, steady(12, 20.0), steady(6))) == [(2 * n, n) for n in range(6)]
+
+
+def test_films_that_began_at_other_times_are_told_so(tmp_path):
+    made = rig(tmp_path, steady(10), steady(10), starts=(0.3, 0.0))
+    assert numbers(made)[:7] == [(n + 3, n) for n in range(7)]
+
+
+def test_a_recording_may_end_before_its_films(tmp_path):
+    made = rig(tmp_path, steady(10), steady(12), starts=(0.0, 0.2), duration=0.5)
+    assert numbers(made) == [(n, n + 2) for n in range(5)]
+
+
+def test_how_many_sets_there_are_is_told_where_films_tell_it(tmp_path):
+    """Matroska does not."""
+    made = rig(tmp_path, steady(10), steady(12), steady(20, 20.0), starts=(0.0, 0.3, 0.0), suffix=".mp4")
+    assert [footage.count for footage in made.footage] == [10, 9, 20]
+    assert made.count == len(numbers(made)) == 10
+    assert rig(tmp_path, steady(10), steady(12), duration=0.5, suffix=".mp4").count == 5
+    assert rig(tmp_path, steady(10), steady(12)).count is None
+
+
+def test_frames_missing_in_one_film_are_none(tmp_path):
+    found = numbers(rig(tmp_path, steady(12), np.delete(steady(12), [4, 5])))
+    assert found == [(n, n if n < 4 else None if n < 6 else n - 2) for n in range(12)]
+
+
+@given(jitter=st.integers(0, 2**32 - 1), phase=st.floats(-0.45, 0.45))
+@in_tmp_path
+def test_clocks_that_tremble_and_lie_half_a_frame_apart_lose_nothing(tmp_path, jitter, phase):
+    rng = np.random.default_rng(jitter)
+    count = 10
+    wobble = steady(count) + rng.uniform(-0.004, 0.004, count)
+    wobble -= wobble[0]
+    made = rig(tmp_path, steady(count), wobble, starts=(max(0.0, 0.1 * phase), max(0.0, -0.1 * phase)))
+    found = numbers(made)
+    seen = [b for _, b in found if b is not None]
+    assert seen == sorted(set(seen))  # each once, in order
+    assert sum(None not in pair for pair in found) >= count - 2
+
+
+def test_a_film_that_ends_is_missing_from_there_on_and_that_is_said_once(tmp_path):
+    made = rig(tmp_path, steady(6), steady(20), steady(20))
+    message = r"cam1\.mkv: ends at 0\.50 s; from there on the run goes on without camera 'cam1'"
+    with pytest.warns(ShadowPuppetWarning, match=message) as said:
+        found = numbers(made)
+    assert found == [(n if n < 6 else None, n, n) for n in range(20)]
+    assert len(said) == 1
+
+
+def test_films_of_nearly_one_length_need_no_word(tmp_path):
+    assert len(numbers(rig(tmp_path, steady(10), steady(10 + LATE - 1)))) == 10 + LATE - 1  # warnings are errors here
+
+
+def test_a_film_that_is_cut_off_leaves_the_others(tmp_path):
+    made = rig(tmp_path, steady(40), steady(40))
+    path = tmp_path / "cam1.mkv"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.warns(ShadowPuppetWarning) as said:
+        found = numbers(made)
+    lost = [a for a, _ in found].index(None)
+    assert 3 < lost < 37
+    assert found == [(n if n < lost else None, n) for n in range(40)]
+    assert sum("goes on without camera 'cam1'" in str(each.message) for each in said) == 1
+
+
+def test_a_silhouette_that_cannot_be_made_costs_that_camera_only(tmp_path):
+    made = rig(tmp_path, steady(12), steady(12))
+
+    def fails(shot: Shot) -> np.ndarray:
+        if shot.time > 0.35:
+            raise SilhouetteError("masks/cam2.mkv: none left")
+        return bright(shot)
+
+    with pytest.warns(ShadowPuppetWarning, match="none left; from there on the run goes on without camera 'cam2'"):
+        sets = list(follow(made, [bright, fails]))
+    assert [each.masks[1] is not None for each in sets] == [n < 4 for n in range(12)]
+    assert len(sets) == 12
+
+
+def test_other_errors_are_not_swallowed(tmp_path):
+    def broken(shot: Shot) -> np.ndarray:
+        raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError, match="a bug"):
+        list(follow(rig(tmp_path, steady(3), steady(3)), [bright, broken]))
+
+
+def test_a_reader_who_stops_leaves_no_threads(tmp_path):
+    import threading
+
+    sets = follow(rig(tmp_path, steady(30), steady(30)), [bright] * 2, threads=2)
+    next(sets)
+    assert any(thread.name.startswith("camera") for thread in threading.enumerate())
+    sets.close()
+    assert not any(thread.name.startswith("camera") for thread in threading.enumerate())
+
+
+# Recordings
+
+
+def recording(folder: Path, count: int = 3) -> Path:
+    """A folder of a recording."""
+    from shadowpuppet.io.calibration.calibration_files import write_calibration
+
+    (folder / "video").mkdir(parents=True)
+    cameras = [looking((2.0, k, 1.0), size=SIZE, name=f"cam{k + 1}") for k in range(count)]
+    write_calibration(folder / "calibration.toml", cameras)
+    for camera in cameras:
+        film(folder / "video" / f"{camera.name}.mkv", steady(4))
+    return folder
+
+
+def test_a_recording_of_several_cameras_is_a_rig(tmp_path):
+    made = open_rig(recording(tmp_path / "r"), Options())
+    assert made.names == ("cam1", "cam2", "cam3")
+    assert numbers(made) == [(n, n, n) for n in range(4)]
+
+
+def test_some_cameras_can_be_chosen_in_the_recordings_own_order(tmp_path):
+    assert open_rig(recording(tmp_path / "r"), Options(camera="cam3, cam1")).names == ("cam1", "cam3")
+
+
+@pytest.mark.parametrize("names", ["cam1,cam9", "cam1,cam1", "", "cam1;cam2"])
+def test_cameras_that_are_not_there_are_refused(tmp_path, names):
+    made = open_rig(recording(tmp_path / "r"), Options())
+    with pytest.raises(RecordingError, match="expected one of cam1, cam2, cam3; or some, each once"):
+        chosen_views(made.recording, names)
+
+
+def test_one_camera_is_no_rig(tmp_path):
+    with pytest.raises(RecordingError, match="found one camera, expected two or more"):
+        open_rig(recording(tmp_path / "r"), Options(camera="cam2"))
+
+
+@pytest.mark.parametrize(("options", "message"), [
+    ({"region": (0, 0, 8, 8)}, "region: found one for 3 cameras"),
+    ({"background": Path("x.png")}, r"background: found one for 3 cameras, expected one each, background/<camera>"),
+])
+def test_what_serves_one_camera_is_refused_for_several(tmp_path, options, message):
+    with pytest.raises(SettingsError, match=message):
+        open_rig(recording(tmp_path / "r"), Options(**options))
+
+
+def test_masks_are_needed_of_every_camera(tmp_path):
+    with pytest.raises(RecordingError, match=r"masks/cam1\.mkv"):
+        open_rig(recording(tmp_path / "r"), Options(masks=True))

@@ -1,0 +1,143 @@
+"""The look at several cameras: what is told of each, doubts with remedies, refusals; as Python and as the command line have it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+
+import made
+import made_rig
+import numpy as np
+import pytest
+
+from shadowpuppet.cli.app import run
+from shadowpuppet.errors import TrackingError
+from shadowpuppet.geometry import rigid
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.pipeline.footage_rig import open_rig
+from shadowpuppet.pipeline.look_rig import RigLook, look_at_rig
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import json_text
+from shadowpuppet.pipeline.track import look_at, track_recording
+
+MASKS = Options(masks=True)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return made_rig.write(tmp_path_factory.mktemp("made") / "rig")
+
+
+@pytest.fixture
+def spoilt(recording, tmp_path):
+    return made.copied(recording, tmp_path / "spoilt")
+
+
+def looked(path, options=MASKS) -> RigLook:
+    look = look_at(path, options)
+    assert isinstance(look, RigLook)
+    return look
+
+
+def test_a_look_tells_of_every_camera(recording):
+    look, cameras = looked(recording, Options()), made_rig.cameras()
+    assert [camera.name for camera in look.cameras] == [camera.name for camera in cameras]
+    for told, camera in zip(look.cameras, cameras):
+        assert told.place == pytest.approx(camera.centre, abs=1e-6)
+        assert told.size == told.worked_size == made_rig.SIZE
+        assert told.rate == pytest.approx(made_rig.RATE)
+        assert told.exact_overlap > 0.9
+        assert told.background == f"background/{camera.name}.mp4"
+    assert look.frames == made_rig.FRAMES
+    assert look.refusal is None
+    assert max(look.agreement.apart) < 1.6
+    assert not look.agreement.wrong
+
+
+def test_a_look_is_plain(recording):
+    told = json.loads(json_text(looked(recording)))
+    assert told["agreement"]["names"] == ["cam1", "cam2", "cam3", "cam4"]
+    assert told["cameras"][0]["quality"]["empty"] == 0
+
+
+def test_the_opening_is_spread_over_the_first_seconds(recording):
+    opening = look_at_rig(open_rig(recording, MASKS), MASKS).opening
+    assert opening.times[0] == 0
+    assert opening.times[-1] > 1.5
+    assert len(opening.times) == len(opening.masks) <= 40
+
+
+def test_films_of_other_rates_and_lengths_are_doubted(spoilt):
+    frames = made.images(spoilt / "video" / "cam2.mp4")
+    made.write_film(spoilt / "video" / "cam2.mp4", frames[::2], made_rig.RATE / 2)
+    for kind in ("masks", "background"):
+        (spoilt / kind / "cam2.mkv").unlink(missing_ok=True)
+    (doubt,) = [d for d in looked(spoilt, Options()).doubts if "rates" in d]
+    assert "cam2 5" in doubt
+    made.write_film(spoilt / "video" / "cam2.mp4", frames[:15], made_rig.RATE)
+    (doubt,) = [d for d in looked(spoilt, Options()).doubts if "lengths" in d]
+    assert "cam2 1.50" in doubt
+    assert "[start] of recording.toml" in doubt
+
+
+def test_swapped_films_are_told(spoilt):
+    for kind, end in (("video", "mp4"), ("masks", "mkv"), ("background", "mp4")):
+        a, b = (spoilt / kind / f"{name}.{end}" for name in ("cam1", "cam2"))
+        shutil.move(a, spoilt / "x")
+        shutil.move(b, a)
+        shutil.move(spoilt / "x", b)
+    assert any("cameras 'cam1' and 'cam2' are swapped" in doubt for doubt in looked(spoilt).doubts)
+
+
+def scaled(camera, factor):
+    T = camera.T_camera_world.copy()
+    T[:3, 3] *= factor
+    return replace(camera, T_camera_world=T)
+
+
+def test_a_calibration_in_millimetres_is_refused_as_it_is_read(spoilt, capsys):
+    write_calibration(spoilt / "calibration.toml", [scaled(camera, 1000) for camera in made_rig.cameras()])
+    assert run(["info", str(spoilt), "--masks"]) == 2
+    shown = capsys.readouterr()
+    assert "millimetres" in shown.err
+    assert "Traceback" not in shown.err
+
+
+def test_a_calibration_in_feet_is_doubted(spoilt):
+    write_calibration(spoilt / "calibration.toml", [scaled(camera, 3.28) for camera in made_rig.cameras()])
+    assert any("is it in metres?" in doubt for doubt in looked(spoilt).doubts)
+
+
+def test_a_camera_that_was_turned_is_named_on_the_command_line(spoilt, capsys):
+    cameras = made_rig.cameras()
+    a = np.radians(5)
+    turn = rigid([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]], np.zeros(3))
+    cameras[2] = replace(cameras[2], T_camera_world=turn @ cameras[2].T_camera_world)
+    write_calibration(spoilt / "calibration.toml", cameras)
+    assert run(["info", str(spoilt), "--masks"]) == 0
+    shown = capsys.readouterr()
+    assert "camera 'cam3' disagrees with the others by" in shown.err
+    assert "--camera cam1,cam2,cam4" in shown.err
+    assert shown.out.count(" px") == 4
+
+
+def test_nobody_at_the_same_time_is_refused_before_the_run(tmp_path):
+    cameras = made_rig.cameras(3)
+    seen = made_rig.masks(cameras, 12)
+    seen = [[mask if k == n % 3 else np.zeros_like(mask) for k, mask in enumerate(row)] for n, row in enumerate(seen)]
+    recording = made_rig.write(tmp_path / "r", cameras, seen)
+    assert "no two cameras see a person at the same time" in looked(recording).refusal
+    with pytest.raises(TrackingError, match="no two cameras"):
+        track_recording(recording, tmp_path / "run", MASKS)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_look_as_json_on_the_command_line(recording, capsys):
+    assert run(["info", str(recording), "--masks", "--json", "--camera", "cam1,cam3"]) == 0
+    assert [camera["name"] for camera in json.loads(capsys.readouterr().out)["cameras"]] == ["cam1", "cam3"]
+
+
+def test_an_unknown_camera_is_a_users_mistake(recording, capsys):
+    assert run(["info", str(recording), "--camera", "cam1,cam8"]) == 2
+    assert "expected one of cam1, cam2, cam3, cam4" in capsys.readouterr().err

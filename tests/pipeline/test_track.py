@@ -1,0 +1,330 @@
+from __future__ import annotations
+
+import json
+import tracemalloc
+from dataclasses import replace
+
+import made
+import numpy as np
+import pytest
+
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.person import read_person
+from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.metrics import overlap
+from shadowpuppet.pipeline.footage import RUN, RUNS, Shot, open_footage, read_masks, silhouettes, take_sample
+from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
+from shadowpuppet.pipeline.track import Listener, Watch, fit_person, track_recording
+from shadowpuppet.video import open_frames
+
+JOINTS = {"pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand"))}
+
+QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
+"""For tests of what does not depend on how well it is done."""
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return made.make(tmp_path_factory.mktemp("made") / "tiny")
+
+
+@pytest.fixture(scope="module")
+def run(recording, tmp_path_factory):
+    return track_recording(recording, tmp_path_factory.mktemp("run") / "run", Options(overlay=True))
+
+
+class Stops(Listener):
+    """Breaks a run off at a frame."""
+
+    def __init__(self, frame: int, error: BaseException) -> None:
+        self.frame, self.error = frame, error
+
+    def advance(self, frames: int) -> None:
+        if frames == self.frame:
+            raise self.error
+
+
+def test_a_run_has_a_row_for_every_frame_at_its_time(recording, run):
+    times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
+    motion = read_run(run.folder).motion
+    assert motion.times == pytest.approx(times, abs=1e-6)
+    assert set(motion.joint_names) == JOINTS
+    assert np.isfinite(motion.joints).all()
+    assert np.isnan(motion.joint_sd).all()  # no honest value
+    header, row = (run.folder / "joints.csv").read_text().splitlines()[:2]
+    empty = [name for name, cell in zip(header.split(","), row.split(",")) if not cell]
+    assert empty == [name for name in header.split(",") if "_sd_" in name]
+
+
+def test_joints_are_in_the_world_of_the_calibration(recording, run):
+    """Up is Z, the person stands at the origin and faces -Y: the left hand is on the +X side when the arms are to the sides."""
+    table, truth = run.motion.table, read_joints(recording / "truth.csv")
+    names = ["neck", "left_shoulder", "right_shoulder", "pelvis"]
+    found, true = table.select(names).positions.mean(0), truth.select(names).positions.mean(0)
+    assert np.abs(found - true)[:3].max() < 0.12
+    assert np.abs(found - true)[3].max() < 0.2  # a trunk that the picture cuts hardly tells where it ends
+    assert run.metrics["errors"]["plane_mm"] < 150
+
+
+def test_a_run_says_how_it_was_made(recording, run):
+    info = read_run(run.folder).info
+    assert info["recording"] == str(recording.resolve())
+    assert info["truth"] == str(recording / "truth.csv")
+    options = make_options(read_options(run.folder / "run.toml"))
+    assert options == Options(overlay=True)
+    assert options.initialization.rounds == Options().initialization.rounds
+
+
+def test_the_same_seed_is_the_same_run_and_another_one_is_not(recording, tmp_path):
+    runs = [track_recording(recording, tmp_path / str(n), make_options(QUICK | {"seed": seed})).folder for n, seed in enumerate((3, 3, 4))]
+    joints = [(folder / "joints.csv").read_bytes() for folder in runs]
+    assert joints[0] == joints[1]
+    assert joints[0] != joints[2]
+
+
+def test_sizes_camera_look_and_times_lie_beside(recording, run):
+    person = read_person(run.folder / "person.toml")
+    assert person.source == "references"
+    assert person.height == pytest.approx(made.SPEC.body.stature, abs=1e-3)
+    look = json.loads((run.folder / "look.json").read_text())
+    assert look["person"]["sizes"] == pytest.approx(dict(zip(person.sizes.names(), person.sizes.to_array())))
+    metrics = json.loads((run.folder / "metrics.json").read_text())
+    assert metrics["complete"]
+    assert set(metrics["ms_per_frame"]) == {"decode", "segment", "track", "write"}
+    assert metrics["frames_per_s"] > 0
+    assert metrics["errors"]["frames"] == len(run.motion)
+    assert (run.folder / "calibration.toml").exists()
+
+
+def test_an_overlay_has_a_frame_for_each_of_the_film(recording, run):
+    overlay = made.images(run.folder / "overlay.mp4")
+    assert len(overlay) == len(run.motion)
+    assert overlay[0].shape == (3 * made.SIZE[1], made.SIZE[0], 3)
+    bottom, film = overlay[10][2 * made.SIZE[1] :], made.images(recording / "video" / "cam.mp4")[10]
+    assert np.abs(bottom.astype(int) - film).mean() < 20
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), ShadowPuppetError("stop"), RuntimeError("a bug")], ids=lambda e: type(e).__name__)
+def test_a_run_that_breaks_off_keeps_what_it_has(recording, run, tmp_path, error):
+    with pytest.raises(type(error)):
+        track_recording(recording, tmp_path / "run", Options(overlay=True), Stops(5, error))
+    left = read_run(tmp_path / "run")
+    assert not left.complete
+    assert len(left.motion) == 5
+    # Causal: what was found does not depend on how long the film goes on.
+    np.testing.assert_array_equal(left.motion.joints, run.motion.joints[:5])
+    assert left.metrics["ms_per_frame"]["track"] > 0
+    assert len(made.images(tmp_path / "run" / "overlay.part.mp4")) == 5
+
+
+def test_a_run_that_never_began_leaves_the_last_one(recording, run, tmp_path):
+    made.copied(run.folder, tmp_path / "run")
+    with pytest.raises(ShadowPuppetError, match="no such recording"):
+        track_recording(tmp_path / "nowhere", tmp_path / "run")
+    assert len(read_run(tmp_path / "run").motion) == len(run.motion)
+    with pytest.raises(ShadowPuppetError, match="no such recording"):
+        track_recording(tmp_path / "nowhere", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_folder_that_is_no_run_is_refused_before_anything_is_done(recording, tmp_path):
+    (tmp_path / "thesis.tex").touch()
+    looked = Stops(0, AssertionError())
+    looked.begin = lambda what, total=None: pytest.fail(what)
+    with pytest.raises(ShadowPuppetError, match=r"found thesis.tex in it but no run.toml"):
+        track_recording(recording, tmp_path, None, looked)
+
+
+def test_frames_before_the_person_and_without_them_are_absent(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "late")
+    masks = made.images(recording / "masks" / "cam.mkv")
+    for n in (0, 1, 2, 15, 16):
+        masks[n] = np.zeros_like(masks[n])
+    made.write_film(spoilt / "masks" / "cam.mkv", masks, lossless=True)
+    result = track_recording(spoilt, tmp_path / "run", make_options(QUICK | {"masks": True, "overlay": True}))
+    absent = np.isin(np.arange(len(masks)), (0, 1, 2, 15, 16))
+    np.testing.assert_array_equal(result.motion.status == "absent", absent)
+    np.testing.assert_array_equal(np.isnan(result.motion.joints).all((1, 2)), absent)
+    assert any("the silhouette is empty in" in doubt for doubt in result.look.doubts)
+    for n, shown in enumerate(made.images(result.folder / "overlay.mp4")):
+        height = made.SIZE[1]
+        assert (shown[height + 30 : 2 * height].max() < 60) == absent[n]  # nothing is drawn of who is not there
+
+
+def test_a_run_that_lost_the_person_says_so(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "lost")
+    masks = made.images(recording / "masks" / "cam.mkv")
+    for n in range(10, 20):
+        masks[n] = np.zeros_like(masks[n])
+        masks[n][::4] = 255  # stripes all over
+    made.write_film(spoilt / "masks" / "cam.mkv", masks, lossless=True)
+    with pytest.warns(ShadowPuppetWarning, match=r"the person is lost in \d+ % of the frames, first at 1.\d\d s"):
+        result = track_recording(spoilt, tmp_path / "run", make_options(QUICK | {"masks": True}))
+    assert np.isnan(result.motion.joints[result.motion.status == "lost"]).all()
+    assert (result.motion.status[:10] == "tracked").all()
+
+
+def test_masks_that_end_early_are_said(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "short")
+    made.write_film(spoilt / "masks" / "cam.mkv", made.images(recording / "masks" / "cam.mkv")[:20], lossless=True)
+    with pytest.raises(SilhouetteError, match=r"masks/cam.mkv: found 20 silhouettes, expected one for each frame of .*cam.mp4"):
+        track_recording(spoilt, tmp_path / "run", Options(masks=True))
+
+
+def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
+    said = []
+
+    class Told(Listener):
+        def begin(self, what: str, total: int | None = None) -> None:
+            said.append((what, total))
+
+    third = track_recording(recording, tmp_path / "run", make_options(QUICK | {"every": 3, "overlay": True}), Told())
+    times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
+    assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
+    assert said[-1] == ("tracking", len(third.motion))
+    assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
+
+
+def test_ready_masks_are_used_only_when_asked_for(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "spoilt")
+    masks = made.images(recording / "masks" / "cam.mkv")
+    made.write_film(spoilt / "masks" / "cam.mkv", [np.zeros_like(mask) for mask in masks], lossless=True)
+    assert open_footage(spoilt, Options()).view.masks is not None
+    seen = silhouettes(*_sampled(spoilt, Options()))
+    shots = list(open_footage(spoilt, Options()).shots(ready=True))
+    assert seen(shots[5]).mean() > 0.05
+    ready = silhouettes(*_sampled(spoilt, Options(masks=True)))
+    assert not ready(shots[5]).any()
+
+
+@pytest.mark.parametrize("options", [Options(), Options(masks=True)])
+def test_the_masks_that_are_read_are_those_that_are_tracked(recording, options):
+    footage, sample, _ = _sampled(recording, options)
+    seen, read = silhouettes(footage, sample, options), list(read_masks(footage, options))
+    assert len(read) == footage.count
+    for mask, shot in zip(read, footage.shots(ready=options.masks)):
+        np.testing.assert_array_equal(mask, seen(shot))
+
+
+def _sampled(recording, options):
+    footage = open_footage(recording, options)
+    return footage, take_sample(footage, options.masks), options
+
+
+def test_larger_frames_are_scaled_and_joints_stay_where_they_are(recording, run, tmp_path):
+    small = track_recording(recording, tmp_path / "run", Options(max_size=100))
+    assert small.look.worked_size == (100, 75)
+    assert small.look.size == made.SIZE
+    shoulders = ["left_shoulder", "right_shoulder", "neck"]
+    apart = np.abs(small.motion.table.select(shoulders).positions - run.motion.table.select(shoulders).positions)
+    assert np.median(apart) < 0.06
+
+
+def test_what_is_outside_the_region_is_background(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "intruder")
+    film = made.images(recording / "video" / "cam.mp4")
+    for image in film:
+        image[5:115, 100:158] = (40, 200, 40)  # larger than the person, and at the arm's end
+    made.write_film(spoilt / "video" / "cam.mp4", film)
+    options = make_options({"region": "0,0,98,120"})
+    footage, sample, _ = _sampled(spoilt, options)
+    seen, clean = silhouettes(footage, sample, options), silhouettes(*_sampled(recording, Options()))
+    for n in (0, 12, 20):
+        mask, right = seen(Shot(0, film[n], None)), clean(Shot(0, made.images(recording / "video" / "cam.mp4")[n], None))
+        right[:, 98:] = False
+        assert not mask[:, 98:].any()
+        assert overlap(mask, right) > 0.9
+
+
+def test_ready_masks_are_cut_to_the_region(recording):
+    options = make_options({"region": "0,0,80,120", "masks": True})
+    seen, whole = silhouettes(*_sampled(recording, options)), silhouettes(*_sampled(recording, Options(masks=True)))
+    shot = next(open_footage(recording, options).shots(ready=True))
+    assert whole(shot)[:, 80:].any()
+    assert not seen(shot)[:, 80:].any()
+    np.testing.assert_array_equal(seen(shot)[:, :80], whole(shot)[:, :80])
+
+
+def test_a_region_is_told_in_pixels_of_the_film(recording):
+    footage = open_footage(recording, Options(max_size=80, region=(40, 20, 120, 100)))
+    assert footage.region == (slice(10, 50), slice(20, 60))
+
+
+def test_a_persons_sizes_are_used_again(recording, run, tmp_path):
+    alone = made.copied(recording, tmp_path / "alone", without=["references"])
+    options = make_options(QUICK | {"person": str(run.folder / "person.toml")})
+    again = track_recording(alone, tmp_path / "run", options)
+    before, after = (read_person(folder / "person.toml") for folder in (run.folder, again.folder))
+    assert after.sizes == before.sizes
+    assert after.source == str(run.folder / "person.toml")
+
+
+def test_without_references_sizes_come_from_proportions(recording, tmp_path):
+    alone = made.copied(recording, tmp_path / "alone", without=["references"])
+    found, look = fit_person(alone, tmp_path / "person.toml")
+    assert found.source.startswith("proportions")
+    assert look.person is not None
+    assert found.start > 0.8
+    person = read_person(tmp_path / "person.toml")
+    assert 0.2 < person.sizes.upper_arm_length < 0.36
+
+
+def test_a_film_of_a_posture_serves_as_its_reference(recording, tmp_path):
+    filmed = made.copied(recording, tmp_path / "filmed")
+    for name in ("front_t_pose", "front_arms_t_pose"):
+        [image] = made.images(recording / "references" / f"{name}.png")
+        empty = made.images(recording / "background" / "cam.mp4")[0]
+        (filmed / "references" / f"{name}.png").unlink()
+        (filmed / "references" / f"{name}_mask.png").unlink()
+        made.write_film(filmed / "references" / f"{name}.mp4", [empty, *[image] * 5, empty])
+    _, of_film = fit_person(filmed, tmp_path / "a.toml")
+    _, of_picture = fit_person(recording, tmp_path / "b.toml")
+    assert of_film.person is not None
+    assert of_picture.person is not None
+    assert of_film.person["overlaps"] == pytest.approx(of_picture.person["overlaps"], abs=0.1)
+
+
+def test_a_truth_that_cannot_be_used_does_not_cost_the_run(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "spoilt", without=["truth.trc"])
+    made.replace_text(spoilt / "truth.csv", "left_hand_x", "left_hand_q")
+    with pytest.warns(ShadowPuppetWarning, match=r"no errors are told: .*truth.csv"):
+        result = track_recording(spoilt, tmp_path / "run", make_options(QUICK))
+    assert "errors" not in result.metrics
+    assert read_run(tmp_path / "run").complete
+
+
+def test_options_round_trip_through_plain_values():
+    options = make_options({"preset": "liu2011", "region": "1,2,30,40", "height": 1.7, "tracker": {"arm": {"particles": 30}}})
+    assert make_options(plain_options(options)) == options
+    assert options.tracker.arm.particles == 30
+    assert options.tracker.cycles == make_options({"preset": "liu2011"}).tracker.cycles
+    assert options == replace(options)
+
+
+def test_a_watch_counts_each_stage():
+    watch = Watch()
+    assert list(watch.each("decode", [1, 2, 3])) == [1, 2, 3]
+    with pytest.raises(KeyError), watch.time("track"):
+        raise KeyError
+    assert watch.seconds["decode"] > 0
+    assert watch.seconds["track"] > 0
+    assert watch.seconds["write"] == 0
+
+
+def test_memory_does_not_grow_with_the_film(recording):
+    """A sample of four times the frames takes no more memory."""
+    footage, peaks = open_footage(recording, Options()), []
+    shots = list(footage.shots(ready=False))
+    for times in (4, 16):
+        longer, film = replace(footage), replace(footage.film(), count=times * len(shots))
+        long = [shot._replace(time=n / 10) for n, shot in enumerate(shots * times)]
+        object.__setattr__(longer, "film", lambda film=film: film)
+        object.__setattr__(longer, "shots", lambda ready, strict, long=long: (shot._replace(image=shot.image.copy()) for shot in long))
+        tracemalloc.start()
+        sample = take_sample(longer)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert len(sample.times) == made.FRAMES * times
+        assert len(sample.shots) == RUNS * RUN
+    assert peaks[1] < 1.3 * peaks[0]

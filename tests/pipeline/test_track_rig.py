@@ -1,0 +1,216 @@
+"""Runs with several cameras around a tracker: files, statuses, what breaks off. The tracker here only stands where the points are."""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+import made
+import made_rig
+import numpy as np
+import pytest
+
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
+from shadowpuppet.evaluation.evaluation import evaluate_run
+from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.run import read_run
+from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
+from shadowpuppet.pipeline.progress import RIG_STAGES, Listener
+from shadowpuppet.pipeline.track import look_at
+from shadowpuppet.pipeline.track_rig import Puppet, track_rig
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.video import open_frames
+
+
+class Standing(NamedTuple):
+    pose: np.ndarray
+    status: str
+    cost: float = 0.0
+    overlap: float = np.nan
+
+
+class Follower:
+    """Puts a body upright where the surface points are."""
+
+    def __init__(self, body) -> None:
+        self.body, self.calls = body, []
+
+    def start(self, rng, points, masks) -> Standing:
+        self.calls.append("start")
+        return self._there(rng, points, masks)
+
+    def step(self, rng, state, points, masks) -> Standing:
+        self.calls.append("step")
+        return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
+
+    def _there(self, rng, points, masks) -> Standing:
+        pose = np.zeros(len(self.body.skeleton.dofs))
+        pose[:3] = points.points.mean(0) + rng.normal(0, 1e-3, 3)
+        return Standing(pose, "tracked" if sum(mask is not None for mask in masks) > 2 else "uncertain")
+
+
+made_of = []
+
+
+def prepare(rng, rig, opening, options, training) -> Puppet:
+    body = make_body("anatomical", average_sizes("anatomical", 1.7))
+    tracker = Follower(body)
+    made_of.append((tracker, opening, training))
+    return Puppet(body, tracker, VisualHull(rig.cameras), {"height": 1.7}, ("the sizes are a guess",))
+
+
+def track(recording, folder, options=None, listener=None):
+    return track_rig(recording, folder, options or Options(masks=True), listener or Listener(), prepare)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return made_rig.write(tmp_path_factory.mktemp("made") / "rig")
+
+
+@pytest.fixture(scope="module")
+def run(recording, tmp_path_factory):
+    return track(recording, tmp_path_factory.mktemp("run") / "run", Options(overlay=True))
+
+
+def test_a_run_has_a_row_for_every_set_at_its_time(run):
+    motion = read_run(run.folder).motion
+    assert motion.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE, abs=1e-6)
+    assert set(motion.status) == {"tracked"}
+    pelvis = motion.table.select(["pelvis"]).positions[:, 0]
+    true = np.array([made_rig.place(n) for n in range(made_rig.FRAMES)])
+    assert np.linalg.norm(pelvis - true, axis=1).max() < 0.35
+
+
+def test_a_run_says_how_it_was_made(recording, run):
+    info = read_run(run.folder).info
+    assert info["recording"] == str(recording.resolve())
+    assert info["method"] == "Ni 2008, 4 cameras"
+    assert info["cameras"] == ["cam1", "cam2", "cam3", "cam4"]
+    assert info["body"] == "anatomical"
+    assert set(run.metrics["ms_per_frame"]) == set(RIG_STAGES)
+    assert run.metrics["ms_per_frame"]["segment"] > 0
+    assert "cost_px" not in run.metrics
+    assert evaluate_run(run.folder)["cost_m2"]["count"] == made_rig.FRAMES
+    look = json.loads((run.folder / "look.json").read_text())
+    assert look["person"] == {"height": 1.7}
+    assert "the sizes are a guess" in look["doubts"]
+    assert max(look["agreement"]["apart"]) < 1.5
+    assert [camera.name for camera in read_calibration(run.folder / "calibration.toml")] == info["cameras"]
+
+
+def test_the_preparation_gets_the_first_seconds_and_training_motion(recording, run):
+    _, opening, training = made_of[-1]
+    assert training is None
+    assert opening.times[0] == 0
+    assert len(opening.masks[0]) == made_rig.CAMERAS
+    assert all(mask is not None and mask.any() for row in opening.masks for mask in row)
+
+
+def test_an_overlay_is_a_grid_of_the_cameras(run):
+    frames = made.images(run.folder / "overlay.mp4")
+    assert len(frames) == made_rig.FRAMES
+    assert frames[0].shape == (2 * made_rig.SIZE[1], 2 * made_rig.SIZE[0], 3)
+    film = made.images(run.folder.parent / "run" / "overlay.mp4")[5]
+    assert film.std() > 10
+
+
+@pytest.mark.parametrize("sizes", [[(640, 480)] * 7, [(1080, 1920)] * 4, [(640, 480)] * 2, [(320, 240), (640, 360), (480, 640)]])
+def test_a_grid_holds_all_cameras_and_is_of_a_reasonable_size(sizes):
+    columns, rows, (width, height) = grid_of(sizes)
+    assert columns * rows >= len(sizes) > columns * (rows - 1)
+    assert columns * width <= WIDEST + 2 * columns
+    assert rows * height <= TALLEST + 2 * rows
+    assert width % 2 == height % 2 == 0
+
+
+def test_the_same_seed_is_the_same_run(recording, tmp_path):
+    folders = [track(recording, tmp_path / str(n), make_options({"masks": True, "seed": seed})).folder for n, seed in enumerate((3, 3, 4))]
+    joints = [(folder / "joints.csv").read_bytes() for folder in folders]
+    assert joints[0] == joints[1]
+    assert joints[0] != joints[2]
+
+
+def test_of_so_many_sets_one_is_tracked(recording, tmp_path):
+    whole, third = (track(recording, tmp_path / str(every), make_options({"masks": True, "every": every, "overlay": True}))
+                    for every in (1, 3))  # fmt: skip
+    assert third.motion.times == pytest.approx(whole.motion.times[::3])
+    film = open_frames(third.folder / "overlay.mp4")
+    assert film.rate == pytest.approx(open_frames(whole.folder / "overlay.mp4").rate / 3)
+
+
+def test_a_subset_of_the_cameras_can_be_tracked(recording, tmp_path):
+    summary = track(recording, tmp_path / "run", Options(masks=True, camera="cam1,cam2,cam4"))
+    assert read_run(summary.folder).info["cameras"] == ["cam1", "cam2", "cam4"]
+
+
+def test_somebody_who_leaves_is_absent_and_searched_for_when_they_come_back(tmp_path):
+    cameras = made_rig.cameras()
+    seen = made_rig.masks(cameras)
+    empty = [np.zeros_like(mask) for mask in seen[0]]
+    seen[10:15] = [empty] * 5
+    seen[15] = [seen[15][0], *empty[1:]]  # one camera alone
+    summary = track(made_rig.write(tmp_path / "r", cameras, seen), tmp_path / "run")
+    assert summary.motion.status[8:17].tolist() == ["tracked"] * 2 + ["absent"] * 5 + ["lost", "tracked"]
+    assert np.isnan(summary.motion.joints[10:16]).all()
+    assert made_of[-1][0].calls.count("start") == 2
+    assert made_of[-1][0].calls[10] == "start"
+
+
+def test_nobody_at_first_is_absent(tmp_path):
+    cameras = made_rig.cameras()
+    seen = made_rig.masks(cameras)
+    empty = [np.zeros_like(mask) for mask in seen[0]]
+    seen[:3] = [empty] * 3
+    assert track(made_rig.write(tmp_path / "r", cameras, seen), tmp_path / "run").motion.status[:4].tolist() == ["absent"] * 3 + ["tracked"]
+
+
+def test_a_camera_that_dies_is_missing_and_the_run_goes_on(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "spoilt")
+    frames = made.images(spoilt / "video" / "cam2.mp4")
+    made.write_film(spoilt / "video" / "cam2.mp4", frames[:9], made_rig.RATE)
+    with pytest.warns(ShadowPuppetWarning, match="goes on without camera 'cam2'") as said:
+        summary = track(spoilt, tmp_path / "run", Options(overlay=True))
+    assert len(summary.motion) == made_rig.FRAMES
+    assert set(summary.motion.status) == {"tracked"}
+    assert sum("goes on without" in str(each.message) for each in said) == 1
+    last = made.images(tmp_path / "run" / "overlay.mp4")[-1]
+    width, height = made_rig.SIZE
+    assert last[height // 3 : 2 * height // 3, width:].mean() < 8 < last[height // 3 : 2 * height // 3, :width].mean()
+
+
+class Stops(Listener):
+    def __init__(self, frame: int, error: BaseException) -> None:
+        self.frame, self.error = frame, error
+
+    def advance(self, frames: int) -> None:
+        if frames == self.frame:
+            raise self.error
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), ShadowPuppetError("stop")], ids=lambda e: type(e).__name__)
+def test_a_run_that_breaks_off_keeps_what_it_has(recording, run, tmp_path, error):
+    with pytest.raises(type(error)):
+        track(recording, tmp_path / "run", Options(overlay=True), Stops(5, error))
+    left = read_run(tmp_path / "run")
+    assert not left.complete
+    np.testing.assert_array_equal(left.motion.joints, run.motion.joints[:5])
+    assert len(made.images(tmp_path / "run" / "overlay.part.mp4")) == 5
+
+
+def test_a_run_that_cannot_begin_leaves_no_folder(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "spoilt")
+    (spoilt / "masks" / "cam3.mkv").unlink()
+    with pytest.raises(RecordingError, match="no ready silhouettes"):
+        track(spoilt, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_nobody_at_all_is_refused(tmp_path):
+    cameras = made_rig.cameras()
+    recording = made_rig.write(tmp_path / "r", cameras, [[np.zeros(made_rig.SIZE[::-1], bool)] * len(cameras)] * 12)
+    with pytest.raises(TrackingError, match="camera 'cam1': the silhouette is empty"):
+        track(recording, tmp_path / "run")
+    assert look_at(recording, Options(masks=True)).refusal is not None

@@ -1,0 +1,223 @@
+"""Sizes and poses solved together: the equations beside the plain version, and girths and bones found from a few made poses."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import actor
+import numpy as np
+import pytest
+from scans import make_body as random_tree
+from scans import scan, some_pose
+
+from shadowpuppet.body.anthropometry import shares_of
+from shadowpuppet.body.whole_body import anatomical
+from shadowpuppet.body.whole_sizes import AnatomicalSizes
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation.bench import naive_multi as naive
+from shadowpuppet.tracking.multiview import bundle_adjustment
+from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud
+from shadowpuppet.tracking.multiview.settings import SurfaceSettings
+
+MEAN = actor.sizes()
+NAMES = AnatomicalSizes.names()
+SPREAD = 4 * np.array([shares_of(AnatomicalSizes)[name][1] * 1.72 for name in NAMES])
+"""More than people differ, so that a few frames decide."""
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("epsilon", [0.0, 0.3])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsilon):
+    rng, body, surface = np.random.default_rng(seed), random_tree(seed), SurfaceSettings(epsilon=epsilon, tau=0.06)
+    pose = some_pose(body, rng)
+    points, normals, weights = scan(body, pose, rng, 15)
+    points = points + rng.normal(0, 0.02, points.shape)
+    frame = bundle_adjustment._equations(bundle_adjustment._model(body), [], pose, make_cloud(points, normals, weights), surface)
+    H, g = naive.normal_equations(body, pose, points, normals, weights, surface)
+    np.testing.assert_allclose(frame.rows, H, atol=2e-4 * np.abs(H).max())
+    np.testing.assert_allclose(frame.gradient, g, atol=2e-4 * np.abs(g).max())
+    assert frame.cost == pytest.approx(naive.cost(body, pose, points, normals, weights, surface), rel=2e-4)
+
+
+def test_what_sizes_do_to_distances_is_their_derivative(rng):
+    """Of a longer loin: what hangs on the chest rises, so that the points there are less far out along their normals."""
+    body, settings, step = actor.body(), SurfaceSettings(), bundle_adjustment.NUDGE
+    pose, k = actor.stance(body.skeleton), NAMES.index("lumbar_height")
+    seen = actor.surface(body, pose, rng, 20)
+    cloud = make_cloud(seen.points + 0.005 * seen.normals, seen.normals, seen.weights)
+    nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, MEAN.to_array(), np.array([k]))
+    frame = bundle_adjustment._equations(bundle_adjustment._model(body), nudged, pose, cloud, settings)
+    near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
+    _, here = bundle_adjustment._measured(bundle_adjustment._model(body), pose, cloud, settings, near, True)
+    taller = anatomical(MEAN.with_values(lumbar_height=MEAN.lumbar_height + step))
+    grows = (here[0] - bundle_adjustment._measured(bundle_adjustment._model(taller), pose, cloud, settings, near, False)[1][0]) / step
+    arms = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("arm", "hand"))])
+    legs = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("thigh", "shank", "foot"))])
+    assert np.quantile(np.abs(grows - here[7])[arms], 0.75) < 0.05  # all but points of edges
+    np.testing.assert_allclose(grows[legs], 0, atol=1e-6)
+    assert frame.rows[-1, -1] == pytest.approx((here[1] * grows**2).sum() / cloud.total, rel=1e-3)
+    assert frame.gradient[-1] == pytest.approx((here[1] * here[0] * grows).sum() / cloud.total, rel=1e-3)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_a_step_is_that_of_all_equations_at_once(damping, rng):
+    """Poses are eliminated, sizes solved for, poses found from these: as good as one great system of equations."""
+    body, F, D, K = random_tree(), 3, 16, 4
+    frames = []
+    for _ in range(F):
+        rows = rng.normal(size=(60, D + K))
+        frames.append(bundle_adjustment._Frame(0.0, 0.0, rows.T @ rows / 60, 1e-3 * rng.normal(size=D + K)))
+    poses = np.stack([some_pose(body, rng) for _ in range(F)])
+    poses[:, body.skeleton.dof_names.index("flexion")] = 1.0
+    start, pull, sizes = poses + 0.01 * rng.normal(size=poses.shape), rng.uniform(0, 0.1, poses.shape), rng.normal(size=6)
+    free, tight, strain, scale = np.array([0, 2, 3, 5]), rng.uniform(0.1, 1, K), rng.normal(size=K), 1e3
+    solution = bundle_adjustment._Solution((sizes, poses), 0.0, frames, strain, body)
+    found = bundle_adjustment._moved(solution, free, tight, scale, start, pull, damping)
+    A, b = np.zeros((F * D + K, F * D + K)), np.zeros(F * D + K)
+    last = F * D + np.arange(K)
+    for f, frame in enumerate(frames):
+        at = np.concatenate([f * D + np.arange(D), last])
+        A[np.ix_(at, at)] += frame.rows
+        b[at] += frame.gradient
+    A[last, last] += tight
+    b[last] -= strain / scale
+    A[range(F * D), range(F * D)] += pull.ravel()
+    b[: F * D] -= (pull * (poses - start)).ravel()
+    A[np.diag_indices_from(A)] *= 1 + damping
+    step = np.linalg.solve(A, b)
+    np.testing.assert_allclose(found[0][free], sizes[free] + step[F * D :], atol=1e-8)
+    np.testing.assert_array_equal(found[0][[1, 4]], sizes[[1, 4]])
+    np.testing.assert_allclose(found[1], poses + step[: F * D].reshape(F, D), atol=1e-8)
+
+
+def test_a_step_that_makes_it_worse_is_not_taken(monkeypatch):
+    """Whatever the equations say: here, the contrary."""
+    near, clouds = shown()[2:]
+    kept = bundle_adjustment._moved
+    at_first = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, rounds=0)
+
+    def contrary(best, *rest):
+        sizes, poses = kept(best, *rest)
+        return 2 * best.at[0] - sizes, 2 * best.at[1] - poses
+
+    monkeypatch.setattr(bundle_adjustment, "_moved", contrary)
+    found = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, rounds=4)
+    assert found.sizes == at_first.sizes
+    np.testing.assert_array_equal(found.poses, near)
+
+
+# Somebody who is not average ------------------------------------------------------------------------------------------
+
+BONES = {"thigh_length": 1.08, "upper_arm_length": 0.9, "hip_distance": 1.2}
+GIRTHS = {"thigh_width": 1.2, "waist_depth": 1.3, "upper_arm_width": 1.15, "calf_width": 1.2}
+
+
+@cache
+def shown(frames: int = 3, noise: float = 0.003) -> tuple[AnatomicalSizes, np.ndarray, np.ndarray, list[Cloud]]:
+    """True sizes and poses, poses beside these, and surface points."""
+    rng, true = np.random.default_rng(5), actor.sizes(**BONES, **GIRTHS)
+    body = anatomical(true)
+    poses = actor.walk(body.skeleton, frames, 4.0)
+    for joint in ("left_elbow", "right_elbow", "left_knee", "right_knee"):  # what a limb's length is shows where it bends
+        poses[:, body.skeleton.dof_indices([f"{joint}_flexion"])] = rng.uniform(0.2, 1.5, (frames, 1))
+    clouds = [actor.cloud_of(actor.surface(body, pose, rng, 30, noise)) for pose in poses]
+    return true, poses, body.skeleton.clamp(poses + rng.normal(0, 0.04, poses.shape)), clouds
+
+
+def off(found: AnatomicalSizes, names) -> np.ndarray:
+    true = shown()[0]
+    return np.array([abs(getattr(found, name) - getattr(true, name)) for name in names])
+
+
+def test_girths_and_bones_are_found_with_the_poses():
+    true, poses, near, clouds = shown()
+    found = solve_bundle(anatomical, MEAN, SPREAD, near, clouds)
+    every = (*BONES, *GIRTHS)
+    assert (off(found.sizes, every) < 0.75 * off(MEAN, every)).all()
+    assert off(found.sizes, every).sum() < 0.4 * off(MEAN, every).sum()
+    body = anatomical(found.sizes)
+    there = body.points(found.poses)
+    before, truth = anatomical(MEAN).points(near), anatomical(true).points(poses)
+    assert np.linalg.norm(there - truth, axis=2).mean() < 0.3 * np.linalg.norm(before - truth, axis=2).mean()
+    assert found.residual < 0.008
+    np.testing.assert_array_equal(found.poses, body.skeleton.clamp(found.poses))
+
+
+def test_sizes_without_a_deviation_stay_as_they_are():
+    _, _, near, clouds = shown()
+    spread = np.where([name.endswith(("width", "depth")) for name in NAMES], SPREAD, 0.0)
+    found = solve_bundle(anatomical, MEAN, spread, near, clouds, rounds=3)
+    for name, wide in zip(NAMES, spread):
+        assert (getattr(found.sizes, name) == getattr(MEAN, name)) == (wide == 0), name
+
+
+def test_with_no_size_free_the_poses_alone_are_solved_for():
+    true, poses, near, clouds = shown()
+    found = solve_bundle(anatomical, true, np.zeros(len(NAMES)), near, clouds)
+    assert found.sizes == true
+    assert actor.apart(anatomical(true), found.poses, poses).mean() < 0.3 * actor.apart(anatomical(true), near, poses).mean()
+
+
+def test_nothing_is_ever_made_worse_and_more_rounds_do_more():
+    _, _, near, clouds = shown()
+    residuals = [solve_bundle(anatomical, MEAN, SPREAD, near, clouds, rounds=rounds) for rounds in (0, 1, 4, 10)]
+    np.testing.assert_array_equal(residuals[0].poses, near)
+    assert residuals[0].sizes == MEAN
+
+    def cost(found) -> float:
+        of = bundle_adjustment._model(anatomical(found.sizes))
+        frames = [bundle_adjustment._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
+        strain = (found.sizes.to_array() - MEAN.to_array()) / SPREAD
+        worth = bundle_adjustment.WORTH / bundle_adjustment.NOISE**2
+        return worth * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
+
+    costs = [cost(found) for found in residuals]
+    assert costs[3] <= costs[2] <= costs[1] <= costs[0]
+    assert costs[3] < 0.3 * costs[0]
+
+
+def test_the_order_of_points_does_not_matter_and_the_same_question_has_the_same_answer(rng):
+    body, poses = anatomical(MEAN), shown()[2][:1]
+    seen = [actor.surface(body, pose, rng, 15, 0.01) for pose in poses]
+    straight = [actor.cloud_of(one) for one in seen]
+    mixed = []
+    for one in seen:
+        order = rng.permutation(len(one.points))
+        mixed.append(make_cloud(one.points[order], one.normals[order], one.weights[order]))
+    one, again, other = (solve_bundle(anatomical, MEAN, SPREAD, poses, some, rounds=3) for some in (straight, straight, mixed))
+    assert one.sizes == again.sizes
+    np.testing.assert_array_equal(one.poses, again.poses)
+    np.testing.assert_allclose(other.sizes.to_array(), one.sizes.to_array(), atol=1e-3)
+    np.testing.assert_allclose(other.poses, one.poses, atol=1e-2)
+
+
+def test_what_is_expected_holds_where_the_frames_say_nothing():
+    near, clouds = shown()[2:]
+    nothing = make_cloud(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+    found = solve_bundle(anatomical, MEAN, SPREAD, near[:2], [nothing, nothing])
+    np.testing.assert_allclose(found.sizes.to_array(), MEAN.to_array(), atol=1e-9)
+    np.testing.assert_array_equal(found.poses, near[:2])
+    tight = solve_bundle(anatomical, MEAN, 1e-5 * SPREAD, near, clouds, rounds=4)
+    np.testing.assert_allclose(tight.sizes.to_array(), MEAN.to_array(), atol=1e-4)
+
+
+def test_sizes_may_begin_elsewhere_than_where_they_are_expected():
+    true, _, near, clouds = shown()
+    begun = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, rounds=0, first=true)
+    assert begun.sizes == true
+    found = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, first=true)
+    assert off(found.sizes, GIRTHS).sum() < 0.4 * off(MEAN, GIRTHS).sum()
+
+
+def test_sizes_stay_possible_whatever_the_points_say(rng):
+    """A body is asked for only of sizes that a person may have."""
+    _, _, near, clouds = shown()
+    nobody = [make_cloud(cloud.origin + rng.normal(0, 0.02, (300, 3)), np.tile([0, 0, 1.0], (300, 1)), np.ones(300)) for cloud in clouds]
+    try:
+        found = solve_bundle(anatomical, MEAN, 20 * SPREAD, near, nobody)
+    except ShadowPuppetError as error:
+        pytest.fail(f"a size went out of range: {error}")
+    assert np.isfinite(found.poses).all()

@@ -1,0 +1,95 @@
+"""A first pose from one frame: postures in all directions, and a person found in any of them."""
+
+from __future__ import annotations
+
+import actor
+import numpy as np
+import pytest
+
+from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.tracking.multiview import pose_search
+from shadowpuppet.tracking.multiview.observation import Evidence, Stage
+from shadowpuppet.tracking.multiview.pose_search import HEADINGS, placed, search
+from shadowpuppet.tracking.multiview.posture_prior import usual_postures
+from shadowpuppet.tracking.multiview.proposals import GLOBAL
+from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_postures_are_placed_where_the_points_are_in_all_directions(name):
+    of, middle = actor.body(name), np.array([1.0, -2.0, 0.9])
+    base = usual_postures(of.skeleton)[:3]
+    found = placed(of, base, middle)
+    assert found.shape == (3 * HEADINGS, len(of.skeleton.dofs))
+    root = of.skeleton.dof_indices(GLOBAL)
+    turns = found[:, root[3]].reshape(3, HEADINGS)
+    np.testing.assert_allclose(np.diff(turns), 2 * np.pi / HEADINGS)
+    rest = np.setdiff1d(np.arange(found.shape[1]), root)
+    np.testing.assert_array_equal(found[:, rest], np.repeat(base, HEADINGS, 0)[:, rest])
+    limbs = actor.limbs_of(of)
+    areas = limbs.lengths * limbs.radii.mean((1, 2))
+    middles = of.skeleton.points(found, limbs.joints, (limbs.starts + limbs.ends) / 2)
+    np.testing.assert_allclose(np.average(middles, 1, areas), np.tile(middle, (len(found), 1)), atol=1e-9)
+    facing = found[HEADINGS // 2]
+    assert facing[root[3]] == pytest.approx(0)
+
+
+def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None):
+    of = actor.body(name)
+    evidence = Evidence(Stage(of, ()), actor.surface(of, pose, np.random.default_rng(1), 25, 0.004), ())
+    refiner = Refiner(of)
+
+    def weigh(poses):
+        costs = refiner.costs(poses, evidence.full)
+        return costs, -costs / 1e-6
+
+    return of, search(rng, of, refiner, evidence, library, weigh, number)
+
+
+@pytest.mark.parametrize("heading", [0.1, 1.3, 3.1, -2.0])
+def test_somebody_is_found_whichever_way_they_face(heading, rng):
+    pose = actor.stance(actor.body().skeleton, 0.35, heading, (0.4, -0.3))
+    of, found = found_in(pose, rng)
+    assert actor.apart(of, found.best, pose)[0] < 0.03
+    assert abs(np.angle(np.exp(1j * (found.best[3] - heading)))) < 0.2
+    assert (found.poses.shape, found.costs.shape, found.log_weights.shape) == ((4, 32), (4,), (4,))
+    assert (np.diff(found.costs) >= 0).all()
+    np.testing.assert_array_equal(found.poses, of.skeleton.clamp(found.poses))
+
+
+def test_cylinders_are_found_too(rng):
+    pose = actor.stance(actor.body("cylinders").skeleton, 0.3, 0.8)
+    of, found = found_in(pose, rng, name="cylinders")
+    assert actor.apart(of, found.best, pose)[0] < 0.05
+
+
+def test_a_library_s_postures_are_tried_in_any_place_and_direction(rng):
+    """An unusual one that is among them is found."""
+    skeleton = actor.body().skeleton
+    pose = actor.stance(skeleton, 0.0, 2.0)
+    pose[skeleton.dof_indices(["left_hip_y", "left_knee_flexion", "right_shoulder_y", "root_bow"])] = -1.3, 1.9, -2.6, 0.3
+    library = np.tile(pose, (3, 1))
+    library[:, :4] = rng.normal(size=(3, 4))
+    of, found = found_in(pose, rng, library=library)
+    assert actor.apart(of, found.best, pose)[0] < 0.02
+
+
+def test_of_a_long_library_some_are_tried(monkeypatch, rng):
+    tried = []
+    monkeypatch.setattr(pose_search, "placed", lambda of, some, middle: tried.append(some) or placed(of, some, middle))
+    monkeypatch.setattr(pose_search, "MOST", 7)
+    poses = actor.walk(actor.body().skeleton, 30)
+    found_in(poses[3], rng, library=poses)
+    usual = usual_postures(actor.body().skeleton)
+    assert len(tried[0]) == 7 + len(usual)
+    assert (tried[0][:7, None] == poses).all(2).any(1).all()
+    np.testing.assert_array_equal(tried[0][7:], usual)
+
+
+@pytest.mark.parametrize("number", [1, 30])
+def test_as_many_are_given_as_asked_for_and_the_same_seed_finds_the_same(number):
+    pose = actor.stance(actor.body().skeleton)
+    one, other = (found_in(pose, np.random.default_rng(3), number)[1] for _ in range(2))
+    assert one.poses.shape == (number, 32)
+    for a, b in zip(one, other):
+        np.testing.assert_array_equal(a, b)

@@ -1,0 +1,304 @@
+"""The tracker of several cameras on what a ring of them sees of a known motion: follows, repeats, waits, finds again, takes a prior."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import actor
+import numpy as np
+import pytest
+
+from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.vqpca import fit_prior
+from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import evaluate
+from shadowpuppet.tracking.resampling import normalise
+
+FEW = {"particles": 8}
+NAMES = actor.body().skeleton.dof_names
+
+
+def tracker(preset: str = "default", name: str = "anatomical", prior=None, library=None, **overrides) -> MultiviewTracker:
+    return MultiviewTracker(actor.body(name), actor.cameras(), make_multiview_settings(preset, FEW | overrides), prior, library)
+
+
+def track(of: MultiviewTracker, seen: Iterable, seed: int = 0) -> list[MultiviewState]:
+    rng, states = np.random.default_rng(seed), []
+    for points, masks in seen:
+        states.append(of.step(rng, states[-1], points, masks) if states else of.start(rng, points, masks))
+    return states
+
+
+def followed(of: MultiviewTracker, seen) -> list[MultiviewState]:
+    """The filter alone: nobody who is lost is searched for."""
+    rng = np.random.default_rng(0)
+    states = [of.start(rng, *seen[0])]
+    for points, masks in seen[1:]:
+        states.append(of.cycle(rng, states[-1], Evidence(of.stage, points, masks)))
+    return states
+
+
+def errors(of: MultiviewTracker, states, poses) -> np.ndarray:
+    return actor.apart(of.body, np.array([state.pose for state in states]), poses)
+
+
+def frame(masks) -> tuple[SurfacePoints, list]:
+    return actor.hull().points(masks), masks
+
+
+def nobody() -> tuple[SurfacePoints, list]:
+    return frame([np.zeros_like(mask) for mask in actor.filmed()[1][0][1]])
+
+
+def same(one: MultiviewState, other: MultiviewState) -> bool:
+    pairs = [(one.pose, other.pose), (one.velocity, other.velocity), *zip(one.particles, other.particles, strict=True)]
+    return all(np.array_equal(a, b) for a, b in pairs) and np.array_equal(one.cost, other.cost, equal_nan=True) and one[4:] == other[4:]
+
+
+# It follows -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("preset", "name", "overrides", "most"), [
+    ("default", "anatomical", {}, 0.015), ("default", "anatomical", {"refinement": "forces"}, 0.05), ("ni2008", "cylinders", {}, 0.06),
+    ("default", "anatomical", {"method": "image_force"}, 0.06), ("default", "cylinders", {"body": "cylinders"}, 0.05),
+    ("default", "anatomical", {"method": "particle_filter", "particles": 200, "sigma_rotation": 0.08}, 0.3),
+])  # fmt: skip
+def test_a_walk_is_followed(preset, name, overrides, most):
+    poses, seen = actor.filmed(name)
+    of = tracker(preset, name, **overrides)
+    states = track(of, seen)
+    found = errors(of, states, poses)
+    assert np.median(found) < most
+    assert found.max() < 2 * most
+    assert "lost" not in {state.status for state in states}
+    for state in states:
+        assert np.isfinite([*state.pose, *state.velocity, state.cost, state.overlap]).all()
+        assert all(np.isfinite(array).all() for array in state.particles)
+        np.testing.assert_array_equal(state.particles.poses, of.body.skeleton.clamp(state.particles.poses))
+
+
+@functools.cache
+def jerky() -> tuple[np.ndarray, list]:
+    """Somebody whose arm is raised from one frame to the next, held, and let fall."""
+    skeleton = actor.body().skeleton
+    poses = np.array([actor.stance(skeleton, 0.1 + 0.02 * n) for n in range(9)])
+    poses[2:, NAMES.index("left_shoulder_y")] = [0.0, -0.8, -0.8, 0.0, 0.0, -0.8, -0.8]
+    return poses, [frame(actor.masks(actor.body(), pose)) for pose in poses]
+
+
+def test_hybrid_keeps_what_image_forces_lose():
+    """An arm that moves farther in a frame than forces draw it (Ni 2008, Table II)."""
+    poses, seen = jerky()
+    wrist = actor.body().landmark_names.index("left_wrist")
+
+    def away(method: str, seed: int = 0) -> np.ndarray:
+        of = tracker(method=method, particles=24)
+        found = of.body.points(np.array([state.pose for state in track(of, seen, seed)]))[:, wrist]
+        return np.linalg.norm(found - of.body.points(poses)[:, wrist], axis=1)
+
+    hybrid, forces = np.array([away("hybrid", seed) for seed in range(3)]), away("image_force")
+    assert np.median(hybrid) < 0.02
+    assert forces[:2].max() < 0.08
+    assert forces.max() > 0.15
+    assert np.median(forces) > 2 * np.median(hybrid)
+    assert forces[3] > 0.1
+    assert forces.mean() > 1.5 * hybrid.mean()
+
+
+@pytest.mark.parametrize("overrides", [
+    {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
+    {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
+    {"posture": 0.0}, {"explore": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
+    {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
+    {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
+], ids=str)  # fmt: skip
+def test_every_setting_runs(overrides):
+    poses, seen = actor.filmed()
+    of = tracker(**overrides)
+    states = track(of, seen[:4])
+    assert {state.status for state in states} <= {"tracked", "uncertain"}
+    assert errors(of, states, poses[:4]).max() < 0.15
+    assert states[-1].particles.poses.shape == (of.settings.particles, len(NAMES))
+
+
+def test_without_the_sum_over_what_hangs_on_a_joint_tracking_runs_but_is_worse():
+    poses, seen = actor.filmed()
+    alone, summed = (tracker(refinement="forces", forces={"hierarchical": choice}) for choice in (False, True))
+    states = track(alone, seen[:4])
+    assert all(np.isfinite(state.pose).all() for state in states)
+    assert errors(alone, states, poses[:4]).mean() > errors(summed, track(summed, seen[:4]), poses[:4]).mean()
+
+
+def test_one_particle_is_all_that_image_forces_have():
+    """And they are forces, however particles would be refined."""
+    by_default, forced = (track(tracker(method="image_force", refinement=refinement), actor.filmed()[1][:3])
+                          for refinement in ("gauss_newton", "forces"))
+    assert by_default[-1].particles.poses.shape == (1, len(NAMES))
+    assert all(same(a, b) for a, b in zip(by_default, forced))
+
+
+def test_a_state_says_what_its_pose_costs_and_how_it_moved():
+    of = tracker()
+    _, seen = actor.filmed()
+    states = track(of, seen[:3])
+    for before, state, (points, masks) in zip(states, states[1:], seen[1:]):
+        evidence = Evidence(of.stage, points, masks)
+        pose = state.pose[None]
+        costs = of.refiner.costs(pose, evidence.full) + of.settings.silhouettes * evidence.differing(pose)
+        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.usual.strain(pose)[0])
+        assert state.overlap == evidence.overlap(state.pose)
+        np.testing.assert_array_equal(state.velocity, state.pose - before.pose)
+        np.testing.assert_array_equal(state.pose, state.particles.best)
+        np.testing.assert_allclose(state.particles.log_weights, -state.particles.costs / of.settings.sigma_cost**2)
+    mean = tracker(estimate="mean")
+    state = track(mean, seen[:3])[-1]
+    np.testing.assert_allclose(state.pose, normalise(state.particles.log_weights) @ state.particles.poses)
+
+
+# It repeats -----------------------------------------------------------------------------------------------------------
+
+
+def test_same_seed_same_states_another_seed_others():
+    seen = actor.filmed()[1][:4]
+    one, again, other = (track(tracker(), seen, seed) for seed in (0, 0, 1))
+    assert all(same(a, b) for a, b in zip(one, again))
+    assert not any(same(a, b) for a, b in zip(one[1:], other[1:]))
+
+
+def test_trackers_side_by_side_find_what_each_finds_alone():
+    """Whatever the number of threads; a tracker's step changes neither its state nor what it is given."""
+    seen = actor.filmed()[1][:4]
+    alone = [track(tracker(), seen, seed) for seed in range(3)]
+    kept = [array.copy() for points, masks in seen for array in (*points, *masks)]
+    one = tracker()
+    with ThreadPoolExecutor(3) as pool:
+        together = list(pool.map(lambda seed: track(one if seed else tracker(), seen, seed), range(3)))
+    assert all(same(a, b) for rows in zip(alone, together) for a, b in zip(*rows))
+    now = [array for points, masks in seen for array in (*points, *masks)]
+    assert all(np.array_equal(a, b) for a, b in zip(kept, now, strict=True))
+    state = alone[0][2]
+    before = state.pose.copy()
+    after = [one.step(np.random.default_rng(5), state, *seen[3]) for _ in range(2)]
+    assert same(*after)
+    np.testing.assert_array_equal(state.pose, before)
+
+
+# Who is there ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("empty", ["masks", "none", "few points"])
+def test_nobody_is_absent_and_the_pose_waits(empty):
+    seen = actor.filmed()[1]
+    points, masks = seen[2]
+    some = SurfacePoints(*(each[:30] for each in points))
+    gone = {"masks": nobody(), "none": frame([None] * len(masks)), "few points": (some, masks)}[empty]
+    states = track(tracker(), [*seen[:2], gone, gone, *seen[2:4]])
+    assert [state.status for state in states] == ["tracked"] * 2 + ["absent"] * 2 + ["tracked"] * 2
+    for state in states[2:4]:
+        np.testing.assert_array_equal(state.pose, states[1].pose)
+        assert not state.velocity.any()
+        assert np.isnan(state.cost)
+        assert state.overlap == 0
+
+
+def test_nobody_at_the_start_is_absent_and_found_when_they_come():
+    poses, seen = actor.filmed()
+    of = tracker()
+    states = track(of, [nobody(), nobody(), *seen[:2]])
+    assert [state.status for state in states] == ["absent"] * 2 + ["tracked"] * 2
+    assert np.isfinite(states[0].pose).all()
+    assert errors(of, states[2:], poses[:2]).max() < 0.04
+    after, anew = of.step(np.random.default_rng(1), states[1], *seen[2]), of.start(np.random.default_rng(1), *seen[2])
+    assert same(after, anew)  # searched for, not followed from where they were last
+
+
+def test_who_comes_back_elsewhere_or_jumps_is_found():
+    poses, seen = actor.filmed()
+    there, later = actor.filmed(begin=2.5, frames=3)
+    of = tracker()
+    assert np.linalg.norm(there[0, :2] - poses[2, :2]) > 0.8
+    for between in ([nobody()], []):
+        states = track(of, [*seen[:3], *between, *later])
+        assert {state.status for state in states[-3:]} == {"tracked"}
+        assert errors(of, states[-3:], there).max() < 0.05
+
+
+def test_as_in_the_paper_nobody_is_searched_for_again(monkeypatch):
+    _, seen = actor.filmed()
+    _, later = actor.filmed(begin=2.5, frames=3)
+    of = tracker(recover=False)
+    state, rng = track(of, seen[:3])[-1], np.random.default_rng(0)
+    monkeypatch.setattr(type(of), "search", lambda *_: pytest.fail("searched for"))
+    statuses = [(state := of.step(rng, state, *frame)).status for frame in (*later, nobody(), *later)]
+    assert "tracked" not in statuses
+    assert statuses[3] == "absent"
+
+
+def test_something_that_is_no_person_is_lost():
+    """Points of a wall, which fit no body."""
+    points, masks = actor.filmed()[1][0]
+    wall = [np.zeros_like(mask) for mask in masks]
+    for mask in wall:
+        mask[20:100, 20:140] = True
+    states = track(tracker(), [(points, masks), frame(wall)])
+    assert states[1].status in ("lost", "absent", "uncertain")
+    assert states[1].overlap < 0.7
+
+
+def test_a_camera_may_fall_out():
+    poses, seen = actor.filmed()
+    blind = [frame([None if k == n % 5 else mask for k, mask in enumerate(masks)]) for n, (_, masks) in enumerate(seen[:5])]
+    of = tracker()
+    states = track(of, blind)
+    assert {state.status for state in states} == {"tracked"}
+    assert errors(of, states, poses[:5]).max() < 0.06
+
+
+@pytest.mark.parametrize(("overlap", "status"), [(0.49, "lost"), (0.51, "uncertain"), (0.69, "uncertain"), (0.71, "tracked")])
+def test_overlap_decides(overlap, status, monkeypatch):
+    monkeypatch.setattr(Evidence, "overlap", lambda *_: overlap)
+    of, (points, masks) = tracker(), actor.filmed()[1][0]
+    evidence = Evidence(of.stage, points, masks)
+    pose = actor.filmed()[0][0]
+    particles = evaluate(pose[None], of.weigh(evidence))
+    assert of.judge(pose, 0 * pose, particles, evidence, of.weigh(evidence)).status == status
+
+
+# Priors ---------------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def learnt() -> MotionPrior:
+    """Of the walk, but for place and heading."""
+    poses = actor.walk(actor.body().skeleton, 120)
+    return fit_prior(np.random.default_rng(0), [poses[:, 4:]], PriorSettings(regions=8, starts=1), names=NAMES[4:], rate=20.0).prior
+
+
+@pytest.mark.parametrize("defensive", [0.0, 0.5])
+def test_a_prior_of_the_motion_helps_where_there_are_few_particles(defensive):
+    poses, seen = actor.filmed()
+    of = tracker(prior=learnt(), defensive=defensive, particles=6)
+    states = track(of, seen)
+    assert {state.status for state in states} == {"tracked"}
+    assert errors(of, states, poses).max() < 0.05
+    alone = [errors(one, followed(one, seen), poses).mean() for one in (
+        tracker(method="particle_filter", prior=prior, defensive=0.0, particles=20, silhouettes=0.0) for prior in (learnt(), None))]
+    assert alone[0] < alone[1]
+
+
+def test_a_prior_of_another_body_is_refused():
+    other = replace(learnt(), names=tuple(f"other_{name}" for name in NAMES[4:]))
+    with pytest.raises(ShadowPuppetError, match=r"prior: found other_\w+ names of degrees of freedom, .*another body"):
+        track(tracker(prior=other), actor.filmed()[1][:2])
+
+
+def test_a_tracker_without_settings_is_the_default():
+    assert MultiviewTracker(actor.body(), actor.cameras()).settings == MultiviewSettings() == make_multiview_settings()

@@ -1,0 +1,638 @@
+"""What is shown of runs, recordings, priors and files, as data; the timeline; who may look at the page."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import made
+import made_rig
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from runs import body_of, make_run, smooth_poses
+
+from shadowpuppet.body.shapes import Quads
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.cli.app import run as command
+from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.geometry import rigid, rotation_about
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.motion.bvh_writer import write_bvh
+from shadowpuppet.io.motion.table import write_joints
+from shadowpuppet.io.prior import write_prior
+from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.motion.prior.vqpca import fit_prior
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.viewer.scene.figures import of_animation, of_poses, of_table
+from shadowpuppet.viewer.scene.footage import hull_of
+from shadowpuppet.viewer.scene.of_prior import body_of as body_of_prior
+from shadowpuppet.viewer.scene.of_prior import drawn_motion, resting, show_prior
+from shadowpuppet.viewer.scene.of_run import beside
+from shadowpuppet.viewer.scene.open_any import between, show_of
+from shadowpuppet.viewer.scene.show import Chart, Eye, Figure, Show
+from shadowpuppet.viewer.web.curves import AROUND, data_around, limits
+from shadowpuppet.viewer.web.page import closed, kept_frames
+from shadowpuppet.viewer.web.pictures import Look, Plain, shown
+from shadowpuppet.viewer.web.timeline import Timeline
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    return made_rig.write(tmp_path_factory.mktemp("rig") / "rig")
+
+
+@pytest.fixture(scope="module")
+def tracked(tmp_path_factory):
+    """A tiny recording of one camera, tracked."""
+    folder = tmp_path_factory.mktemp("tracked")
+    recording = made.make(folder / "tiny")
+    from shadowpuppet.pipeline.options import make_options
+    from shadowpuppet.pipeline.track import track_recording
+
+    track_recording(recording, folder / "run", make_options({"seed": 1}))
+    return folder / "run"
+
+
+def skinned(figure: Figure, n: int) -> np.ndarray:
+    """The mesh's points (V, 3) in a frame, as a page moves them."""
+    mesh, x, y, z, w = figure.mesh, *(figure.quaternions[n][figure.mesh.joints].T[k] for k in (1, 2, 3, 0))
+    R = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                  [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                  [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])  # fmt: skip
+    return np.einsum("xyv,vy->vx", R, mesh.points - figure.rest[mesh.joints]) + figure.places[n][mesh.joints]
+
+
+# Figures
+
+
+@pytest.mark.parametrize("name", ["cardbox", "rounded", "cylinders", "anatomical"])
+def test_a_bodys_mesh_goes_where_its_shapes_are(name, rng):
+    body = body_of(name)
+    poses, root = smooth_poses(body, 3, rng), rigid(rotation_about([0, 0, 1], 0.7), [1.0, -2.0, 0.5])
+    figure = of_poses("a", body, np.arange(3) / 10, poses, root)
+    for n in range(3):
+        points = skinned(figure, n)
+        joints = body.points(poses[n : n + 1], root)[0]
+        reach = np.linalg.norm(points[:, None] - joints[None], axis=2).min(0)  # every landmark is in or on the mesh
+        assert reach.max() < 0.19
+        if isinstance(body.shapes, Quads):
+            frames = body.skeleton.forward(poses[n : n + 1], root)[0][body.shapes.joints[:, 0]]
+            corners = np.einsum("sxy,scy->scx", frames[:, :, :3], body.shapes.corners) + frames[:, None, :, 3]
+            assert points == pytest.approx(corners.reshape(-1, 3), abs=1e-5)
+
+
+def test_sticks_lie_between_their_joints(rng):
+    names = ("pelvis", "neck", "left_shoulder", "left_elbow", "marker")
+    start = np.array([[0, 0, 1.0], [0, 0, 1.5], [0.2, 0, 1.4], [0.4, 0.1, 1.2], [2, 2, 2]])
+    turns = rotation_about([0.6, 0.0, 0.8], np.linspace(0, 3, 7))
+    places = np.einsum("txy,jy->tjx", turns, start) + rng.normal(size=(7, 1, 3))
+    places[3, 3] = np.nan
+    figure = of_table("a", JointTable(np.arange(7) / 10, names, places))
+    for n in (0, 2, 6):
+        points = skinned(figure, n)
+        for joint in places[n, :4]:
+            assert np.linalg.norm(points - joint, axis=1).min() < 0.06
+        between = (places[n, 2] + places[n, 3]) / 2
+        assert np.linalg.norm(points - between, axis=1).min() < 0.05
+    assert figure.known.all()
+    assert np.isnan(figure.places[3]).any()  # the forearm of the frame without elbow
+    assert np.isfinite(figure.places[2, 1:]).all()
+
+
+def test_the_frame_that_is_shown_is_the_nearest_and_only_where_near():
+    times = np.array([0.0, 0.1, 0.2, 0.3])
+    places = np.zeros((4, 1, 3))
+    places[2] = np.nan
+    table = of_table("a", JointTable(times, ("pelvis", "neck"), np.stack([np.zeros((4, 3)), np.tile([0, 0, 0.5], (4, 1))], 1)))
+    figure = replace(table, places=np.where(np.arange(4)[:, None, None] == 2, np.nan, table.places))
+    assert [figure.at(time) for time in (0.0, 0.04, 0.06, 0.14, 0.21, 0.3, 0.37, 0.4, -0.2)] == [0, 0, 1, 1, None, 3, 3, None, None]
+    still = replace(table, times=times[:1], places=table.places[:1], turns=table.turns[:1])
+    assert still.at(99.0) == 0
+
+
+# Timeline
+
+
+class Clock:
+    now = 5.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_a_timeline_plays_at_its_speed_loops_and_stops():
+    clock = Clock()
+    line = Timeline(np.arange(10) / 10, clock)
+    assert line.tick() == 0
+    line.play()
+    for passed, frame in ((0.0, 0), (0.05, 0), (0.1, 1), (0.55, 5), (0.9, 9), (0.99, 9)):
+        clock.now = 5.0 + passed
+        assert line.tick() == frame
+    clock.now = 6.2
+    assert (line.tick(), line.playing) == (0, True)  # a loop
+    line.speed = 2.0
+    clock.now += 0.2
+    assert line.tick() == 4
+    line.loop = False
+    clock.now += 10
+    assert (line.tick(), line.playing) == (9, False)
+    line.play()  # from the start
+    assert line.tick() == 0
+    line.seek(5)
+    clock.now += 0.1
+    assert line.tick() == 7
+    line.step(-1)
+    assert (line.tick(), line.playing) == (6, False)
+    line.step(-100)
+    assert line.tick() == 0
+    line.loop = True
+    line.step(-1)
+    assert line.tick() == 9
+
+
+@given(st.lists(st.tuples(st.sampled_from(["play", "pause", "wait", "seek", "step", "speed", "loop"]), st.floats(-3, 3)), max_size=20))
+def test_whatever_is_asked_a_timeline_has_a_frame(acts):
+    clock = Clock()
+    line = Timeline(np.array([0.0, 0.1, 0.15, 2.0]), clock)
+    for act, value in acts:
+        if act == "wait":
+            clock.now += abs(value)
+        elif act == "speed":
+            line.speed = abs(value) + 0.1
+        elif act == "loop":
+            line.loop = value > 0
+        elif act in ("seek", "step"):
+            getattr(line, act)(int(value * 2))
+        else:
+            getattr(line, act)()
+        assert 0 <= line.tick() < 4
+        assert line.time == line.times[line.frame]
+
+
+def test_one_frame_does_not_play():
+    line = Timeline(np.zeros(1), Clock())
+    line.play()
+    assert (line.playing, line.tick()) == (False, 0)
+
+
+# Curves
+
+
+def test_curves_around_a_time_have_a_line_at_it():
+    times = np.arange(100) / 10
+    chart = Chart("error", "mm", times, {"mean": times * 10, "worst": np.where(times > 3, np.nan, 2 * times)})
+    x, mean, worst, line = data_around(chart, 4.05)
+    assert len(x) == len(mean) == len(worst) == len(line)
+    assert (np.diff(x) >= 0).all()
+    assert (x[0], x[-1]) == pytest.approx((4.05 - AROUND, 4.05 + AROUND))
+    assert x[np.isfinite(line)] == pytest.approx([4.05, 4.05])
+    assert tuple(line[np.isfinite(line)]) == limits(chart)
+    known = np.isfinite(mean) & ~np.isfinite(line)
+    assert mean[known] == pytest.approx(10 * x[known])
+    assert len(data_around(chart, -50.0)[0]) == 4  # nothing is near
+
+
+# Cameras
+
+
+@pytest.mark.parametrize("fisheye", [False, True])
+def test_pictures_in_frustums_have_no_distortion_and_their_axis_in_the_middle(fisheye):
+    """A world point is in the plain picture where a camera of the frustum's angle, without distortion, sees it."""
+    matrix = np.array([[160.0, 0, 150.0], [0, 155.0, 130.0], [0, 0, 1]])
+    camera = Camera("a", (320, 240), matrix, np.array([-0.2, 0.05, 0.001, -0.002]), fisheye=fisheye)
+    plain = Plain(camera, 160)
+    assert plain.size == (160, 120)
+    image = np.zeros((240, 320), np.uint8)
+    for point in np.array([[0.0, 0, 2], [0.5, 0.3, 2], [-0.8, 0.5, 2], [0.6, -0.6, 2]]):
+        column, row = np.round(camera.project(point)).astype(int)
+        image[:] = 0
+        image[row - 3 : row + 4, column - 3 : column + 4] = 255
+        found = np.argwhere(plain(image) > 100).mean(0)[::-1]
+        half = np.array([plain.aspect, 1.0]) * np.tan(plain.fov / 2)
+        expected = ((point[:2] / point[2] / half + 1) / 2) * np.array(plain.size) - 0.5
+        assert found == pytest.approx(expected, abs=1.3)
+
+
+class OneFrame:
+    def __init__(self, image, mask):
+        self.image, self.made = image, mask
+
+    def picture(self, time):
+        return self.image if time < 1 else None
+
+    def mask(self, time):
+        return self.made if time < 1 else None
+
+
+def test_silhouettes_show_nothing_of_the_picture(rng):
+    camera = Camera.from_fov((64, 48), 1.0)
+    mask = np.zeros((48, 64), bool)
+    mask[10:30, 20:40] = True
+    noise = rng.integers(0, 255, (48, 64, 3)).astype(np.uint8)
+    plain = Plain(camera, 64)
+    a, b = (shown(OneFrame(image, mask), plain, 0.0, Look.SILHOUETTE) for image in (noise, 255 - noise))
+    assert np.array_equal(a, b)
+    assert a.shape == (48, 64, 4)
+    assert (a[20, 30, 3], a[2, 2, 3] < 60) == (255, True)
+    picture = shown(OneFrame(noise, mask), plain, 0.0, Look.PICTURE)
+    assert picture.shape == (48, 64, 3)
+    assert np.abs(picture[40:, :10].astype(int) - noise[40:, :10, ::-1]).max() <= 1
+    assert shown(OneFrame(noise, mask), plain, 2.0, Look.PICTURE) is None
+    assert shown(OneFrame(noise, mask), plain, 0.0, Look.NOTHING) is None
+
+
+# Recordings
+
+
+def test_a_recording_is_shown_with_its_cameras_hull_and_frames(rig):
+    show = show_of(rig)
+    assert len(show.eyes) == made_rig.CAMERAS
+    assert show.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE)
+    assert show.hull is not None
+    for n in (20, 3, 11):
+        surface = show.hull(float(show.times[n]))
+        assert len(surface.points) > 300
+        assert np.linalg.norm(surface.points.mean(0)[:2] - made_rig.place(n)[:2]) < 0.12
+        seen = show.eyes[0].seen
+        exact = made_rig.masks([show.eyes[0].camera], 1, n)[0][0]
+        mask = seen.mask(float(show.times[n]))
+        assert (mask & exact).sum() / (mask | exact).sum() > 0.9
+        assert seen.picture(float(show.times[n])).shape == (120, 160, 3)
+    assert show.eyes[0].seen.mask(99.0) is None
+
+
+def test_silhouettes_are_made_where_none_are_ready(rig, tmp_path):
+    folder = made.copied(rig, tmp_path / "rig", ["masks"])
+    show = show_of(folder)
+    assert "made as" in show.facts["silhouettes"]
+    mask, exact = show.eyes[1].seen.mask(0.5), made_rig.masks([show.eyes[1].camera], 1, 5)[0][0]
+    assert (mask & exact).sum() / (mask | exact).sum() > 0.85
+
+
+def test_a_film_whose_silhouettes_cannot_be_made_is_shown_without(rig, tmp_path):
+    folder = made.copied(rig, tmp_path / "rig", ["masks", "background"])
+    made.write_film(folder / "video" / "cam2.mp4", [np.zeros((120, 160, 3), np.uint8)] * 2, made_rig.RATE)
+    (folder / "background").mkdir()
+    (folder / "background" / "cam2.png").write_bytes((rig / "calibration.toml").read_bytes())
+    with pytest.raises(ShadowPuppetError, match="cam2"):  # said before anything is shown
+        show_of(folder)
+    (folder / "background" / "cam2.png").unlink()
+    seen = show_of(folder).eyes[1].seen
+    seen.options = replace(seen.options, silhouette=replace(seen.options.silhouette, method="averaging"))
+    with pytest.warns(ShadowPuppetWarning, match="'cam2': no silhouettes"):
+        assert seen.mask(0.0) is None
+    assert seen.mask(0.1) is None  # said once
+    plain = Plain(seen.footage.camera, 160)
+    assert shown(seen, plain, 0.0, Look.PICTURE).shape == (120, 160, 3)
+    assert shown(seen, plain, 0.0, Look.SILHOUETTE) is None
+
+
+def test_one_camera_has_no_hull(rig):
+    show = show_of(rig, Options(camera="cam1"))
+    assert ([eye.camera.name for eye in show.eyes], show.hull) == (["cam1"], None)
+    assert hull_of([Eye(Camera.from_fov((64, 48), 1.0)), Eye(Camera.from_fov((64, 48), 1.0))], Options()) is None
+
+
+# Runs
+
+
+def test_a_run_is_shown_beside_its_truth_with_errors_angles_and_particles(tracked):
+    show = show_of(tracked)
+    estimate, truth = show.figures
+    assert (estimate.kind, truth.kind, show.lacks) == ("estimate", "truth", ())
+    names = [chart.name for chart in show.charts]
+    assert names[:2] == ["error", "overlap"]
+    assert {"angles: left arm", "angles: right arm", "angles: trunk and head"} <= set(names)
+    measured = read_run(tracked).metrics["errors"]
+    mean = next(chart for chart in show.charts if chart.name == "error").curves["mean"]
+    assert np.nanmean(mean) == pytest.approx(measured["mean_mm"], rel=0.02)
+    n = 14
+    cloud = show.cloud(float(show.times[n]))
+    assert cloud is not None
+    joints = read_run(tracked).motion.joints[n]
+    hand = read_run(tracked).motion.joint_names.index("left_elbow")
+    ends = cloud.lines.reshape(-1, 3)
+    assert np.linalg.norm(ends - joints[hand], axis=1).min() < 0.08  # some particle is where the run's own estimate was
+    assert (cloud.weights.max(), cloud.weights.min() >= 0) == (1.0, True)
+    assert (cloud.spread.axes > 0).all()
+    again = show.cloud(float(show.times[n]))
+    assert np.array_equal(again.lines, cloud.lines)
+
+
+@pytest.mark.parametrize(("name", "lost"), [("anatomical", (3, 4)), ("cardbox", ())])
+def test_a_runs_puppet_stands_where_its_joints_are(tmp_path, name, lost):
+    folder = make_run(tmp_path / "run", name, frames=12, lost=lost, spread=True)
+    show = show_of(folder)
+    figure, motion = show.figures[0], read_run(folder).motion
+    for n in (0, 7):
+        points = skinned(figure, n)
+        assert np.linalg.norm(points[:, None] - motion.joints[n][None], axis=2).min(0).max() < 0.19
+    assert [figure.at(float(time)) for time in motion.times] == [None if n in lost else n for n in range(12)]
+    spread = figure.spread(7)
+    assert np.array_equal(np.sort(spread.axes.ravel()), np.sort(motion.joint_sd[7].ravel()))
+    assert show.notes == ()
+    assert (show.cloud, show.hull, show.eyes) == (None, None, ())
+
+
+def test_a_run_without_sizes_is_shown_by_its_joints_and_says_so(tmp_path):
+    show = show_of(make_run(tmp_path / "run", frames=5, person=False))
+    assert show.figures[0].known.all()
+    assert len(show.lacks) == 2
+    assert "person.toml" in show.lacks[0]
+    assert "the recording made is not there" in show.lacks[1]
+
+
+def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_path):
+    import shutil
+
+    run = shutil.copytree(tracked, tmp_path / "run")
+    recording = read_run(run).info["recording"]
+    made.replace_text(run / "run.toml", recording, str(tmp_path / "gone"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        show = show_of(run)
+        assert any("gone" in lack for lack in show.lacks)
+        assert [eye.seen for eye in show.eyes] == [None]  # where it stood is known
+        assert show_of(run, recording=Path(recording)).eyes[0].seen is not None
+
+
+def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
+    from shadowpuppet.io.motion.truth import read_truth
+    from shadowpuppet.motion.inverse_kinematics import fit_poses
+    from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
+    from shadowpuppet.pipeline.footage import opened
+    from shadowpuppet.synthetic import synthesize
+    from shadowpuppet.viewer.scene.of_recording import eyes_of
+    from shadowpuppet.viewer.scene.particles import Rerun
+
+    options = Options()
+    eyes = eyes_of(opened(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
+    found = fit_poses(read_truth(tmp_path / "ring" / "truth.csv"))
+    names = [name for name in found.body.landmark_names if not name.endswith("_fist")]
+    builder = MotionBuilder(found.body.name, found.body.skeleton.dof_names, names)
+    for time, pose, places in zip(found.times, found.poses, found.body.points(found.poses, names=names)):
+        builder.append(MotionFrame(time, "tracked" if time > 0.3 else "lost", pose, places))
+    motion = builder.build()
+    rerun = Rerun(found.body, motion, options, eyes)
+    n = 12
+    cloud = rerun(float(motion.times[n]))
+    assert cloud is not None
+    middle = cloud.lines[np.argmax(cloud.weights)].reshape(-1, 3)
+    off = np.linalg.norm(middle[:, None] - motion.joints[n][None], axis=2).min(1)
+    assert np.median(off) < 0.1
+    assert rerun(float(motion.times[0])) is None  # lost: there is no pose to begin from
+
+
+def test_two_runs_side_by_side_or_over_each_other(tmp_path):
+    runs = [show_of(make_run(tmp_path / name, frames=frames, seed=seed)) for name, frames, seed in (("a", 10, 1), ("b", 14, 2))]
+    both = beside(*runs, 1.5)
+    assert [figure.kind for figure in both.figures] == ["estimate", "other"]
+    assert np.linalg.norm(both.figures[1].shift) == pytest.approx(1.5)
+    assert abs(both.figures[1].shift[2]) < 1e-12
+    assert beside(*runs, 0.0).figures[1].shift == pytest.approx((0, 0, 0))
+    assert len(both.times) == 14
+    curves = next(chart for chart in both.charts if chart.name == "angles: left arm").curves
+    assert sum(name.endswith(", beside") for name in curves) == len(curves) / 2
+
+
+# Priors and files
+
+
+def test_a_prior_is_shown_by_its_regions_and_a_motion_drawn_from_it(tmp_path, rng):
+    body = body_of("anatomical")
+    kept = [n for n, name in enumerate(body.skeleton.dof_names) if name not in ("root_x", "root_y", "root_z", "root_heading")]
+    poses = smooth_poses(body, 120, rng)[:, kept]
+    names = tuple(body.skeleton.dof_names[n] for n in kept)
+    prior = fit_prior(rng, [poses], PriorSettings(regions=4), names=names, rate=50.0).prior
+    write_prior(tmp_path / "prior.npz", prior)
+    show = show_of(tmp_path / "prior.npz")
+    assert [figure.kind for figure in show.figures] == ["estimate"] + ["mean"] * 4
+    assert len(show.times) == 500
+    assert show.figures[0].known.all()
+    assert body_of_prior(tmp_path, prior).name == "anatomical"
+    share = resting(prior)
+    assert share @ prior.transitions == pytest.approx(share, abs=1e-6)
+    drawn = drawn_motion(np.random.default_rng(3), prior, 50)
+    assert drawn.shape == (50, len(names))
+    assert np.abs(drawn - drawn.mean(0)).max() > 0.05  # it moves
+    lowest = min(skinned(figure, 0)[:, 2].min() for figure in show.figures)
+    assert -0.15 < lowest < 0.15
+    other = replace(prior, names=("a", *names[1:]))
+    write_prior(tmp_path / "other.npz", other)
+    with pytest.raises(FormatError, match="names"):
+        show_prior(tmp_path / "other.npz")
+
+
+def test_files_of_motion_and_calibrations(tmp_path, rng):
+    body = body_of("anatomical")
+    poses = smooth_poses(body, 20, rng)
+    times = np.arange(20) / 25
+    animation = BodyTree(body).animation(times, poses, np.eye(4))
+    write_bvh(tmp_path / "a.bvh", animation, "m")
+    write_joints(tmp_path / "a.csv", JointTable(times, body.landmark_names, body.points(poses)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        bvh, table = show_of(tmp_path / "a.bvh"), show_of(tmp_path / "a.csv")
+    assert (len(bvh.times), len(table.times)) == (20, 20)
+    reference = of_animation("a", animation)
+    assert skinned(bvh.figures[0], 5).mean(0) == pytest.approx(skinned(reference, 5).mean(0), abs=0.02)
+    write_calibration(tmp_path / "calibration.toml", made_rig.cameras())
+    show = show_of(tmp_path / "calibration.toml")
+    assert (len(show.eyes), show.figures, len(show.times)) == (4, (), 1)
+    assert np.linalg.norm(show.middle[:2]) < 0.3
+    assert np.linalg.norm(show.viewpoint - show.middle) > 3
+    assert show_of(tmp_path).title == "calibration.toml"
+
+
+def test_markers_of_unknown_names_are_shown_all(tmp_path, rng):
+    write_joints(tmp_path / "a.csv", JointTable(np.arange(3) / 10, ("m1", "m2"), rng.normal(size=(3, 2, 3))))
+    show = show_of(tmp_path / "a.csv")
+    assert show.facts["joints"] == "2"
+
+
+def test_a_part_of_a_show():
+    show = Show(title="a", times=np.arange(50) / 10)
+    assert between(show, 1.0, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
+    assert len(between(show, None, None).times) == 50
+    with pytest.raises(ShadowPuppetError, match="a part of"):
+        between(show, 7.0, None)
+
+
+def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "a.txt").write_text("hello")
+    (tmp_path / "a.bvh").write_text("HIERARCHY\nROOT")
+    (tmp_path / "a.npz").write_bytes(b"PK\x03\x04 none")
+    (tmp_path / "a.toml").write_text("x = 1")
+    (tmp_path / "a.mp4").write_bytes(b"\x00" * 500)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.toml").write_text("complete = true\nbody = 'cardbox'\n[versions]\n")
+    for name in ("none", "empty", "a.txt", "a.bvh", "a.npz", "a.toml", "a.mp4", "run"):
+        assert command(["view", str(tmp_path / name), "--no-open"]) == 2
+        error = capsys.readouterr().err
+        assert name in error
+        assert error.startswith("error: ")
+        assert "Traceback" not in error
+    run = str(make_run(tmp_path / "good", frames=3))
+    for more, expected in ((["--pictures"], "--html"), (["--port", "70000"], "port"), (["--html", str(tmp_path / "a.png")], ".html"),
+                           (["--html", str(tmp_path / "none" / "a.html")], "no folder"), (["--listen", "203.0.113.7"], "listen"),
+                           (["--start", "9"], "part of"), ([run, "--beside", run], "one of them"),
+                           (["--truth", str(tmp_path / "a.txt")], "a.txt")):  # fmt: skip
+        code, error = command(["view", run, "--no-open", *more]), capsys.readouterr()
+        assert (code == 2, expected in error.err) == (True, True), (more, error.err)
+    assert command(["view", str(tmp_path / "a.bvh"), "--truth", run]) == 2
+
+
+# The page
+
+
+def test_what_is_wished_for_is_drawn(tracked, rig):
+    pytest.importorskip("viser")
+    from shadowpuppet.viewer.web.nodes import ball
+    from shadowpuppet.viewer.web.server import close_server, open_server
+    from shadowpuppet.viewer.web.stage import POINTS, Stage, Wish
+
+    points, faces = ball()
+    corners = points[faces]
+    assert np.linalg.norm(points, axis=1) == pytest.approx(1, abs=1e-6)
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("fx,fx->f", outward, corners.mean(1)) > 0).all()
+    server = open_server(port=0)
+    try:
+        show = show_of(rig)
+        stage = Stage(server, show, Wish(hull=True, pictures=Look.PICTURE))
+        for n in (3, 9):
+            stage.to(float(show.times[n]))
+            drawn = stage._hull.points.astype(float) + show.middle
+            surface = show.hull(float(show.times[n])).points
+            assert len(drawn) == POINTS
+            assert np.linalg.norm(drawn[:100, None] - surface[None], axis=2).min(1).max() < 0.003
+            assert stage.eyes[0].handle.image.shape == (120, 160, 3)
+        near = stage.eyes[1].handle.scale
+        stage.look_through(1)
+        beyond = np.linalg.norm(stage.eyes[1].eye.camera.centre - show.middle)
+        assert stage.eyes[1].handle.scale / stage.eyes[1].volume > beyond
+        stage.look_through(None)
+        assert stage.eyes[1].handle.scale == pytest.approx(near)
+        stage.wish.hull = stage.wish.cameras = False
+        stage.to(0.5)
+        assert (stage._hull.visible, stage.eyes[0].handle.visible) == (False, False)
+        stage.close()
+        server.scene.reset()
+        show = show_of(tracked)
+        stage = Stage(server, show, Wish(cloud=True, spread=True))
+        stage.to(float(show.times[14]))
+        cloud = show.cloud(float(show.times[14]))
+        assert stage._ellipsoids.batched_positions == pytest.approx(cloud.spread.points, abs=1e-5)
+        assert len(stage._cloud.points) <= 150 * cloud.lines.shape[1]
+        assert stage.figures[1].frame.visible
+        stage.wish.figures["truth"] = stage.wish.cloud = stage.wish.spread = False
+        stage.to(float(show.times[14]))
+        assert (stage.figures[1].frame.visible, stage._cloud.visible, stage._ellipsoids.visible) == (False, False, False)
+        stage.to(1e6)  # nobody is there any more
+        assert not stage.figures[0].frame.visible
+        stage.close()
+    finally:
+        close_server(server)
+
+
+def test_a_file_says_what_may_be_fetched_and_its_title():
+    page = closed("<!doctype html><html><head><title>Viser</title></head><body></body></html>", "<b>run</b>")
+    assert "default-src 'none'" in page
+    assert "<title>&lt;b&gt;run&lt;/b&gt;</title>" in page
+    assert "https:" not in page
+
+
+def test_a_file_has_no_more_frames_than_are_seen():
+    assert len(kept_frames(np.arange(120) / 60)) == 60
+    assert len(kept_frames(np.arange(50) / 25)) == 50
+    assert len(kept_frames(np.zeros(1))) == 1
+
+
+def test_other_sites_pages_and_names_are_refused():
+    pytest.importorskip("viser")
+    import urllib.error
+    import urllib.request
+
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    from shadowpuppet.viewer.web.server import address_of, close_server, open_server
+
+    server = open_server(port=0)
+    try:
+        address, port = address_of(server), server.get_port()
+        assert address == f"http://127.0.0.1:{port}/"
+        with urllib.request.urlopen(address) as answer:
+            policy = answer.headers["Content-Security-Policy"]
+            assert (answer.status, "frame-ancestors 'none'" in policy, "http" in policy) == (200, True, False)
+        strange = urllib.request.Request(address, headers={"Host": "evil.example"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(strange)
+        protocol = _protocol()
+        socket = f"ws://127.0.0.1:{port}"
+        with connect(socket, subprotocols=[protocol], origin=f"http://127.0.0.1:{port}") as ours:
+            assert ours.recv(timeout=20)
+        for origin in ("http://evil.example", "null", f"http://127.0.0.1:{port + 1}"):
+            with pytest.raises(InvalidStatus, match="403"), connect(socket, subprotocols=[protocol], origin=origin):
+                pass
+        with pytest.raises(SettingsError, match="free port"):
+            open_server(port=port)
+        server.request_share_url()  # does nothing
+    finally:
+        close_server(server)
+
+
+def _protocol():
+    import viser
+    from websockets.typing import Subprotocol
+
+    return Subprotocol(f"viser-v{viser.__version__}")
+
+
+def test_a_library_that_cannot_be_guarded_is_not_used(monkeypatch):
+    pytest.importorskip("viser")
+    import websockets.asyncio.server as library
+
+    from shadowpuppet.viewer.web import server
+
+    plain = library.serve
+    with server.guarded(True) as installed:
+        assert library.serve is not plain
+        assert not installed()
+    assert library.serve is plain
+
+
+def test_without_viser_the_command_says_how_to_get_it(tmp_path):
+    code = ("import sys; sys.modules['viser'] = None\n"
+            "import importlib.util as u; find = u.find_spec\n"
+            "u.find_spec = lambda name, *a: None if name == 'viser' else find(name, *a)\n"
+            f"from shadowpuppet.cli.app import run; sys.exit(run(['view', {str(tmp_path)!r}]))")  # fmt: skip
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    assert "pip install 'shadowpuppet[view]'" in done.stderr
+
+
+def test_a_live_session_that_cannot_begin_leaves_no_words_of_the_library(tmp_path):
+    pytest.importorskip("viser")
+    command = [sys.executable, "-m", "shadowpuppet", "live", "--show", "viewer", "--port", "0", "--camera", str(tmp_path / "none.mp4"),
+               "--height", "1.7", "--fov", "60", "-o", str(tmp_path / "run")]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "none.mp4" in done.stderr
+
+
+def test_the_command_line_brings_no_viewer():
+    code = ("import sys, json; import shadowpuppet.cli.app; "
+            "print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    assert json.loads(done.stdout) == []
