@@ -10,8 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from shadowpuppet.pipeline.demo import run_demo
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.synthesize import run_demo
 from shadowpuppet.synthetic import spec_from, synthesize
 from shadowpuppet.video import open_frames, write_image
 

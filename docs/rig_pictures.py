@@ -21,8 +21,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.pipeline.demo import run_demo
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.synthesize import run_demo
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.synthetic import Ring, Spec
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.models import ALL
-from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.pipeline.options import Options, make_options

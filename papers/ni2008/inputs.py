@@ -20,7 +20,7 @@ import shadowpuppet
 from papers.common.experiment import Request
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.whole_sizes import sizes_kind
+from shadowpuppet.body.sizes import sizes_kind
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array

@@ -9,8 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shadowpuppet.body.sizes import CardboxSizes
-    from shadowpuppet.body.whole_sizes import AnatomicalSizes, CylinderSizes
+    from shadowpuppet.body.sizes import AnatomicalSizes, CardboxSizes, CylinderSizes
     from shadowpuppet.camera.camera import Camera
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
@@ -63,7 +62,7 @@ _HOMES = {
     "fit_prior": "motion.prior.vqpca", "read_prior": "io.prior", "write_prior": "io.prior",
     "HullSettings": "tracking.multiview.settings", "SurfacePoints": "tracking.multiview.surface.visual_hull",
     "VisualHull": "tracking.multiview.surface.visual_hull", "FittedPoses": "motion.inverse_kinematics",
-    "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.whole_sizes", "CylinderSizes": "body.whole_sizes",
+    "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.sizes", "CylinderSizes": "body.sizes",
     "read_humaneva": "io.humaneva", "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
     "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation.evaluation",

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from shadowpuppet.body.jacobian import ROTATION, SMALL, TRANSLATION, VECTOR, exponential, make_chain, place_one
 from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.evaluation.bench import naive_multi as naive
 
 pytestmark = pytest.mark.kernels

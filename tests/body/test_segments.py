@@ -7,7 +7,7 @@ import pytest
 
 from shadowpuppet.body.models import ALL, average_sizes, make_body
 from shadowpuppet.body.segments import GIVEN, HELD, JOINTS, coarse_arms, coarse_limbs, dofs_of, limbs_of, members_of, parts_of
-from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.body.sizes import WHOLE
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in ALL}
 

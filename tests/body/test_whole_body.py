@@ -10,8 +10,8 @@ from scipy import ndimage
 from shadowpuppet.body.anthropometry import ANATOMICAL, CYLINDERS, SOLE
 from shadowpuppet.body.models import ALL, average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
+from shadowpuppet.body.sizes import KINDS, WHOLE, kind_of, sizes_kind
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
-from shadowpuppet.body.whole_sizes import KINDS, WHOLE, kind_of, sizes_kind
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError

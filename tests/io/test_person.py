@@ -8,8 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.body.models import average_sizes
-from shadowpuppet.body.sizes import CardboxSizes
-from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.body.sizes import WHOLE, CardboxSizes
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.person import Person, read_person, write_person
 

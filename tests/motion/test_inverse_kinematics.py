@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about, three_turns
 from shadowpuppet.io.motion.table import read_joints

@@ -11,7 +11,7 @@ import made
 import numpy as np
 import pytest
 
-from shadowpuppet.body.whole_sizes import AnatomicalSizes
+from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.cli import app as cli
 from shadowpuppet.evaluation.evaluation import angle_errors
 from shadowpuppet.io.motion.table import read_joints
@@ -19,7 +19,7 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.metrics import LIMBS
-from shadowpuppet.pipeline.demo import contact_sheet
+from shadowpuppet.pipeline.synthesize import contact_sheet
 from shadowpuppet.synthetic import demo_ring_spec
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
@@ -37,15 +37,15 @@ def shown(tmp_path_factory):
     """The demo's folder."""
     folder = tmp_path_factory.mktemp("demo") / "show"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shadowpuppet.pipeline.demo.demo_spec", lambda: made.SPEC)
-        patch.setattr("shadowpuppet.pipeline.demo.demo_ring_spec", lambda: made.RING)
+        patch.setattr("shadowpuppet.pipeline.synthesize.demo_spec", lambda: made.SPEC)
+        patch.setattr("shadowpuppet.pipeline.synthesize.demo_ring_spec", lambda: made.RING)
         assert cli.run(["demo", "-o", str(folder), "--quiet", *QUICK]) == 0
     return folder
 
 
 def test_a_demo_names_its_pictures(shell, shown, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.pipeline.demo.track_recording", lambda recording, run, *_: summary_of(run))
-    monkeypatch.setattr("shadowpuppet.pipeline.demo.synthesize", lambda spec, folder, *_: folder)
+    monkeypatch.setattr("shadowpuppet.pipeline.synthesize.track_recording", lambda recording, run, *_: summary_of(run))
+    monkeypatch.setattr("shadowpuppet.pipeline.synthesize.synthesize", lambda spec, folder, *_: folder)
     code, out, err = shell("demo", "-o", "show", *QUICK)
     assert (code, err) == (0, "")
     assert [line for line in out.splitlines() if line in ("one camera", "several cameras")] == ["one camera", "several cameras"]

@@ -11,8 +11,8 @@ from scans import scan
 
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Limbs
+from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture

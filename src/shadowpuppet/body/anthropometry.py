@@ -9,8 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from shadowpuppet.body.sizes import CardboxSizes
-from shadowpuppet.body.whole_sizes import AnatomicalSizes, BoneSizes
+from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CardboxSizes
 from shadowpuppet.geometry import Array
 
 Whole = TypeVar("Whole", bound=BoneSizes)

@@ -7,10 +7,9 @@ from typing import Any
 
 from shadowpuppet.body.anthropometry import PROPORTIONS, SOLE, shares_of, sizes_from_height, whole_sizes_from_bones, whole_sizes_from_height
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import CardboxSizes, Sizes
+from shadowpuppet.body.sizes import BoneSizes, CardboxSizes, Sizes, sizes_kind
 from shadowpuppet.body.upper_body import BODIES, HAND_SHARE, WRIST_SHARE
 from shadowpuppet.body.whole_body import anatomical, cylinders
-from shadowpuppet.body.whole_sizes import BoneSizes, sizes_kind
 from shadowpuppet.errors import ShadowPuppetError
 
 Make = Callable[[Any], Body]

@@ -154,7 +154,7 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
     from dataclasses import replace
 
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.demo import run_demo
+    from shadowpuppet.pipeline.synthesize import run_demo
 
     options = replace(options_from(flags, config), overlay=True)
     with terminal(quiet, folder) as shown:

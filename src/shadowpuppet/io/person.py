@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.body.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
-from shadowpuppet.body.whole_sizes import KINDS, kind_of, sizes_kind
+from shadowpuppet.body.sizes import HEIGHTS, KINDS, CardboxSizes, Sizes, expected_metres, is_within, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.io.files.text import write_whole

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.anthropometry import shares_of, stature_of, whole_sizes_from_bones
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import LEAST
-from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes, sizes_kind
+from shadowpuppet.body.sizes import LEAST, WHOLE, BoneSizes, sizes_kind
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.ik_initial_guess import guess

@@ -10,8 +10,8 @@ import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.whole_sizes import BoneSizes
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_motion

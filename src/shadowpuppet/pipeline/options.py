@@ -11,8 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
 
-from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
-from shadowpuppet.body.whole_sizes import WHOLE
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, WHOLE, expected_metres
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings

@@ -11,8 +11,8 @@ from scans import make_body as random_tree
 from scans import scan, some_pose
 
 from shadowpuppet.body.anthropometry import shares_of
+from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
-from shadowpuppet.body.whole_sizes import AnatomicalSizes
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.tracking.multiview import bundle_adjustment

@@ -11,8 +11,8 @@ import pytest
 
 from shadowpuppet.body.anthropometry import shares_of
 from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.sizes import WHOLE, AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
-from shadowpuppet.body.whole_sizes import WHOLE, AnatomicalSizes
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import EXACT, SHOWN, measure, seen_height, spread_of

@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, whole_sizes_from_height
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.whole_sizes import AnatomicalSizes
+from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.motion import BLANK, MotionFrame

@@ -12,7 +12,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.whole_skeleton import GLOBAL
+from shadowpuppet.body.whole_body import GLOBAL
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import resampled, resampled_table

@@ -10,8 +10,7 @@ import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
 from shadowpuppet.body.models import Make, make_body
-from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, CardboxSizes, Sizes, expected_metres, is_within
-from shadowpuppet.body.whole_sizes import WHOLE, BoneSizes
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, WHOLE, BoneSizes, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.camera.rasterize import place

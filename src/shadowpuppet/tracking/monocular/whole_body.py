@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.body.models import make_body, whole_from_upper
-from shadowpuppet.body.sizes import CardboxSizes
-from shadowpuppet.body.whole_sizes import BoneSizes
+from shadowpuppet.body.sizes import BoneSizes, CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture

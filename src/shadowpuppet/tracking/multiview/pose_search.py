@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.whole_skeleton import GLOBAL
+from shadowpuppet.body.whole_body import GLOBAL
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.observation import Evidence
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures

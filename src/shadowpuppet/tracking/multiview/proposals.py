@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.whole_skeleton import GLOBAL
+from shadowpuppet.body.whole_body import GLOBAL
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior

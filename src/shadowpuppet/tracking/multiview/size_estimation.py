@@ -14,8 +14,7 @@ import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, shares_of, stature_of
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import HEIGHTS
-from shadowpuppet.body.whole_sizes import BoneSizes
+from shadowpuppet.body.sizes import HEIGHTS, BoneSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError

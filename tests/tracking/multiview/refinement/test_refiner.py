@@ -16,8 +16,8 @@ from scans import scan, some_pose
 from shadowpuppet.body.jacobian import place_one
 from shadowpuppet.body.models import average_sizes
 from shadowpuppet.body.models import make_body as make_named
+from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
-from shadowpuppet.body.whole_sizes import WHOLE
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import rotation_about
