@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.batch.tasks import Task
-from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome
+from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome, WorkerPool
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -31,7 +31,7 @@ def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome
     return do(task, out, _kept.repeats if reuse else None)
 
 
-class Cluster:
+class Cluster(WorkerPool):
     """The workers of a Dask cluster. They must see the same files under the same names, and have this package."""
 
     def __init__(self, address: str, out: Path, start: str, reuse: bool, listener: BatchListener) -> None:

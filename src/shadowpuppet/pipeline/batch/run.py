@@ -20,7 +20,7 @@ from shadowpuppet.pipeline.batch.grid import PLAIN, Case, Grid
 from shadowpuppet.pipeline.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
 from shadowpuppet.pipeline.batch.task import PART, PLAN, RUNS
 from shadowpuppet.pipeline.batch.tasks import Task, Track, make_tasks
-from shadowpuppet.pipeline.batch.workers import Alone, BatchListener, Crew, Outcome, Processes
+from shadowpuppet.pipeline.batch.workers import BatchListener, InProcess, LocalProcesses, Outcome, WorkerPool
 from shadowpuppet.threads import usable_cores
 
 LOCK, FAILURES = ".lock", "failed"
@@ -75,8 +75,8 @@ def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | No
         _write_plan(out, tasks, chosen)
         try:
             if work.todo:
-                with _crew(out, scheduler, min(count, len(work.todo)), threads, reuse, listener) as crew:
-                    work.all(crew)
+                with _pool(out, scheduler, min(count, len(work.todo)), threads, reuse, listener) as pool:
+                    work.all(pool)
         except KeyboardInterrupt:
             done = sum(run.status == "done" for run in _told(work, table).runs)
             raise KeyboardInterrupt(f"{done} of {len(tasks)} runs are done and in {out}; the same command does the rest") from None
@@ -115,19 +115,19 @@ class _Work:
             self.listener.note(f"{self.out}: some of its runs were made by shadowpuppet {', '.join(sorted(old))}, not by this one; take a "
                                "new folder to make them again")
 
-    def all(self, crew: Crew) -> None:
+    def all(self, pool: WorkerPool) -> None:
         """Do what is to be done."""
         self.listener.begin(len(self.tasks), len(self.tasks) - len(self.todo))
         for task in self.todo:
-            crew.put(task)
+            pool.put(task)
         left = len(self.todo)
         while left:
-            task, outcome = crew.next()
+            task, outcome = pool.next()
             self.tries[task.id] += 1
             again = outcome["status"] != "done" and outcome["again"] and self.tries[task.id] <= self.retries
             self.listener.ended(task, outcome, again)
             if again:
-                crew.put(task)
+                pool.put(task)
                 continue
             left -= 1
             if outcome["status"] != "done":
@@ -155,12 +155,12 @@ class _Work:
         return BatchRun(task, "failed", None, outcome["seconds"], tries, outcome["message"])
 
 
-def _crew(out: Path, scheduler: str | None, workers: int, threads: int, reuse: bool, listener: BatchListener) -> Crew:
+def _pool(out: Path, scheduler: str | None, workers: int, threads: int, reuse: bool, listener: BatchListener) -> WorkerPool:
     if scheduler is not None:
         from shadowpuppet.pipeline.batch.cluster import Cluster
 
         return Cluster(scheduler, out, f"{time.time():.6f}", reuse, listener)
-    return Processes(out, workers, threads, reuse, listener) if workers else Alone(out, reuse, listener)
+    return LocalProcesses(out, workers, threads, reuse, listener) if workers else InProcess(out, reuse, listener)
 
 
 @contextlib.contextmanager
