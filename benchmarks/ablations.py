@@ -300,7 +300,7 @@ def _se(one: Result, first: Result) -> float:
 def _smallest(folder: Path) -> list[object]:
     for name, parent in ((ONE[0], "one"), (RINGS[0], "rings")):
         smallest.make(folder / parent / name, smallest.RING if parent == "rings" else smallest.ONE)
-    return ["cost", "noise", "rings_cycles", "--seeds", 1, "--workers", 0, "--recordings", 1, "--one", folder / "one",
+    return ["cost", "noise", "rings_cameras", "--seeds", 1, "--workers", 0, "--recordings", 1, "--one", folder / "one",
             "--rings", folder / "rings", "--output", folder / "out", "--page", smallest.copy(PAGE, folder)]
 
 
