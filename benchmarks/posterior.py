@@ -20,7 +20,7 @@ from proving_ground import HERE, made
 from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER_JOINTS
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.tracking.monocular.pose_search import arm_dofs
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
@@ -88,10 +88,10 @@ def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose
         arms = sample(rng, cost, sign, skeleton.limits[0][dofs], skeleton.limits[1][dofs], temperature)
         if sweep == SWEEPS - 1:
             points = picture.points_world(put(arms)).mean(0)
-            places |= {name: points[picture.body.landmark_names.index(name)] for name in UPPER if name.startswith(side)}
+            places |= {name: points[picture.body.landmark_names.index(name)] for name in UPPER_JOINTS if name.startswith(side)}
         middle = to_arms(to_directions(arms, sign).mean(0)[None], sign)[0]
         pose[dofs] = np.clip(middle, skeleton.limits[0][dofs], skeleton.limits[1][dofs])
-    return np.array([places[name] for name in UPPER])
+    return np.array([places[name] for name in UPPER_JOINTS])
 
 
 def compare(path: Path, every: int, temperature: float, seed: int) -> tuple[float, float]:
@@ -99,8 +99,8 @@ def compare(path: Path, every: int, temperature: float, seed: int) -> tuple[floa
     case, options = Case.read(path, masks=True), Options(masks=True)
     for_fit, for_track, for_sample = np.random.default_rng(seed).spawn(3)
     picture = case.person(options, for_fit).picture(case.camera, options.tracker.body)
-    tracker, truth = MonocularTracker(picture, options.tracker), case.truth.select(UPPER).positions
-    columns = [picture.body.landmark_names.index(name) for name in UPPER]
+    tracker, truth = MonocularTracker(picture, options.tracker), case.truth.select(UPPER_JOINTS).positions
+    columns = [picture.body.landmark_names.index(name) for name in UPPER_JOINTS]
     state, errors = tracker.start(for_track, case.masks[0]), []
     for n, mask in enumerate(case.masks):
         state = tracker.step(for_track, state, mask) if n else state

@@ -69,9 +69,9 @@ def unit(vectors: Array) -> Array:
 
 ORDERS = ("ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX")
 """Axes of the three turns; the first is what most programs write."""
-CLEAR = np.radians(25.0)
+MIN_MARGIN = np.radians(25.0)
 """As long as the middle turn keeps so far from a quarter, the first order will do."""
-SINGULAR = 1e-7
+GIMBAL_COSINE = 1e-7
 """Cosine of the middle turn under which the other two are one and the same."""
 
 
@@ -84,21 +84,21 @@ def continuous_angles(rotations: Array, order: str, limits: ArrayLike | None = N
     axes = ["XYZ".index(axis) for axis in order]
     low, high = np.reshape([-np.pi, np.pi] * 3 if limits is None else limits, (3, 2)).T
     middle = (low + high) / 2
-    first = three_turns(rotations, axes)
+    first = euler_angles(rotations, axes)
     both = middle + (np.stack([first, first * [1, -1, 1] + np.pi], 1) - middle + np.pi) % (2 * np.pi) - np.pi
     over = np.maximum(low - both, 0) + np.maximum(both - high, 0)
-    angles = branch(both, (over**2).sum(2) + 1e-6 * (both**2).sum(2), wraps=np.ones(3, bool))
+    angles = smoothest_path(both, (over**2).sum(2) + 1e-6 * (both**2).sum(2), wraps=np.ones(3, bool))
     angles = np.unwrap(_kept(rotations, angles, axes), axis=0)
     return angles - 2 * np.pi * np.round((np.median(angles, axis=0) - middle) / (2 * np.pi))
 
 
 def clear_order(rotations: Array) -> str:
     """The first of `ORDERS` where it is far from singular in all rotations (T, 3, 3); else the one that stays farthest."""
-    room = [np.pi / 2 - float(np.abs(three_turns(rotations, ["XYZ".index(axis) for axis in order])[:, 1]).max()) for order in ORDERS]
-    return ORDERS[0] if room[0] >= CLEAR else ORDERS[int(np.argmax(room))]
+    room = [np.pi / 2 - float(np.abs(euler_angles(rotations, ["XYZ".index(axis) for axis in order])[:, 1]).max()) for order in ORDERS]
+    return ORDERS[0] if room[0] >= MIN_MARGIN else ORDERS[int(np.argmax(room))]
 
 
-def three_turns(R: Array, axes: Sequence[int]) -> Array:
+def euler_angles(R: Array, axes: Sequence[int]) -> Array:
     """Angles (N, 3) of turns about three different axes, one after another, that make rotations (N, 3, 3); the second within a quarter.
 
     Where the second is a quarter, the first and the third are one and the same, and the first is none.
@@ -112,7 +112,7 @@ def three_turns(R: Array, axes: Sequence[int]) -> Array:
     return np.stack([np.where(single, 0.0, first), second, third], 1)
 
 
-def branch(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
+def smoothest_path(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
     """Of candidates (T, K, 3) the path (T, 3) of least squared steps and least costs of their own (T, K) (Viterbi 1967)."""
     steps = candidates[1:, None, :] - candidates[:-1, :, None]
     steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
@@ -130,7 +130,7 @@ def branch(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
 
 
 def _singular(R: Array, axes: Sequence[int]) -> NDArray[np.bool_]:
-    return np.hypot(R[:, axes[0], axes[0]], R[:, axes[0], axes[1]]) < SINGULAR
+    return np.hypot(R[:, axes[0], axes[0]], R[:, axes[0], axes[1]]) < GIMBAL_COSINE
 
 
 def _kept(rotations: Array, angles: Array, axes: Sequence[int]) -> Array:
@@ -144,7 +144,7 @@ def _kept(rotations: Array, angles: Array, axes: Sequence[int]) -> Array:
     return angles
 
 
-FEWEST = 3
+MIN_POINTS = 3
 """Points that a rotation needs."""
 
 
@@ -181,6 +181,6 @@ def align(points: ArrayLike, targets: ArrayLike, scaled: bool = False) -> Alignm
     R = (U * signs[..., None, :]) @ Vt
     spread = (a**2).sum((-1, -2))
     scale = np.divide((S * signs).sum(-1), spread, out=np.ones(spread.shape), where=spread > 0) if scaled else np.ones(spread.shape)
-    few = count[..., 0] < FEWEST
+    few = count[..., 0] < MIN_POINTS
     scale = np.where(few, np.nan, scale)
     return Alignment(R, middles[1] - scale[..., None] * (R @ middles[0][..., None])[..., 0], scale)

@@ -6,9 +6,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-LIMIT = "SHADOWPUPPET_THREADS"
+THREADS_VARIABLE = "SHADOWPUPPET_THREADS"
 """Environment variable: cores that a process may use, where several share a machine."""
-POOLS = (LIMIT, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
+THREAD_VARIABLES = (THREADS_VARIABLE, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
 """Variables that libraries read when they are loaded."""
 
 
@@ -26,7 +26,7 @@ def one_blas_thread() -> Iterator[None]:
 
 def thread_limit() -> int | None:
     """Threads that this process is told to keep to; None where it is not told."""
-    told = os.environ.get(LIMIT, "")
+    told = os.environ.get(THREADS_VARIABLE, "")
     return int(told) if told.isdecimal() and int(told) else None
 
 

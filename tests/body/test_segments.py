@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.models import ALL, average_sizes, make_body
-from shadowpuppet.body.segments import GIVEN, HELD, JOINTS, coarse_arms, coarse_limbs, dofs_of, limbs_of, members_of, parts_of
+from shadowpuppet.body.segments import (
+    PULLED_POINTS,
+    SEGMENT_JOINTS,
+    UNOBSERVED_DOFS,
+    coarse_arms,
+    coarse_limbs,
+    dofs_of,
+    limbs_of,
+    parts_of,
+    segments_of,
+)
 from shadowpuppet.body.sizes import WHOLE
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in ALL}
@@ -15,13 +25,13 @@ BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in ALL}
 @pytest.mark.parametrize("name", ALL)
 def test_every_angle_is_one_member_s(name):
     body = BODY[name]
-    members = members_of(body.skeleton)
+    members = segments_of(body.skeleton)
     assert members == (("torso", "left_arm", "right_arm", "left_leg", "right_leg") if name in WHOLE else ("torso", "left_arm", "right_arm"))
     assert limbs_of(body.skeleton) == members[1:]
     owned = np.concatenate([dofs_of(body.skeleton, member) for member in members])
     assert len(set(owned.tolist())) == len(owned)
-    assert {body.skeleton.dof_names[d] for d in set(range(len(body.skeleton.dofs))) - set(owned.tolist())} <= set(GIVEN)
-    assert {name for member in members for name in HELD[member]} <= set(body.landmark_names)
+    assert {body.skeleton.dof_names[d] for d in set(range(len(body.skeleton.dofs))) - set(owned.tolist())} <= set(UNOBSERVED_DOFS)
+    assert {name for member in members for name in PULLED_POINTS[member]} <= set(body.landmark_names)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -31,7 +41,7 @@ def test_a_limb_s_parts_move_with_it_alone(name, rng):
         parts = parts_of(body, limb)
         assert len(parts) >= 2
         assert all(part.startswith(limb.split("_")[0]) for part in parts)
-        others = {part for member in members_of(body.skeleton) if member != limb for part in parts_of(body, member)}
+        others = {part for member in segments_of(body.skeleton) if member != limb for part in parts_of(body, member)}
         assert not others & set(parts)
 
 
@@ -71,5 +81,5 @@ def test_coarse_legs_are_mirrored_and_of_use(name):
 
 
 def test_joints_of_members_do_not_overlap():
-    every = [joint for joints in JOINTS.values() for joint in joints]
+    every = [joint for joints in SEGMENT_JOINTS.values() for joint in joints]
     assert len(set(every)) == len(every)

@@ -11,7 +11,7 @@ from people import SIZES, random_poses
 
 from shadowpuppet.body.forward_kinematics import sines
 from shadowpuppet.body.skeleton import AXES, Coupling, Dof, Joint, Skeleton
-from shadowpuppet.body.upper_body import RISE, SIDES, upper_body_skeleton
+from shadowpuppet.body.upper_body import SHOULDER_RISE, SIDES, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
@@ -131,7 +131,7 @@ def test_clavicles_lift_and_advance_the_shoulder_with_its_arm_only(name, other):
     rest = skeleton.forward(skeleton.pose()[None])[0, :, :, 3]
     raised = skeleton.forward(skeleton.pose(**{f"{name}_shoulder_abduction": 1.5, f"{name}_shoulder_forward": 0.5})[None])[0, :, :, 3]
     moved = (raised - rest)[skeleton.joint_index(f"{name}_shoulder")]
-    np.testing.assert_allclose(moved, [0.5 * RISE, 0, 1.5 * RISE], atol=1e-12)
+    np.testing.assert_allclose(moved, [0.5 * SHOULDER_RISE, 0, 1.5 * SHOULDER_RISE], atol=1e-12)
     np.testing.assert_allclose((raised - rest)[skeleton.joint_index(f"{other}_shoulder")], 0)
     assert not UPPER["plain"].couplings
 

@@ -7,7 +7,7 @@ import pytest
 from people import random_poses
 from scipy import ndimage
 
-from shadowpuppet.body.anthropometry import ANATOMICAL, CYLINDERS, SOLE
+from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, CYLINDER_SHARES, SOLE
 from shadowpuppet.body.models import ALL, average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
 from shadowpuppet.body.sizes import KINDS, WHOLE, kind_of, sizes_kind
@@ -76,7 +76,7 @@ def test_bodies_are_linear_in_their_sizes_and_use_every_one(name, rng):
 def test_sizes_are_kept_checked_and_grow_with_the_height(name):
     sizes, kind = average_sizes(name, 1.75), sizes_kind(name)
     assert kind.from_mapping(dict(zip(kind.names(), sizes.to_array().tolist()))) == sizes
-    assert set(kind.names()) == set(ANATOMICAL if name == "anatomical" else CYLINDERS)
+    assert set(kind.names()) == set(ANATOMICAL_SHARES if name == "anatomical" else CYLINDER_SHARES)
     np.testing.assert_allclose(sizes.to_array() / (1.75 - SOLE), average_sizes(name, 1.4).to_array() / (1.4 - SOLE))
     assert sizes.with_values(hip_forward=-0.02, shoulder_drop=0.0).to_array() is not None
     with pytest.raises(ShadowPuppetError, match=r"size thigh_length: found 44\.0, expected 0\.005 to 2\.0 metres"):

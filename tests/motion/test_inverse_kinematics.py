@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.geometry import Array, rotation_about, three_turns
+from shadowpuppet.geometry import Array, euler_angles, rotation_about
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.motion.inverse_kinematics import _along, _Linear, _solved, fit_poses
+from shadowpuppet.motion.inverse_kinematics import _Linear, _solve_chain, _solve_step, fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.plausibility import NEEDED
+from shadowpuppet.motion.plausibility import NEEDED_JOINTS
 from shadowpuppet.motion.prior.clips import mirrored
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 
@@ -140,7 +140,7 @@ def test_a_short_trunk_bends_forward_not_backward():
 
 @pytest.mark.parametrize("left_out", [
     ("pelvis",), ("left_hip", "right_hip"), ("neck", "head"), ("left_wrist", "right_wrist", "left_hand", "right_hand"),
-    ("left_ankle", "right_ankle"), tuple(set(JOINTS) - set(NEEDED) - {"left_hip", "right_hip"}),
+    ("left_ankle", "right_ankle"), tuple(set(JOINTS) - set(NEEDED_JOINTS) - {"left_hip", "right_hip"}),
 ])  # fmt: skip
 @pytest.mark.parametrize("name", WHOLE)
 def test_any_joints_will_do_that_show_a_person(name, left_out):
@@ -187,9 +187,9 @@ def test_three_turns_make_the_rotation_again_in_the_singular_place_too(axes, rng
     angles[:20, 1] = rng.choice([-1, 1], 20) * np.pi / 2
     turned = [rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, angles.T)]
     R = turned[0] @ turned[1] @ turned[2]
-    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, three_turns(R, axes).T))
+    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, euler_angles(R, axes).T))
     np.testing.assert_allclose(first @ second @ third, R, atol=1e-6)
-    np.testing.assert_array_equal(three_turns(R, axes)[:20, 0], 0)
+    np.testing.assert_array_equal(euler_angles(R, axes)[:20, 0], 0)
 
 
 def test_one_frame_is_enough():
@@ -273,12 +273,12 @@ def test_the_chain_is_solved_as_the_whole_matrix(T, D, S, seed):
     right, free = np.concatenate([equations.g.ravel(), equations.h]), np.append(~held.ravel(), np.ones(S, bool))
     expected = np.zeros(len(right))
     expected[free] = np.linalg.solve(M[np.ix_(free, free)], right[free])
-    step, change = _solved(equations, links, damping, held)
+    step, change = _solve_step(equations, links, damping, held)
     np.testing.assert_allclose(np.append(step.ravel(), change), expected, rtol=1e-6, atol=1e-9)
 
 
 def test_a_chain_of_one_block():
-    np.testing.assert_allclose(_along(np.array([[[2.0]]]), np.zeros((0, 1)), np.array([[[4.0]]])), [[[2.0]]])
+    np.testing.assert_allclose(_solve_chain(np.array([[[2.0]]]), np.zeros((0, 1)), np.array([[[4.0]]])), [[[2.0]]])
 
 
 # On recordings ----------------------------------------------------------------------------------------------------------

@@ -7,20 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from shadowpuppet.body.skeleton import AXES, Dof
-from shadowpuppet.geometry import Array, branch, three_turns, unit
+from shadowpuppet.geometry import Array, euler_angles, smoothest_path, unit
 
 
-def angles_of(rotations: Array, dofs: Sequence[Dof]) -> Array:
+def rotation_angles(rotations: Array, dofs: Sequence[Dof]) -> Array:
     """Values (N, 3) of three DOF that make rotations (N, 3, 3), each on the branch that is best within the limits."""
     candidates, low, high = _candidates(rotations, dofs)
     return candidates[np.arange(len(candidates)), _excess(candidates, low, high).argmin(1)]
 
 
-def _angles(rotations: Array, dofs: Sequence[Dof]) -> Array:
+def angles_over_time(rotations: Array, dofs: Sequence[Dof]) -> Array:
     """Values (T, 3) of three DOF that make rotations (T, 3, 3), on the branch that limits and neighbours in time want."""
     candidates, low, high = _candidates(rotations, dofs)
     free = ~np.isfinite(low)
-    values = branch(candidates, _excess(candidates, low, high), wraps=free)
+    values = smoothest_path(candidates, _excess(candidates, low, high), wraps=free)
     values[:, free] = np.unwrap(values[:, free], axis=0)
     return values
 
@@ -35,7 +35,7 @@ def _candidates(rotations: Array, dofs: Sequence[Dof]) -> tuple[Array, Array, Ar
         other = v - 2 * np.pi * unit(np.where(np.linalg.norm(v, axis=1, keepdims=True) > 1e-9, v, [0, 0, 1e-9]))
         return np.stack([v, other], 1), low, high
     signs, free = np.array([AXES[dof.axis][1] for dof in dofs]), ~np.isfinite(low)
-    first = three_turns(rotations, [AXES[dof.axis][0] for dof in dofs])
+    first = euler_angles(rotations, [AXES[dof.axis][0] for dof in dofs])
     both = np.stack([first, first * [1, -1, 1] + np.pi], 1) * signs
     centre = np.where(free, 0.0, (np.where(free, 0, low) + np.where(free, 0, high)) / 2)
     return centre + (both - centre + np.pi) % (2 * np.pi) - np.pi, low, high

@@ -34,13 +34,13 @@ given by Winter (2009, fig. 4.1), breadths and depths rounded from ANSUR II (Gor
 Breadths and depths of trunk and limbs vary together from slim to stout: they are left loose, so that many of them do not outvote the
 lengths, which tell how far away the person stands.
 """
-SHOULDER_JOINT = (0.103, 0.06)
+SHOULDER_SHARE = (0.103, 0.06)
 """Half the distance of the shoulders' joints: half the biacromial breadth of ANSUR II less some 2 cm to the humerus' centre."""
-TRUNK = (0.518, 0.03)
+TRUNK_SHARE = (0.518, 0.03)
 """From the crotch to the crown: one less ANSUR II's crotch height. Of all upright measures the steadiest fraction of stature."""
 
 
-BONES: Mapping[str, tuple[float, float]] = {
+BONE_SHARES: Mapping[str, tuple[float, float]] = {
     "hip_distance": (0.108, 0.012), "hip_drop": (0.005, 0.008), "hip_forward": (0.0, 0.008),
     "neck_length": (0.072, 0.012), "head_forward": (0.020, 0.010), "head_height": (0.084, 0.006),
     "shoulder_distance": (0.203, 0.012), "shoulder_drop": (0.045, 0.012), "shoulder_forward": (0.010, 0.008),
@@ -52,13 +52,15 @@ BONES: Mapping[str, tuple[float, float]] = {
 Arms by de Leva (1996, table 4; means of women and men), legs and heights along the trunk by Drillis & Contini (1966) as given by Winter
 (2009, fig. 4.1); shoulders' joints as `SHOULDER_JOINT`; hips' joints and what lies forward by CMU's mocap skeletons.
 """
-CYLINDERS: Mapping[str, tuple[float, float]] = {
-    **BONES, "trunk_height": (0.308, 0.012), "trunk_width": (0.185, 0.020), "trunk_depth": (0.130, 0.020), "head_width": (0.092, 0.006),
+CYLINDER_SHARES: Mapping[str, tuple[float, float]] = {
+    **BONE_SHARES,
+    "trunk_height": (0.308, 0.012), "trunk_width": (0.185, 0.020), "trunk_depth": (0.130, 0.020), "head_width": (0.092, 0.006),
     "upper_arm_width": (0.052, 0.008), "forearm_width": (0.042, 0.006), "thigh_width": (0.090, 0.010), "shank_width": (0.058, 0.007),
 }  # fmt: skip
 """The sizes of `cylinders`; each width is about the mean of those along the part in `ANATOMICAL`."""
-ANATOMICAL: Mapping[str, tuple[float, float]] = {
-    **BONES, "lumbar_height": (0.152, 0.012), "thorax_height": (0.156, 0.012), "foot_length": (0.153, 0.006), "toe_out": (0.018, 0.012),
+ANATOMICAL_SHARES: Mapping[str, tuple[float, float]] = {
+    **BONE_SHARES,
+    "lumbar_height": (0.152, 0.012), "thorax_height": (0.156, 0.012), "foot_length": (0.153, 0.006), "toe_out": (0.018, 0.012),
     "pelvis_width": (0.196, 0.015), "pelvis_depth": (0.143, 0.015), "waist_width": (0.180, 0.018), "waist_depth": (0.135, 0.018),
     "chest_width": (0.168, 0.014), "chest_depth": (0.145, 0.014), "shoulder_thickness": (0.062, 0.008), "neck_width": (0.0685, 0.006),
     "head_width": (0.0893, 0.004), "head_depth": (0.115, 0.005), "upper_arm_width": (0.0593, 0.007), "elbow_width": (0.0480, 0.005),
@@ -70,7 +72,7 @@ ANATOMICAL: Mapping[str, tuple[float, float]] = {
 
 def shares_of(kind: type[BoneSizes]) -> Mapping[str, tuple[float, float]]:
     """The sizes of a whole body as fractions of the stature, and their deviations."""
-    return ANATOMICAL if issubclass(kind, AnatomicalSizes) else CYLINDERS
+    return ANATOMICAL_SHARES if issubclass(kind, AnatomicalSizes) else CYLINDER_SHARES
 
 
 def whole_sizes_from_height(kind: type[Whole], height: float) -> Whole:
@@ -86,7 +88,7 @@ def whole_sizes_from_bones(kind: type[Whole], lengths: Mapping[str, float], stat
 
 def stature_of(lengths: Mapping[str, float]) -> float:
     """The likeliest stature (m, no shoes) of who has bones of these lengths (m), named as in `BONES`; some must be given."""
-    known = [(length, *BONES[name]) for name, length in lengths.items() if name in BONES]
+    known = [(length, *BONE_SHARES[name]) for name, length in lengths.items() if name in BONE_SHARES]
     return sum(length * share / deviation**2 for length, share, deviation in known) / sum((s / deviation) ** 2 for _, s, deviation in known)
 
 
@@ -115,6 +117,6 @@ class SizePrior:
         joint = sizes[:, of["shoulder_width"]] / 2 - sizes[:, of["shoulder_inset"]]
         trunk = sizes[:, [of["head_height"], of["neck_gap"], of["torso_height"], of["waist_height"]]].sum(1)
         total = (((sizes / self.mean - 1) / spread) ** 2).sum(1)
-        for value, (share, deviation) in ((joint, SHOULDER_JOINT), (trunk, TRUNK)):
+        for value, (share, deviation) in ((joint, SHOULDER_SHARE), (trunk, TRUNK_SHARE)):
             total += ((value / (share * stature) - 1) / deviation) ** 2
         return total

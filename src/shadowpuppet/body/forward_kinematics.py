@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.jit import kernel, part
+from shadowpuppet.jit import device, kernel
 
 # Coefficients of fdlibm's kernels (Sun Microsystems 1993): sine and cosine within pi / 4, and pi / 2 in three parts.
 _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
@@ -16,7 +16,7 @@ SHIFT, TURN, VECTOR = 0, 1, 2
 """Kinds of DOF: a shift along an axis, a turn about one, a component of a rotation vector (three in a row)."""
 
 
-@part
+@device
 def sines(angles, sine, cosine):  # pragma: no cover
     """Sine and cosine (B,) of angles (B,), right to the last bit or two for angles under 1e5 rad; the C library's do not vectorise."""
     s0, s1, s2, s3, s4, s5 = _SINE
@@ -34,7 +34,7 @@ def sines(angles, sine, cosine):  # pragma: no cover
         cosine[n] = -along if (quarter == 1) | (quarter == 2) else along
 
 
-@part
+@device
 def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no cover
     """The transforms (3, 4, B) of joint `j` before its DOF: its parent's, shifted by its offset (3, B), which follows its couplings."""
     parent, coupled, shifts = tree[0][j], tree[5], tree[6]
@@ -89,7 +89,7 @@ def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma:
                         place[n] += along[n] * value[n]
 
 
-@part
+@device
 def _turn(T, a, b, sine, cosine):  # pragma: no cover
     """Columns a and b of transforms (3, 4, B) turned by angles (B,)."""
     for r in range(3):
@@ -99,7 +99,7 @@ def _turn(T, a, b, sine, cosine):  # pragma: no cover
             u[n], v[n] = cosine[n] * x + sine[n] * y, cosine[n] * y - sine[n] * x
 
 
-@part
+@device
 def _turn_by_vector(T, work):  # pragma: no cover
     """Transforms (3, 4, B) turned by rotation vectors, the first rows of `work` (6, B): Rodrigues' formula, row by row.
 
@@ -121,7 +121,7 @@ def _turn_by_vector(T, work):  # pragma: no cover
             z[n] += a * s + b * (p * v[n] - q * u[n])
 
 
-@part
+@device
 def load_joints(transforms, begin, T):  # pragma: no cover
     """Transforms (N, J, 3, 4) from `begin` on, as far as there are any, into a block (J, 3, 4, B)."""
     for n in range(min(T.shape[3], transforms.shape[0] - begin)):

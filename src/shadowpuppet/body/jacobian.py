@@ -17,9 +17,9 @@ from shadowpuppet.jit import kernel
 
 TRANSLATION, ROTATION, VECTOR = 0, 1, 2
 KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
-STEP = 0.5
+MAX_STEP = 0.5
 """No DOF moves farther than this (rad or m) in one iteration of a refinement."""
-SMALL = 1e-4
+SMALL_ANGLE = 1e-4
 """Rotation vectors shorter than this (rad) are turned by their series."""
 
 
@@ -62,7 +62,7 @@ def exponential(x, y, z, R, J):  # pragma: no cover
     """Rotation (3, 3) of a rotation vector, and its left Jacobian (3, 3): exp(v + d) = exp(J d) exp(v) for small d."""
     square = x * x + y * y + z * z
     angle = np.sqrt(square)
-    if angle < SMALL:
+    if angle < SMALL_ANGLE:
         a, b, c = 1 - square / 6, 0.5 - square / 24, 1 / 6 - square / 120
     else:
         a, b, c = np.sin(angle) / angle, (1 - np.cos(angle)) / square, (angle - np.sin(angle)) / (square * angle)

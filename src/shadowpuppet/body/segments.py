@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.angles import angles_of
+from shadowpuppet.body.angles import rotation_angles
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import Dof, Skeleton
 from shadowpuppet.body.upper_body import SIDES
@@ -21,32 +21,32 @@ def _both(torso: tuple[str, ...], arm: tuple[str, ...], leg: tuple[str, ...]) ->
     return {"torso": torso} | {f"{side}_{limb}": tuple(f"{side}_{name}" for name in names) for limb, names in limbs for side in SIDES}
 
 
-JOINTS = _both(("pelvis", "torso", "chest", "head"), ("shoulder", "elbow"), ("hip", "knee", "ankle"))
+SEGMENT_JOINTS = _both(("pelvis", "torso", "chest", "head"), ("shoulder", "elbow"), ("hip", "knee", "ankle"))
 """Joints that a member may have."""
-HELD = _both(("left_shoulder", "right_shoulder"), ("elbow", "hand"), ("knee", "ankle"))
+PULLED_POINTS = _both(("left_shoulder", "right_shoulder"), ("elbow", "hand"), ("knee", "ankle"))
 """Points by which each member is held where it was."""
-GIVEN = ("root_x",)
+UNOBSERVED_DOFS = ("root_x",)
 """DOF that one camera's silhouettes do not tell: how far away the person is stays as it was found."""
 
 
-def members_of(skeleton: Skeleton) -> tuple[str, ...]:
+def segments_of(skeleton: Skeleton) -> tuple[str, ...]:
     """The members that a skeleton has."""
-    return tuple(name for name, joints in JOINTS.items() if set(joints) & set(skeleton.joint_names))
+    return tuple(name for name, joints in SEGMENT_JOINTS.items() if set(joints) & set(skeleton.joint_names))
 
 
 def limbs_of(skeleton: Skeleton) -> tuple[str, ...]:
     """Arms and legs of a skeleton."""
-    return tuple(name for name in members_of(skeleton) if name != "torso")
+    return tuple(name for name in segments_of(skeleton) if name != "torso")
 
 
 def dofs_of(skeleton: Skeleton, member: str) -> NDArray[np.int64]:
     """Indices of a member's DOF that are sought in silhouettes."""
-    return np.flatnonzero([dof.joint in JOINTS[member] and dof.name not in GIVEN for dof in skeleton.dofs])
+    return np.flatnonzero([dof.joint in SEGMENT_JOINTS[member] and dof.name not in UNOBSERVED_DOFS for dof in skeleton.dofs])
 
 
 def parts_of(body: Body, member: str) -> list[str]:
     """Names of the parts that lie wholly on a member."""
-    joints = [i for i, name in enumerate(body.skeleton.joint_names) if name in JOINTS[member]]
+    joints = [i for i, name in enumerate(body.skeleton.joint_names) if name in SEGMENT_JOINTS[member]]
     inside = np.flatnonzero(np.isin(body.shapes.joints, joints).all(1))
     return list(dict.fromkeys(body.parts[shape] for shape in inside))
 
@@ -56,16 +56,16 @@ def coarse_limbs(skeleton: Skeleton, limb: str) -> Array:
     return _coarse(tuple(skeleton.dofs[d] for d in dofs_of(skeleton, limb)))
 
 
-def steady(skeleton: Skeleton, before: Array, poses: Array, limbs: Iterable[str]) -> Array:
+def keep_limb_directions(skeleton: Skeleton, before: Array, poses: Array, limbs: Iterable[str]) -> Array:
     """Poses (N, D) with some limbs turned in their first joint so that they point as in the pose `before` (D,), as far as limits allow."""
     poses, (low, high) = poses.copy(), skeleton.limits
     for limb in limbs:
-        joint = skeleton.joint_index(JOINTS[limb][0])
+        joint = skeleton.joint_index(SEGMENT_JOINTS[limb][0])
         parent, dofs = skeleton.tree[0][joint], dofs_of(skeleton, limb)[:3]
         above, T = np.arange(parent + 1), np.empty((len(poses), len(skeleton.joints), 3, 4))
         skeleton.forward_some(poses, above, T, np.eye(4))
         own = skeleton.forward(before[None])[0, joint, :, :3]
-        turned = angles_of(np.swapaxes(T[:, parent, :, :3], 1, 2) @ own, [skeleton.dofs[d] for d in dofs])
+        turned = rotation_angles(np.swapaxes(T[:, parent, :, :3], 1, 2) @ own, [skeleton.dofs[d] for d in dofs])
         poses[:, dofs] = np.clip(turned, low[dofs], high[dofs])
     return poses
 
@@ -93,7 +93,7 @@ def _coarse(dofs: tuple[Dof, ...]) -> Array:
     library = _coarse_legs() if "hip" in dofs[0].joint else coarse_arms()
     out, side = np.zeros((len(library), len(dofs))), 1 if dofs[0].joint.startswith("left") else -1
     x, y, z = (rotation_about(axis, sign * column) for axis, sign, column in zip(np.eye(3), (side, -1, side), library.T))
-    out[:, :3], out[:, 3] = angles_of(x @ y @ z, dofs[:3]), library[:, 3]
+    out[:, :3], out[:, 3] = rotation_angles(x @ y @ z, dofs[:3]), library[:, 3]
     out = np.clip(out, [dof.low for dof in dofs], [dof.high for dof in dofs])
     out.setflags(write=False)
     return out

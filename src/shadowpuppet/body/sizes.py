@@ -27,7 +27,7 @@ def expected_metres(value: object, limits: tuple[float, float]) -> str:
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
-LEAST, MOST = 0.005, 2.0
+MIN_SIZE, MAX_SIZE = 0.005, 2.0
 """What a size can be, metres; offsets can be less."""
 
 
@@ -38,9 +38,9 @@ class Sizes:
     def __post_init__(self) -> None:
         """Check every size."""
         for field in fields(self):
-            value, least = getattr(self, field.name), -0.2 if field.name in self.offsets() else LEAST
-            if not least <= value <= MOST:
-                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to {MOST} metres")
+            value, least = getattr(self, field.name), -0.2 if field.name in self.offsets() else MIN_SIZE
+            if not least <= value <= MAX_SIZE:
+                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to {MAX_SIZE} metres")
 
     @classmethod
     def offsets(cls) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     return joints, dofs
 
 
-RISE = 0.012
+SHOULDER_RISE = 0.012
 """How far a shoulder rises, or comes forward, as the arm does, metres a radian: about 2 cm in a level arm, by the clavicle's elevation of
 some 8 degrees (Ludewig et al. 2009)."""
 
@@ -66,8 +66,8 @@ def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleto
         joints += arm_joints
         dofs += arm_dofs
     couplings = [coupling for side in SIDES for coupling in (
-        Coupling(f"{side}_shoulder", f"{side}_shoulder_abduction", (0.0, 0.0, RISE)),
-        Coupling(f"{side}_shoulder", f"{side}_shoulder_forward", (RISE, 0.0, 0.0)),
+        Coupling(f"{side}_shoulder", f"{side}_shoulder_abduction", (0.0, 0.0, SHOULDER_RISE)),
+        Coupling(f"{side}_shoulder", f"{side}_shoulder_forward", (SHOULDER_RISE, 0.0, 0.0)),
     )]
     return Skeleton(tuple(joints), tuple(dofs), tuple(couplings) if clavicles else ())
 

@@ -16,14 +16,14 @@ from shadowpuppet.body.shapes import Body, Hulls, Limbs
 from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CylinderSizes
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 
-ALONG = {
+LIMB_AXES = {
     "up": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
     "down": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
     "forward": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
     "left": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
 }
 """Axes x, y, z of a limb's own frame, as columns, in its joint's: z runs along it; x is forward, or up for a foot."""
-FLAT = 0.02
+FLAT_END = 0.02
 """A flat end is drawn as an ellipsoid of so little height, as a share of its radii."""
 Pair = tuple[float, float]
 
@@ -46,7 +46,7 @@ class _Limb(NamedTuple):
 
 
 def _limbs(skeleton: Skeleton, parts: Sequence[_Limb]) -> Limbs:
-    frames = np.array([ALONG[part.along] for part in parts], float)
+    frames = np.array([LIMB_AXES[part.along] for part in parts], float)
     starts, ends = np.array([[*zip(part.off, part.aside, part.reach)] for part in parts]).swapaxes(0, 1)
     return Limbs(np.array([skeleton.joint_index(part.joint) for part in parts], np.int64), frames, (frames @ starts[:, :, None])[..., 0],
                  (ends - starts)[:, 2], (ends - starts)[:, :2], np.array([part.radii for part in parts], float),
@@ -55,7 +55,7 @@ def _limbs(skeleton: Skeleton, parts: Sequence[_Limb]) -> Limbs:
 
 def _drawn(limbs: Limbs) -> Hulls:
     """Limbs as hulls of two ellipsoids, one at either end."""
-    flat = FLAT * limbs.radii.mean(2)
+    flat = FLAT_END * limbs.radii.mean(2)
     radii = np.concatenate([limbs.radii, np.maximum(limbs.caps, flat)[..., None]], 2)
     in_joint = (np.abs(limbs.rotations)[:, None] @ radii[..., None])[..., 0]
     return Hulls(np.stack([limbs.joints, limbs.joints], 1), np.stack([limbs.starts, limbs.ends], 1), in_joint)
@@ -165,7 +165,7 @@ SIDES = ("left", "right")
 Bounds = tuple[float, float]
 Three = tuple[float, float, float]
 FREE = (-np.inf, np.inf)
-GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
+GLOBAL_DOFS = ("root_x", "root_y", "root_z", "root_heading")
 """Degrees of freedom that say where a person is and whither they look, which no prior of articulation models."""
 SWING = {"left": ("-y", "x", "z"), "right": ("-y", "-x", "-z")}
 """Axes about which a hanging limb swings forward, swings outward, and twists outward."""

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 
-ABSURD = 1e6
+MAX_DISTORTION = 1e6
 """A coefficient of distortion that no lens has."""
-STEPS = 1000
+REACH_STEPS = 1000
 """Angles off the optical axis at which a lens is tried."""
 
 
@@ -50,7 +50,7 @@ class Camera:
         distortion = numbers("distortions", self.distortion)
         allowed = (4,) if self.fisheye else (0, 4, 5, 8)
         check(distortion.size in allowed, "distortions", f"{distortion.size} numbers", " or ".join(map(str, allowed)))
-        check(bool((np.abs(distortion) < ABSURD).all()), "distortions", distortion.tolist(), f"numbers under {ABSURD:g}")
+        check(bool((np.abs(distortion) < MAX_DISTORTION).all()), "distortions", distortion.tolist(), f"numbers under {MAX_DISTORTION:g}")
         distortion = distortion if self.fisheye else np.pad(distortion, (0, 8 - distortion.size))
         T = numbers("rotation and translation", self.T_camera_world, (4, 4))
         R = T[:3, :3]
@@ -124,8 +124,8 @@ class Camera:
         """Radius on the plane z = 1 up to which the lens's formula leads outward; infinite where it does so everywhere."""
         if not (self.fisheye or self.distortion.any()):
             return np.inf
-        radii = np.tan(np.arange(STEPS) * np.pi / 2 / STEPS)
-        outward = np.diff(self._bent(np.stack([radii, np.zeros(STEPS)], 1))[:, 0]) > 0
+        radii = np.tan(np.arange(REACH_STEPS) * np.pi / 2 / REACH_STEPS)
+        outward = np.diff(self._bent(np.stack([radii, np.zeros(REACH_STEPS)], 1))[:, 0]) > 0
         return np.inf if outward.all() else float(radii[max(int(np.argmin(outward)), 1)])
 
     def rays(self, pixels: ArrayLike) -> Array:

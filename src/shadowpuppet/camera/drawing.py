@@ -18,8 +18,8 @@ if TYPE_CHECKING:  # both bring much with them
 # Colours (blue, green, red) that people who see colours differently tell apart: Okabe & Ito 2008.
 BLACK, GREY, WHITE = (0, 0, 0), (96, 96, 96), (255, 255, 255)
 MODEL_ONLY, SILHOUETTE_ONLY = (0, 159, 230), (233, 180, 86)
-SIDES = {"left": (115, 158, 0), "right": (167, 121, 204)}
-MIDDLE = (66, 228, 240)
+SIDE_COLOURS = {"left": (115, 158, 0), "right": (167, 121, 204)}
+MIDDLE_COLOUR = (66, 228, 240)
 """The colour of what is neither left nor right."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row by model + 2 silhouette + 4 ignored."""
@@ -111,7 +111,7 @@ def _darkened(image: Image) -> Image:
 
 
 def _side(name: str) -> tuple[int, int, int]:
-    return SIDES.get(name.split("_")[0], MIDDLE)
+    return SIDE_COLOURS.get(name.split("_")[0], MIDDLE_COLOUR)
 
 
 class _Piece(NamedTuple):

@@ -6,11 +6,11 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import kernel, part
+from shadowpuppet.jit import device, kernel
 
 DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
 """Directions in which a hull's outline is taken: the corners of its polygon."""
-NEAR = 0.05
+NEAR_PLANE = 0.05
 """What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
 Lens = tuple[Array, Array, bool, bool, float]
 """Matrix (3, 3); distortion (8,) or (4,); whether it is a fisheye's; whether it bends; the radius on the plane z = 1 to which it holds."""
@@ -40,8 +40,8 @@ def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # 
             x, y, z, u, w = work[3 * v], work[3 * v + 1], work[3 * v + 2], along[v], down[v]
             _move(joint, quads[:, q, v], begin, work[3 * v : 3 * v + 3])
             for n in range(size):
-                behind += z[n] < NEAR
-                ahead = 1 / max(z[n], NEAR)
+                behind += z[n] < NEAR_PLANE
+                ahead = 1 / max(z[n], NEAR_PLANE)
                 u[n], w[n] = x[n] * ahead, y[n] * ahead
         u, w, x, y = along[3], down[3], along[4], down[4]
         for n in range(size):
@@ -52,7 +52,7 @@ def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # 
         _to_pixels(X[i], Y[i], lens)
 
 
-@part
+@device
 def _move(T, points, begin, place):  # pragma: no cover
     """Where transforms (3, 4, B) take one point (1, 3), or the points of the people from `begin` on (N, 3), the last again where they end;
     into `place` (3, B)."""
@@ -88,15 +88,15 @@ def project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, 
         _to_pixels(X[i], Y[i], lens)
 
 
-@part
+@device
 def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no cover
     """The ellipse (5, B), centre and matrix (xx, xy, yy), that ellipsoids with centres and radii (1 or N, 3) look like. `room`: (4, B)."""
     x, y, z = room[0], room[1], room[2]
     _move(T, centres, begin, room[0:3])
     cx, cy, xx, xy, yy, near = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4], room[3]
     for n in range(x.size):
-        counts[n] = DIRECTIONS.shape[0] if z[n] > NEAR else counts[n]
-        near[n] = 1 / max(z[n], NEAR)
+        counts[n] = DIRECTIONS.shape[0] if z[n] > NEAR_PLANE else counts[n]
+        near[n] = 1 / max(z[n], NEAR_PLANE)
         cx[n], cy[n] = x[n] * near[n], y[n] * near[n]
         xx[n], xy[n], yy[n] = 0.0, 0.0, 0.0
     for a in range(3):
@@ -113,7 +113,7 @@ def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no c
             yy[n] += v * v
 
 
-@part
+@device
 def _reach_to(u, v, number, ellipses, x, y, other_x, other_y):  # pragma: no cover
     """The farthest points x, y (B,) of the first ellipses in the direction (u, v), and those in the opposite one."""
     for e in range(number):
@@ -130,27 +130,27 @@ def _reach_to(u, v, number, ellipses, x, y, other_x, other_y):  # pragma: no cov
             x[n], y[n], other_x[n], other_y[n] = a, b, c, d
 
 
-@part
+@device
 def _clip(points, n, X, Y):  # pragma: no cover
     """Cut quad `n` of points (12, B) at the near plane; x / z and y / z of the up to five corners left into X, Y (5, B); their number."""
     m = 0
     for v in range(4):
         a, b = 3 * v, 3 * ((v + 1) & 3)
         z, after = points[a + 2, n], points[b + 2, n]
-        if z >= NEAR:
+        if z >= NEAR_PLANE:
             X[m, n], Y[m, n] = points[a, n] / z, points[a + 1, n] / z
             m += 1
-        if (z >= NEAR) != (after >= NEAR):
-            s = (NEAR - z) / (after - z)
-            X[m, n] = (points[a, n] + s * (points[b, n] - points[a, n])) / NEAR
-            Y[m, n] = (points[a + 1, n] + s * (points[b + 1, n] - points[a + 1, n])) / NEAR
+        if (z >= NEAR_PLANE) != (after >= NEAR_PLANE):
+            s = (NEAR_PLANE - z) / (after - z)
+            X[m, n] = (points[a, n] + s * (points[b, n] - points[a, n])) / NEAR_PLANE
+            Y[m, n] = (points[a + 1, n] + s * (points[b + 1, n] - points[a + 1, n])) / NEAR_PLANE
             m += 1
     for v in range(m, 5):
         X[v, n], Y[v, n] = (X[m - 1, n], Y[m - 1, n]) if m else (0.0, 0.0)
     return m
 
 
-@part
+@device
 def _to_pixels(X, Y, lens):  # pragma: no cover
     """Points (K, B) on the plane z = 1 to pixels, in place."""
     K, k, fisheye, bends, reach = lens
@@ -163,7 +163,7 @@ def _to_pixels(X, Y, lens):  # pragma: no cover
             x[n], y[n] = K[0, 0] * x[n] + K[0, 2], K[1, 1] * y[n] + K[1, 2]
 
 
-@part
+@device
 def bend_within(x, y, k, fisheye, reach):  # pragma: no cover
     """Distortion of a point on the plane z = 1. Edges between bent corners stay straight: a card is small beside the lens's bend."""
     beyond = max(np.sqrt(x * x + y * y) / reach, 1.0)
@@ -171,7 +171,7 @@ def bend_within(x, y, k, fisheye, reach):  # pragma: no cover
     return x * beyond, y * beyond
 
 
-@part
+@device
 def _bend(x, y, k, fisheye):  # pragma: no cover
     """OpenCV's formulas."""
     if fisheye:

@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.body.forward_kinematics import load_joints, place_joints
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE, Lens, make_lens, project_hulls, project_quads
 from shadowpuppet.camera.scanline import count_and_clear, draw_outline, find_edges, make_page
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
-from shadowpuppet.jit import BLOCK, kernel, part
+from shadowpuppet.jit import BLOCK, device, kernel
 
 Bits = NDArray[np.uint64]
 Shapes = tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]
@@ -49,7 +49,7 @@ def count(bits: Bits) -> int:
     return int(np.bitwise_count(bits).sum())
 
 
-IN_USE = Lock()
+BUFFER_LOCK = Lock()
 """Held while a kernel draws: pictures keep room for it, and may be used by several threads."""
 
 
@@ -144,7 +144,7 @@ class Picture:
             return self.empty()
         T = self.transforms(np.asarray(pose, float)[None])[0, self.body.skeleton.joint_index("pelvis")]
         low = self.body.hem @ T[:, :3].T + T[:, 3]
-        if low[:, 2].min() < NEAR:
+        if low[:, 2].min() < NEAR_PLANE:
             return self.empty()
         pixels = self.camera.project(transform(inverse(self.camera.T_camera_world), low))
         left, right, top = pixels[:, 0].min(), pixels[:, 0].max(), np.median(pixels[:, 1])
@@ -176,7 +176,7 @@ class Picture:
         joints = self._every if joints is None else joints
         block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses), np.int64)
-        with IN_USE:
+        with BUFFER_LOCK:
             _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
                      (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
         return out
@@ -232,7 +232,7 @@ def polygon_bits(corners: ArrayLike, size: tuple[int, int]) -> Bits:
 # Kernels
 
 
-@part
+@device
 def _project(begin, shapes, which, lens, block):  # pragma: no cover
     """Corners of a block's shapes from its joints."""
     quads, centres, radii, numbers, joints = shapes

@@ -13,7 +13,7 @@ from numba.core import config, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from shadowpuppet.jit import joined, kernel, part
+from shadowpuppet.jit import device, inline_kernel, kernel
 
 ROWS = 8
 """Rows of a strip."""
@@ -65,7 +65,7 @@ def find_edges(X, Y, counts, width, height, boxes, lines):  # pragma: no cover
                     line[2, n] = 0.0
 
 
-@part
+@device
 def _follow(x, y, to_x, to_y, base, area, start, slope, side):  # pragma: no cover
     """The lines (B,) of edges from one corner to the next: x in row `base`, x gained a row, and on which side they bound."""
     for n in range(x.size):
@@ -75,7 +75,7 @@ def _follow(x, y, to_x, to_y, base, area, start, slope, side):  # pragma: no cov
         start[n] = x[n] + (base[n] - y[n]) * slope[n] - SNAP
 
 
-@part
+@device
 def _enclose(x, y, count, box, area):  # pragma: no cover
     """Least and greatest y and x of the first `count` corners x, y (K, B) into box (4, B), and twice the area (B,), signed."""
     top, bottom, west, east = box[0], box[1], box[2], box[3]
@@ -90,7 +90,7 @@ def _enclose(x, y, count, box, area):  # pragma: no cover
             west[n], east[n] = min(west[n], a[n]), max(east[n], a[n])
 
 
-@part
+@device
 def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma: no cover
     """First pixel and end of each row's span between three lines on the left and three on the right, (3, 2) each: x, x gained a row.
 
@@ -110,7 +110,7 @@ def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma:
         end[r] = min(end[r], j) if again else j
 
 
-@part
+@device
 def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
     """The lines (K, 3, B) of polygon `n` that bound it on the left and on the right, (K + 3, 2) each; how many on the richer side.
 
@@ -130,7 +130,7 @@ def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
     return most
 
 
-@joined
+@inline_kernel
 def draw_outline(s, n, boxes, lines, width, page):  # pragma: no cover
     """Set the bits of polygon `n` of shape `s` on a page; the page's dirty strips and words grow to hold it.
 
@@ -159,7 +159,7 @@ def draw_outline(s, n, boxes, lines, width, page):  # pragma: no cover
     dirty[2], dirty[3] = min(dirty[2], c0), max(dirty[3], c1)
 
 
-@joined
+@inline_kernel
 def count_and_clear(outside, inside, page):  # pragma: no cover
     """Bits of a page that are set in `outside`, less those set in `inside`, (C, rows) each; the page is empty then."""
     bits, dirty = page[0], page[1]
@@ -174,7 +174,7 @@ def count_and_clear(outside, inside, page):  # pragma: no cover
     return total
 
 
-@part
+@device
 def clean(page):  # pragma: no cover
     """Say that a page is empty."""
     bits, dirty = page[0], page[1]

@@ -15,7 +15,7 @@ from shadowpuppet.motion.motion import JointTable
 
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 """From our world (Z up) to that of files with Y up: (x, z, -y), which Blender and OpenSim undo. Who looks along X does so there, too."""
-STILL = 1e-9
+SAME_PLACE = 1e-9
 """Metres within which a place does not move."""
 
 
@@ -63,7 +63,7 @@ class Animation:
     def moving(self) -> tuple[int, ...]:
         """Joints but the root whose place against the parent changes."""
         strays = np.abs(self.shifts[self.known] - self.offsets).max((0, 2), initial=0.0)
-        return tuple(j for j in range(1, len(self.names)) if strays[j] > STILL)
+        return tuple(j for j in range(1, len(self.names)) if strays[j] > SAME_PLACE)
 
     def world(self) -> tuple[Array, Array]:
         """Places (T, J, 3), metres, and rotations (T, J, 3, 3) of the joints in the world."""

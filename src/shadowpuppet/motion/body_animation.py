@@ -16,18 +16,18 @@ from shadowpuppet.motion.motion import Motion
 
 TO_REST = np.array([[0.0, 1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From a body's axes (forward, left, up) to those of skeletons at rest (left, up, forward)."""
-NEAR = 1e-9
+SAME_POINT = 1e-9
 """Metres within which two places are one."""
-SAME = 1e-4
+JOINT_TOLERANCE = 1e-4
 """Metres by which a run's joints may stray from its body's for these to be the same."""
-SHORTEST = 0.01
+MIN_END = 0.01
 """Metres; of a bone's end."""
 Three = tuple[float, float, float]
 Known = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Node:
+class TreeNode:
     """A joint of the body, or a landmark fixed to one."""
 
     name: str
@@ -46,15 +46,15 @@ class BodyTree:
     body: Body
 
     @cached_property
-    def nodes(self) -> tuple[Node, ...]:
+    def nodes(self) -> tuple[TreeNode, ...]:
         """Parents before children; a joint where a landmark lies has the landmark's name."""
         skeleton, names = self.body.skeleton, self._names
-        nodes = list[Node]()
+        nodes = list[TreeNode]()
         for j, joint in enumerate(skeleton.joints):
             above = -1 if joint.parent is None else self._joint_node(nodes, skeleton.joint_index(joint.parent))
-            nodes.append(Node(names[j], above, j, None))
+            nodes.append(TreeNode(names[j], above, j, None))
         for name, (joint, place) in self._fixed:
-            nodes.append(Node(name, self._above(nodes, joint, place), joint, place))
+            nodes.append(TreeNode(name, self._above(nodes, joint, place), joint, place))
         return tuple(nodes)
 
     def node_of(self, joint: int) -> int:
@@ -88,7 +88,7 @@ class BodyTree:
         frames = self.body.skeleton.forward(none)
         return np.array([np.zeros(3) if node.parent < 0 else self._against(frames, node)[1][0] for node in self.nodes])
 
-    def _against(self, frames: Array, node: Node) -> tuple[Array, Array]:
+    def _against(self, frames: Array, node: TreeNode) -> tuple[Array, Array]:
         """Rotations (T, 3, 3) and places (T, 3) of a node against the one above it, rest axes, from the joints' frames (T, J, 3, 4)."""
         if node.parent < 0:
             return frames[:, node.joint, :, :3], frames[:, node.joint, :, 3]
@@ -123,17 +123,17 @@ class BodyTree:
 
     def _joint_at(self, joint: int, place: Three) -> int | None:
         """The joint that lies at a place in a joint's frame, if any does in every pose."""
-        if np.linalg.norm(place) < NEAR:
+        if np.linalg.norm(place) < SAME_POINT:
             return joint
         skeleton = self.body.skeleton
         moved = {coupling.joint for coupling in skeleton.couplings} | {dof.joint for dof in skeleton.dofs if dof.kind == "translation"}
         for j, other in enumerate(skeleton.joints):
-            near = np.abs(np.subtract(other.offset, place)).max() < NEAR
+            near = np.abs(np.subtract(other.offset, place)).max() < SAME_POINT
             if near and other.parent == skeleton.joints[joint].name and other.name not in moved:
                 return j
         return None
 
-    def _above(self, nodes: list[Node], joint: int, place: Three) -> int:
+    def _above(self, nodes: list[TreeNode], joint: int, place: Three) -> int:
         """The node on which a landmark hangs: the last landmark on the way to it from its joint, or that joint."""
         length = float(np.linalg.norm(place))
         for n in range(len(nodes) - 1, -1, -1):
@@ -143,10 +143,10 @@ class BodyTree:
         return self._joint_node(nodes, joint)
 
     @staticmethod
-    def _joint_node(nodes: list[Node] | tuple[Node, ...], joint: int) -> int:
+    def _joint_node(nodes: list[TreeNode] | tuple[TreeNode, ...], joint: int) -> int:
         return next(n for n, node in enumerate(nodes) if node.joint == joint and node.place is None)
 
-    def _end(self, leaf: Node) -> Three:
+    def _end(self, leaf: TreeNode) -> Three:
         """How far the body's shapes reach beyond a leaf, along its bone; from a joint, toward the farthest of them."""
         start = np.zeros(3) if leaf.place is None else np.array(leaf.place)
         shapes = self.body.shapes
@@ -155,12 +155,12 @@ class BodyTree:
         radii = np.zeros_like(centres) if isinstance(shapes, Quads) else shapes.radii
         own = joints == leaf.joint
         if not own.any():
-            return (0.0, 0.0, -SHORTEST)
+            return (0.0, 0.0, -MIN_END)
         centres, radii = centres[own], radii[own]
         toward = start if leaf.place is not None else centres[np.linalg.norm(centres, axis=1).argmax()]
-        along = toward / max(float(np.linalg.norm(toward)), NEAR)
+        along = toward / max(float(np.linalg.norm(toward)), SAME_POINT)
         reach = (centres @ along + np.sqrt(((radii * along) ** 2).sum(1))).max() - start @ along
-        x, y, z = (max(float(reach), SHORTEST) * along).tolist()
+        x, y, z = (max(float(reach), MIN_END) * along).tolist()
         return (x, y, z)
 
 
@@ -189,7 +189,7 @@ def base_in_world(body: Body, motion: Motion) -> tuple[Array, float]:
     ours = body.points(motion.poses[known], names=names)
     root = fitted(ours.reshape(-1, 3), wanted.reshape(-1, 3))
     off = _off(root, ours, wanted)
-    if off > SAME:
+    if off > JOINT_TOLERANCE:
         some = np.stack([fitted(a, b) for a, b in zip(ours, wanted)])
         off, root = _off(some, ours, wanted), np.tile(np.eye(4), (len(motion), 1, 1))
         root[known] = some

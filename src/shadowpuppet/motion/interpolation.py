@@ -11,15 +11,15 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 
-NEAR = 0.2
+FRAME_TOLERANCE = 0.2
 """Share of a step by which a frame may lie off its place: films' times are rounded to milliseconds, cameras' tremble."""
-MOST = 10_000_000
+MAX_FRAMES = 10_000_000
 """Frames; so many make no motion."""
-ALONE = 30.0
+SINGLE_FRAME_RATE = 30.0
 """Frames/s of one frame."""
 
 
-class Steady(NamedTuple):
+class UniformSampling(NamedTuple):
     """Times that are a step apart, and the frames that belong to them."""
 
     rate: float
@@ -30,7 +30,7 @@ class Steady(NamedTuple):
     """The frame of each time (K,), -1 where there is none; None: frames lie between, and values must be found anew."""
 
 
-def steady(times: ArrayLike) -> Steady:
+def uniform_sampling(times: ArrayLike) -> UniformSampling:
     """Times a step apart that go through frames at times (T,), seconds: those of a film with frames missing, or of their median step.
 
     Raises `ShadowPuppetError` where there is no frame, or far too many would be missing.
@@ -39,19 +39,19 @@ def steady(times: ArrayLike) -> Steady:
     if len(times) < 2:
         if not len(times):
             raise ShadowPuppetError("found no frame, expected one at least")
-        return Steady(ALONE, times, np.zeros(1, np.int64))
+        return UniformSampling(SINGLE_FRAME_RATE, times, np.zeros(1, np.int64))
     steps = np.diff(times)
     step = float(np.median(steps))
-    if (times[-1] - times[0]) / step > MOST:
-        raise ShadowPuppetError(f"times: found {times[-1] - times[0]:g} s in steps of {step:g} s, expected at most {MOST} of them")
+    if (times[-1] - times[0]) / step > MAX_FRAMES:
+        raise ShadowPuppetError(f"times: found {times[-1] - times[0]:g} s in steps of {step:g} s, expected at most {MAX_FRAMES} of them")
     numbers = np.concatenate([[0], np.cumsum(np.round(steps / step))])
     slope, start = np.polyfit(numbers, times, 1) if numbers[-1] > 0 else (step, times[0])
-    if (np.diff(numbers) > 0).all() and (np.abs(start + slope * numbers - times) <= NEAR * slope).all():
+    if (np.diff(numbers) > 0).all() and (np.abs(start + slope * numbers - times) <= FRAME_TOLERANCE * slope).all():
         frames = np.full(int(numbers[-1]) + 1, -1)
         frames[numbers.astype(int)] = np.arange(len(times))
-        return Steady(_rounded(1 / slope), times[0] + slope * np.arange(len(frames)), frames)
-    count = int((times[-1] - times[0]) / step + 1 + NEAR)
-    return Steady(_rounded(1 / step), np.minimum(times[0] + step * np.arange(count), times[-1]), None)
+        return UniformSampling(_rounded(1 / slope), times[0] + slope * np.arange(len(frames)), frames)
+    count = int((times[-1] - times[0]) / step + 1 + FRAME_TOLERANCE)
+    return UniformSampling(_rounded(1 / step), np.minimum(times[0] + step * np.arange(count), times[-1]), None)
 
 
 def _rounded(rate: float) -> float:
@@ -59,11 +59,11 @@ def _rounded(rate: float) -> float:
     return float(f"{rate:.6g}")
 
 
-FIT = 1e-6
+END_TOLERANCE = 1e-6
 """Share of a step by which the last new time may lie past the end, for rounding's sake."""
 
 
-def resampled(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
+def resample(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
     """Times (K,), a step of 1 / rate apart from the first on, and the values (K, ...) there of values (T, ...) at times (T,), seconds.
 
     By cubic splines through what is known; not a number where either neighbour in time is none. Angles must have been unwrapped.
@@ -74,15 +74,15 @@ def resampled(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, 
         raise ShadowPuppetError(f"times: found {times.shape} for values {values.shape}, expected a finite, increasing one for each value")
     if not 0 < rate < np.inf:
         raise ShadowPuppetError(f"rate: found {rate}, expected frames a second, more than zero")
-    steps = np.arange(int((times[-1] - times[0]) * rate + 1 + FIT))
+    steps = np.arange(int((times[-1] - times[0]) * rate + 1 + END_TOLERANCE))
     wanted = np.minimum(times[0] + steps / rate, times[-1])
     columns = [_interpolated(times, column, wanted) for column in values.reshape(len(times), -1).T]
     return wanted, np.reshape(np.transpose(columns), (len(wanted), *values.shape[1:]))
 
 
-def resampled_table(table: JointTable, rate: float) -> JointTable:
+def resample_table(table: JointTable, rate: float) -> JointTable:
     """Joints at another frame rate; see `resampled`."""
-    times, positions = resampled(table.times, table.positions, rate)
+    times, positions = resample(table.times, table.positions, rate)
     return JointTable(times, table.names, positions)
 
 

@@ -17,25 +17,25 @@ from numpy.typing import NDArray
 from shadowpuppet.body.anthropometry import shares_of, stature_of, whole_sizes_from_bones
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import LEAST, WHOLE, BoneSizes, sizes_kind
+from shadowpuppet.body.sizes import MIN_SIZE, WHOLE, BoneSizes, sizes_kind
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.ik_initial_guess import guess
+from shadowpuppet.motion.ik_initial_guess import initial_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.plausibility import SIDES, check_person, of
+from shadowpuppet.motion.plausibility import SIDES, check_person, positions_of
 
-REACH = 0.1
+OUTLIER = 0.1
 """A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""
-SMOOTH, TRUNK, REST, TWIST, CHEST, NOD = 3e-4, 1e-2, 1e-6, 1e-5, 1e-4, 1e-2
+SMOOTH_PULL, TRUNK_SMOOTH_PULL, REST_PULL, TWIST_PULL, CHEST_PULL, HEAD_TURN_PULL = 3e-4, 1e-2, 1e-6, 1e-5, 1e-4, 1e-2
 """Pulls (m^2 / rad^2, beside the squared distances of joints, m^2): of an angle to the next frame's, of the trunk's, which carry so much
 that it cannot turn suddenly; to its rest, of a limb's turn about itself to none, of the chest, of the head's turn."""
-KNOWN = 0.0015
+PROPORTION_TOLERANCE = 0.0015
 """Joints may stray by so much (m) before the proportions of the average person are to be doubted."""
-HAND = 0.02
+HAND_WEIGHT = 0.02
 """Weight of the base of the fingers beside other joints."""
-RATE = 60.0
+SMOOTHING_RATE = 60.0
 """The frame rate (frames/s) at which neighbours pull as said; less at a lower one, so that quick motion is slowed alike at any."""
-STEP, CHUNK = 1e-6, 500
+DIFFERENCE_STEP, CHUNK_FRAMES = 1e-6, 500
 """Step of finite differences; frames that are differentiated at once."""
 
 
@@ -90,11 +90,11 @@ def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | N
     if body not in WHOLE:
         raise ShadowPuppetError(f"body {body!r}: found a body without legs or none, expected one of {choices(WHOLE)}")
     check_person(joints, source)
-    someone = sizes or whole_sizes_from_bones(sizes_kind(body), _bones(joints))  # pyright: ignore[reportArgumentType]
+    someone = sizes or whole_sizes_from_bones(sizes_kind(body), _bone_lengths(joints))  # pyright: ignore[reportArgumentType]
     start = make_body(body, someone)
     table = joints.select([name for name in start.landmark_names if name in joints.names])
-    problem = _Problem(body, table, someone, _shown(start, someone, table.names) if sizes is None else ())
-    return problem.told(*problem.solve(guess(start, table), someone.to_array()))
+    problem = _Problem(body, table, someone, _observable_sizes(start, someone, table.names) if sizes is None else ())
+    return problem.told(*problem.solve(initial_poses(start, table), someone.to_array()))
 
 
 class _Linear(NamedTuple):
@@ -115,15 +115,15 @@ class _Problem:
         self.free = np.array([self.kind.names().index(name) for name in free], np.int64)
         self.known: NDArray[np.bool_] = np.asarray(np.isfinite(table.positions).all(2))
         self.wanted = np.where(self.known[..., None], table.positions, 0.0)
-        self.weight = np.array([HAND if name.endswith("_hand") else 1.0 for name in table.names])
+        self.weight = np.array([HAND_WEIGHT if name.endswith("_hand") else 1.0 for name in table.names])
         dofs = make_body(body, sizes).skeleton.dofs
         self.rest = np.array([dof.rest for dof in dofs])
         self.pull = np.array([_pull(dof.name, dof.kind) for dof in dofs])
         steps, slow = np.diff(table.times), [dof.name.startswith(("chest", "root_bow", "root_tilt")) for dof in dofs]
-        self.smooth = np.outer(1 / (RATE * steps) ** 2, np.where(slow, TRUNK, SMOOTH))
+        self.smooth = np.outer(1 / (SMOOTHING_RATE * steps) ** 2, np.where(slow, TRUNK_SMOOTH_PULL, SMOOTH_PULL))
         self.mean, deviation = sizes.to_array()[self.free], np.array([shares_of(self.kind)[name][1] for name in free])
         stature = stature_of(dict(zip(sizes.names(), sizes.to_array())))
-        self.hold = len(table.times) * (KNOWN / (deviation * stature)) ** 2 if len(free) else np.zeros(0)
+        self.hold = len(table.times) * (PROPORTION_TOLERANCE / (deviation * stature)) ** 2 if len(free) else np.zeros(0)
 
     def body(self, values: Array) -> Body:
         """The body of sizes (all of them)."""
@@ -132,7 +132,7 @@ class _Problem:
     def cost(self, poses: Array, values: Array) -> float:
         """What poses (T, D) and sizes cost, m^2."""
         squared = ((self._places(self.body(values), poses) - self.wanted) ** 2).sum(2)
-        joints = (self.weight * squared / (1 + squared / REACH**2))[self.known].sum()
+        joints = (self.weight * squared / (1 + squared / OUTLIER**2))[self.known].sum()
         smooth = (self.smooth * np.diff(poses, axis=0) ** 2).sum()
         sizes = (self.hold * (values[self.free] - self.mean) ** 2).sum()
         return float(joints + smooth + sizes + (self.pull * (poses - self.rest) ** 2).sum())
@@ -140,11 +140,11 @@ class _Problem:
     def solve(self, poses: Array, values: Array, rounds: int = 40) -> tuple[Array, Array]:
         """Poses (T, D) and sizes of least cost near those given."""
         low, high = self.body(values).skeleton.limits
-        least = np.where(np.isin(self.kind.names(), self.kind.offsets()), -0.2, LEAST)
+        least = np.where(np.isin(self.kind.names(), self.kind.offsets()), -0.2, MIN_SIZE)
         damping, best = 1e-4, self.cost(poses, values)
         equations = self._equations(poses, values)
         for _ in range(rounds):
-            step, change = _solved(equations, self.smooth, damping, _held(poses, equations.g, low, high))
+            step, change = _solve_step(equations, self.smooth, damping, _at_limits(poses, equations.g, low, high))
             new_poses, new_values = np.clip(poses + step, low, high), values.copy()
             new_values[self.free] += change
             new_values = np.clip(new_values, least, 1.9)
@@ -176,14 +176,14 @@ class _Problem:
         T, D, S = *poses.shape, len(self.free)
         A, B, C = np.zeros((T, D, D)), np.zeros((T, D, S)), np.diag(self.hold)
         g, h = np.zeros((T, D)), self.hold * (self.mean - values[self.free])
-        body, others = self.body(values), [self.body(values + STEP * (np.arange(len(values)) == k)) for k in self.free]
-        for begin in range(0, T, CHUNK):
-            rows = slice(begin, begin + CHUNK)
+        body, others = self.body(values), [self.body(values + DIFFERENCE_STEP * (np.arange(len(values)) == k)) for k in self.free]
+        for begin in range(0, T, CHUNK_FRAMES):
+            rows = slice(begin, begin + CHUNK_FRAMES)
             at = self._places(body, poses[rows])
             J = self._slopes(body, poses[rows], at)
-            K = np.stack([(self._places(other, poses[rows]) - at) / STEP for other in others], -1) if S else np.zeros((*at.shape, 0))
+            K = np.stack([(self._places(other, poses[rows]) - at) / DIFFERENCE_STEP for other in others], -1) if S else np.zeros((*at.shape, 0))
             r = (self.wanted[rows] - at) * self.known[rows, :, None]
-            w = self.weight * self.known[rows] / (1 + (r**2).sum(2) / REACH**2) ** 2
+            w = self.weight * self.known[rows] / (1 + (r**2).sum(2) / OUTLIER**2) ** 2
             J, K, r = (each.reshape(len(at), 3 * at.shape[1], each.shape[-1]) for each in (J, K, r[..., None]))
             weighted = np.swapaxes(J * np.repeat(w, 3, axis=1)[..., None], 1, 2)
             A[rows], B[rows], g[rows] = weighted @ J, weighted @ K, (weighted @ r)[..., 0]
@@ -199,8 +199,8 @@ class _Problem:
     def _slopes(self, body: Body, poses: Array, at: Array) -> Array:
         """Derivatives (T, J, 3, D) of the joints' places `at` (T, J, 3)."""
         T, D = poses.shape
-        moved = (poses[:, None] + STEP * np.eye(D)).reshape(T * D, D)
-        return np.moveaxis(self._places(body, moved).reshape(T, D, -1, 3) - at[:, None], 1, -1) / STEP
+        moved = (poses[:, None] + DIFFERENCE_STEP * np.eye(D)).reshape(T * D, D)
+        return np.moveaxis(self._places(body, moved).reshape(T, D, -1, 3) - at[:, None], 1, -1) / DIFFERENCE_STEP
 
 
 def _pull(name: str, kind: str) -> float:
@@ -208,18 +208,18 @@ def _pull(name: str, kind: str) -> float:
     if kind == "translation" or name == "root_heading":
         return 0.0
     if name.startswith("head") and name.endswith(("_z", "_twist")):
-        return NOD
+        return HEAD_TURN_PULL
     if name.startswith("chest"):
-        return CHEST
-    return TWIST if name.endswith(("shoulder_z", "hip_z", "_twist")) else REST
+        return CHEST_PULL
+    return TWIST_PULL if name.endswith(("shoulder_z", "hip_z", "_twist")) else REST_PULL
 
 
-def _held(poses: Array, downhill: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+def _at_limits(poses: Array, downhill: Array, low: Array, high: Array) -> NDArray[np.bool_]:
     """DOF (T, D) that stand at a limit and would go beyond it."""
     return ((poses <= low) & (downhill < 0)) | ((poses >= high) & (downhill > 0))
 
 
-def _solved(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _solve_step(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.bool_]) -> tuple[Array, Array]:
     """The step of poses (T, D) and sizes (S,): the band is solved for the poses, then what is left for the sizes (Schur complement)."""
     (T, D), S, free = equations.g.shape, len(equations.h), ~held
     A = equations.A * free[:, :, None] * free[:, None, :]
@@ -228,7 +228,7 @@ def _solved(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.
     chain[1:] += smooth
     A[:, np.arange(D), np.arange(D)] += np.where(held, 1.0, damping + chain)
     right = np.concatenate([equations.g[..., None], equations.B], 2) * free[..., None]
-    solved = _along(A, smooth * (free[1:] & free[:-1]), right)
+    solved = _solve_chain(A, smooth * (free[1:] & free[:-1]), right)
     margin = (equations.B * free[..., None]).reshape(T * D, S)
     steps = solved.reshape(T * D, 1 + S)
     corner = equations.C + damping * np.eye(S) - margin.T @ steps[:, 1:]
@@ -236,7 +236,7 @@ def _solved(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.
     return solved[..., 0] - solved[..., 1:] @ change, change
 
 
-def _along(A: Array, links: Array, right: Array) -> Array:
+def _solve_chain(A: Array, links: Array, right: Array) -> Array:
     """Solutions (T, D, R) of a chain of blocks A (T, D, D), neighbours linked by -diag(links), links (T - 1, D): Thomas' algorithm."""
     T, D, _ = right.shape
     pivot, rest, carried, out = A[0], right[0], [], np.empty_like(right)
@@ -252,7 +252,7 @@ def _along(A: Array, links: Array, right: Array) -> Array:
     return out
 
 
-def _shown(body: Body, sizes: BoneSizes, names: tuple[str, ...]) -> tuple[str, ...]:
+def _observable_sizes(body: Body, sizes: BoneSizes, names: tuple[str, ...]) -> tuple[str, ...]:
     """Sizes on which the places of these joints depend."""
     pose, values = np.zeros((1, len(body.skeleton.dofs))), sizes.to_array()
     moved = [make_body(body.name, type(sizes).from_array(values + 0.01 * row)).points(pose, names=names) for row in np.eye(len(values))]
@@ -260,13 +260,13 @@ def _shown(body: Body, sizes: BoneSizes, names: tuple[str, ...]) -> tuple[str, .
     return tuple(name for name, place in zip(sizes.names(), moved) if np.abs(place - at).max() > 1e-6)
 
 
-def _bones(table: JointTable) -> dict[str, float]:
+def _bone_lengths(table: JointTable) -> dict[str, float]:
     """Median lengths of bones that joints show by their distance, metres."""
     pairs = {"hip_distance": [("left_hip", "right_hip")], "shoulder_distance": [("left_shoulder", "right_shoulder")]}
     for bone, ends in {"upper_arm_length": ("shoulder", "elbow"), "forearm_length": ("elbow", "wrist"), "hand_point": ("wrist", "hand"),
                        "thigh_length": ("hip", "knee"), "shank_length": ("knee", "ankle")}.items():  # fmt: skip
         pairs[bone] = [(f"{side}_{ends[0]}", f"{side}_{ends[1]}") for side in SIDES]
-    lengths = {bone: np.concatenate([np.linalg.norm(of(table, a) - of(table, b), axis=1) for a, b in both]) for bone, both in pairs.items()}
+    lengths = {bone: np.concatenate([np.linalg.norm(positions_of(table, a) - positions_of(table, b), axis=1) for a, b in both]) for bone, both in pairs.items()}
     return {bone: float(np.nanmedian(each)) for bone, each in lengths.items() if np.isfinite(each).any()}
 
 

@@ -14,17 +14,17 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable, Motion
-from shadowpuppet.motion.synchronization import in_step, match
+from shadowpuppet.motion.synchronization import at_common_times, match
 
-UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
+UPPER_JOINTS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 """What is compared where one camera saw the upper body."""
-LIMBS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
+LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
 """What is compared where the whole body was seen."""
-GROUPS = {"upper": UPPER, "limbs": LIMBS, "humaneva": ("pelvis", "neck", "head", *LIMBS)}
+GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS, "humaneva": ("pelvis", "neck", "head", *LIMB_JOINTS)}
 """Joints that are compared together, by a name; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
-LOST, FAR = 0.5, 0.3
+LOST_ERROR, FAR_ERROR = 0.5, 0.3
 """Metres: what a joint that is not there counts, so that leaving out bad frames never helps; and beyond which one is far off."""
-LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+LEVEL_CAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """World to camera of a level camera that looks along the world's y."""
 
 
@@ -81,15 +81,15 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
         raise ShadowPuppetError("the truth has no position of any of the joints compared, so there is nothing to compare")
     lost = known & ~np.asarray(np.isfinite(found).all(2))
     delta = found - reference
-    across = delta @ (LEVEL if camera is None else camera.T_camera_world[:3, :3]).T
+    across = delta @ (LEVEL_CAMERA if camera is None else camera.T_camera_world[:3, :3]).T
     distances = (np.linalg.norm(delta, axis=2), np.linalg.norm(across[..., :2], axis=2), np.abs(across[..., 2]),
                  np.linalg.norm(delta - _offsets(delta), axis=2))
-    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances), delta=delta)
+    return JointErrors(names, known, lost, *(np.where(lost, LOST_ERROR, d) for d in distances), delta=delta)
 
 
 def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:
     """`LIMBS` of a run that has legs, else `UPPER`; those that both have."""
-    group = LIMBS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER
+    group = LIMB_JOINTS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER_JOINTS
     return tuple(name for name in group if name in run.names and name in truth.names)
 
 
@@ -143,12 +143,12 @@ def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[s
              camera: Camera | None = None, start: int = 0, cameras: int = 1) -> dict[str, Any]:
     """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments.
 
-    Run and truth are compared at the same times (`synchrony.in_step`), whatever their rates. Where several `cameras` saw it costs are
+    Run and truth are compared at the same times (`synchronization.at_common_times`), whatever their rates. Where several `cameras` saw it costs are
     m^2, and no error is told along or across the axis of one.
     """
     run = motion.table
     if truth is not None and len(motion):
-        run, truth = in_step(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))
+        run, truth = at_common_times(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))
     errors = None if truth is None else joint_errors(run, truth, joints, camera=camera)
     names = errors.names if errors else joints or default_joints(run, run)
     said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
@@ -181,6 +181,6 @@ def _summary(values: dict[str, Array]) -> dict[str, float]:
     d = values["distance"] * 1000
     p50, p90, p95 = np.percentile(d, [50, 90, 95]).tolist()
     return {"mean_mm": float(d.mean()), "rmse_mm": float(np.sqrt((d**2).mean())), "p50_mm": p50, "p90_mm": p90, "p95_mm": p95,
-            "max_mm": float(d.max()), "far": float((d > 1000 * FAR).mean()),
+            "max_mm": float(d.max()), "far": float((d > 1000 * FAR_ERROR).mean()),
             **{f"{key}_mm": float(values[kind].mean() * 1000)
                for key, kind in (("plane", "plane"), ("depth", "depth"), ("aligned_mean", "aligned")) if kind in values}}

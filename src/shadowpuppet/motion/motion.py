@@ -17,7 +17,7 @@ STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
 """What can be said of a frame: followed; followed, but in doubt; carried on without a picture; not known where; nobody there."""
 BLANK = ("lost", "absent")
 """Statuses of frames that have no pose and no joints: there is no honest value."""
-SERIES = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
+PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
 """The fields of a `Motion` that have a row a frame."""
 
 
@@ -114,7 +114,7 @@ class Motion:
 
     def __getitem__(self, frames: slice | NDArray[np.bool_]) -> Motion:
         """Some frames: a slice, or a mask (T,)."""
-        return replace(self, **{name: getattr(self, name)[frames] for name in SERIES})
+        return replace(self, **{name: getattr(self, name)[frames] for name in PER_FRAME})
 
     def _check_blank(self) -> None:
         blank = np.flatnonzero(np.isin(self.status, BLANK))

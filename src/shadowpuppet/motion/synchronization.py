@@ -11,19 +11,19 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 
-REACH = 1.5
+MAX_GAP = 1.5
 """Steps that two frames may be apart to be interpolated between; over longer gaps nothing is known."""
-NEAR = 0.1
+NEAREST_WITHIN = 0.1
 """Of a step: a frame so near in time is taken as it is where nothing can be interpolated, so that rounded times lose none at the ends."""
-DENSER = 0.75
+DENSER_TRUTH = 0.75
 """A truth whose steps are less than so much of the run's is interpolated, not the run."""
-SHARED, LEAST = 0.5, 12
+MIN_SHARED, MIN_SPEEDS = 0.5, 12
 """Share of the shorter motion's speeds that must meet for an offset to count, and how many at least."""
-SPAN = 0.25
+SPEED_SPAN = 0.25
 """Seconds over which a speed is taken: over a frame it would be mostly the run's jitter."""
-CLEAR = 0.7
+STANDS_OUT = 0.7
 """An offset is found where the error of speed is less than so much of the usual one."""
-ELSEWHERE, RIVAL, ALIKE = 0.3, 1.15, 0.01
+OTHER_OFFSET, RIVAL_FACTOR, RIVAL_MARGIN = 0.3, 1.15, 0.01
 """Seconds beyond which an offset is another one, and by what factor, and m/s more, its error may be larger and still in doubt."""
 
 
@@ -57,24 +57,24 @@ def at_times(table: JointTable, times: ArrayLike) -> JointTable:
     before, after = after - 1, np.minimum(after, len(own) - 1)
     span = own[after] - own[before]
     share = np.divide(times - own[before], span, out=np.zeros(len(times)), where=span > 0)
-    usable = (span > 0) & (span <= REACH * step_of(own)) & (share >= 0) & (share <= 1)
+    usable = (span > 0) & (span <= MAX_GAP * step_of(own)) & (share >= 0) & (share <= 1)
     weight = np.where(usable, share, 0)[:, None, None]
     found = np.where(usable[:, None, None], (1 - weight) * places[before] + weight * places[after], np.nan)
     nearest = _nearest(own, times)
-    near = np.abs(own[nearest] - times) <= (NEAR * step_of(own) if len(own) > 1 else 1e-6)
+    near = np.abs(own[nearest] - times) <= (NEAREST_WITHIN * step_of(own) if len(own) > 1 else 1e-6)
     return JointTable(times, table.names, np.where(near[:, None, None] & ~np.isfinite(found), places[nearest], found))
 
 
-def in_step(run: JointTable, truth: JointTable) -> tuple[JointTable, JointTable]:
+def at_common_times(run: JointTable, truth: JointTable) -> tuple[JointTable, JointTable]:
     """Both at the same times: the truth's; or, where the truth has more frames a second, the run's, between whose frames less is known.
 
     Where the run has no frames the truth's own times remain, as many a second as the run has, so that what is left out counts as lost.
     """
     slow = step_of(run.times)
-    if len(run.times) == 0 or not step_of(truth.times) < DENSER * slow < np.inf:
+    if len(run.times) == 0 or not step_of(truth.times) < DENSER_TRUTH * slow < np.inf:
         return at_times(run, truth.times), truth
-    within = (run.times >= truth.times[0] - NEAR * step_of(truth.times)) & (run.times <= truth.times[-1] + NEAR * step_of(truth.times))
-    alone = truth.times[np.abs(run.times[_nearest(run.times, truth.times)] - truth.times) > REACH / 2 * slow]
+    within = (run.times >= truth.times[0] - NEAREST_WITHIN * step_of(truth.times)) & (run.times <= truth.times[-1] + NEAREST_WITHIN * step_of(truth.times))
+    alone = truth.times[np.abs(run.times[_nearest(run.times, truth.times)] - truth.times) > MAX_GAP / 2 * slow]
     thinned = alone[np.unique(np.floor((alone - alone[:1]) / slow + 1e-6), return_index=True)[1]]
     times = np.sort(np.concatenate([run.times[within], thinned]))
     return at_times(run, times), at_times(truth, times)
@@ -107,14 +107,14 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
         raise ShadowPuppetError("sync: found no joint that run and truth share in two frames or more, so the clocks cannot be compared")
     lags, errors = _by_lag(*(_speeds(table, _steps(table, step)) for table in (ours, theirs)))
     if not np.isfinite(errors).any():
-        raise ShadowPuppetError(f"sync: run and truth share fewer than {LEAST} speeds at every offset, so the clocks cannot be compared")
+        raise ShadowPuppetError(f"sync: run and truth share fewer than {MIN_SPEEDS} speeds at every offset, so the clocks cannot be compared")
     offsets = run.times[0] - truth.times[0] + lags * step
-    good = RIVAL * np.nanmin(errors) + ALIKE
+    good = RIVAL_FACTOR * np.nanmin(errors) + RIVAL_MARGIN
     smallest = np.nanmin(np.abs(offsets[errors <= good]))
-    best = int(np.nanargmin(np.where(np.abs(offsets) <= smallest + ELSEWHERE, errors, np.nan)))
-    elsewhere = np.where(np.abs(offsets - offsets[best]) > ELSEWHERE, errors, np.nan)
+    best = int(np.nanargmin(np.where(np.abs(offsets) <= smallest + OTHER_OFFSET, errors, np.nan)))
+    elsewhere = np.where(np.abs(offsets - offsets[best]) > OTHER_OFFSET, errors, np.nan)
     usual = np.nanmedian(elsewhere) if np.isfinite(elsewhere).any() else np.inf
-    if not errors[best] < CLEAR * usual:
+    if not errors[best] < STANDS_OUT * usual:
         raise ShadowPuppetError(f"sync: the best offset, {offsets[best]:.3f} s, leaves {errors[best]:.3f} m/s of speed error, the usual "
                                 f"one {usual:.3f}: none stands out; give --offset")
     tried = offsets[best] + step * np.linspace(-1, 1, 41)
@@ -141,8 +141,8 @@ def _steps(table: JointTable, step: float) -> Array:
 
 def _speeds(table: JointTable, times: Array) -> Array:
     """Speeds (T, J), m/s, over `SPAN` around each time."""
-    before, after = (at_times(table, times + sign * SPAN / 2).positions for sign in (-1, 1))
-    return np.linalg.norm(after - before, axis=2) / SPAN
+    before, after = (at_times(table, times + sign * SPEED_SPAN / 2).positions for sign in (-1, 1))
+    return np.linalg.norm(after - before, axis=2) / SPEED_SPAN
 
 
 def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
@@ -156,7 +156,7 @@ def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
 
     count = np.round(total(known_a, known_b))
     squares = total(a**2, known_b) - 2 * total(a, b) + total(known_a, b**2)
-    enough = count >= max(LEAST, SHARED * min(known_a.sum(), known_b.sum()))
+    enough = count >= max(MIN_SPEEDS, MIN_SHARED * min(known_a.sum(), known_b.sum()))
     errors = np.sqrt(np.maximum(squares, 0) / np.maximum(count, 1))
     return np.arange(len(count)) - (len(theirs) - 1), np.where(enough, errors, np.nan)
 

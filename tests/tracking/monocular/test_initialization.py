@@ -14,9 +14,9 @@ from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.person import wrong_posture
-from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, find_person, fit_references, refine
+from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, find_person, fit_references, refine
 from shadowpuppet.tracking.monocular.settings import InitializationSettings
-from shadowpuppet.tracking.monocular.size_search import Bodies, Guess, Hypotheses
+from shadowpuppet.tracking.monocular.size_search import LinearBodies, PersonEstimate, SizeSearch
 from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 
 CAMERA = camera((320, 240))
@@ -26,7 +26,7 @@ SOMEONE = AVERAGE.with_values(
     torso_bottom_depth=1.2 * AVERAGE.torso_bottom_depth, upper_arm_length=1.05 * AVERAGE.upper_arm_length,
 )  # fmt: skip
 """Taller in the arm and stouter than the average."""
-TRUE = Guess(SOMEONE, 1.78, 2.8, 0.15)
+TRUE = PersonEstimate(SOMEONE, 1.78, 2.8, 0.15)
 QUICK = InitializationSettings(rounds=15, sweeps=2)
 
 
@@ -35,11 +35,11 @@ def reach(sizes: CardboxSizes) -> float:
     return sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length
 
 
-def crown(guess: Guess) -> float:
+def crown(guess: PersonEstimate) -> float:
     return guess.elevation + guess.sizes.torso_height + guess.sizes.neck_gap + guess.sizes.head_height
 
 
-def seen(pose: np.ndarray, body: str = "rounded", guess: Guess = TRUE) -> np.ndarray:
+def seen(pose: np.ndarray, body: str = "rounded", guess: PersonEstimate = TRUE) -> np.ndarray:
     """The mask of a pose, with legs that begin a little inside the waist."""
     picture = guess.picture(CAMERA, body)
     legs = picture.legs(pose, spread=np.radians(4))
@@ -53,7 +53,7 @@ def references(body: str = "rounded") -> dict[str, np.ndarray]:
 
 
 @cache
-def fitted(body: str = "rounded", settings: InitializationSettings = InitializationSettings(), **known: float) -> Fit:  # noqa: B008
+def fitted(body: str = "rounded", settings: InitializationSettings = InitializationSettings(), **known: float) -> SizeFit:  # noqa: B008
     return fit_references(np.random.default_rng(0), CAMERA, references(body), body=body, settings=settings, **known)
 
 
@@ -104,7 +104,7 @@ def test_sizes_are_found_where_height_and_distance_are_known(body):
 
 def test_algorithm_1_improves_on_proportions():
     fit = fitted(height=1.78, distance=2.8)
-    average = Guess(sizes_from_height(1.78), 1.78, 2.8, crown(TRUE) - crown(Guess(sizes_from_height(1.78), 0, 0, 0)))
+    average = PersonEstimate(sizes_from_height(1.78), 1.78, 2.8, crown(TRUE) - crown(PersonEstimate(sizes_from_height(1.78), 0, 0, 0)))
     costs = [sum(silhouette_costs(view, Observation.without_legs(mask, view, pose), pose[None])[0]
                  for mask, pose in zip(references().values(), fit.poses))
              for view in (fit.guess.picture(CAMERA), average.picture(CAMERA))]  # fmt: skip
@@ -136,7 +136,7 @@ def test_without_either_the_average_is_taken():
 
 def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
     """From one search to the next the cost may rise: where the legs are, is looked up anew."""
-    original, searches = Hypotheses.search, []
+    original, searches = SizeSearch.search, []
 
     def search(of, rng, columns, pictures, settings, sigma, scale=True):
         observations, before = of.observe(), of.vector
@@ -144,7 +144,7 @@ def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
         searches.append((curve, *(of.costs(v[None], pictures, observations)[0] for v in (before, of.vector))))
         return curve
 
-    monkeypatch.setattr(Hypotheses, "search", search)
+    monkeypatch.setattr(SizeSearch, "search", search)
     fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=QUICK)
     assert len(searches) == QUICK.sweeps * len(SUBSETS)
     for curve, before, after in searches:
@@ -193,7 +193,7 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
     names, masks = list(POSTURES), list(references().values())
     poses = np.array([BODIES["rounded"](SOMEONE).skeleton.pose(torso_y=0.3 * i, **POSTURES[name]) for i, name in enumerate(names)])
     no_prior = InitializationSettings(prior_weight=0.0, posture_weight=0.0)
-    of = Hypotheses(CAMERA, masks, poses, TRUE, SizePrior(1.78), no_prior, "rounded")
+    of = SizeSearch(CAMERA, masks, poses, TRUE, SizePrior(1.78), no_prior, "rounded")
     here, there = of.vector[None].copy(), of.vector[None].copy()
     there[:, of.columns([], distance=True)[0]] -= farther
     moved = there.copy()
@@ -208,7 +208,7 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
 def test_who_was_taken_for_small_and_near_becomes_taller_and_farther(seed):
     """The picture is the same for both; only the height that is known tells them apart."""
     share = 1.5 / 1.78
-    near = Guess(CardboxSizes.from_array(SOMEONE.to_array() * share), 1.78, 2.8 * share, 0.15 * share)
+    near = PersonEstimate(CardboxSizes.from_array(SOMEONE.to_array() * share), 1.78, 2.8 * share, 0.15 * share)
     pose = BODIES["rounded"](SOMEONE).skeleton.pose
     poses = np.array([pose(torso_y=0.3 * i * share, **angles) for i, angles in enumerate(POSTURES.values())])
     fit = refine(np.random.default_rng(seed), CAMERA, near, list(references().values()), poses, free_distance=True, settings=QUICK)
@@ -329,7 +329,7 @@ def standing(gap: slice | None = None, feet: int = 240, width: int = 24) -> np.n
 def counted(mask: np.ndarray) -> np.ndarray:
     """Rows in which the middle of the silhouette counts."""
     pose = BODIES["rounded"](SOMEONE).skeleton.pose(**POSTURES["front_t_pose"])[None]
-    of = Hypotheses(CAMERA, [mask], pose, TRUE, SizePrior(1.78), QUICK, "rounded")
+    of = SizeSearch(CAMERA, [mask], pose, TRUE, SizePrior(1.78), QUICK, "rounded")
     middle = round(float(np.flatnonzero(TRUE.picture(CAMERA).legs(pose[0], spread=0.0)[-1]).mean()))
     ignored = unpack(of.observe()[0].ignore, 320)
     return np.flatnonzero(mask[:, middle] & ~ignored[:, middle])
@@ -431,7 +431,7 @@ def test_costs_of_many_sizes_are_those_of_bodies_built_one_by_one(body, rng):
     mask = TRUE.picture(CAMERA, body).mask(poses[0])
     ignore = rng.random(mask.shape) < 0.1
     root = place(CAMERA, 2.8, 0.15)
-    found = Bodies(body).costs(CAMERA, root, Observation.of(mask, ignore), poses, many, shift)
+    found = LinearBodies(body).costs(CAMERA, root, Observation.of(mask, ignore), poses, many, shift)
     for n, sizes in enumerate(many):
         at = place(CAMERA, 2.8 - shift[n, 0], 0.15 + shift[n, 1])
         alone = Picture(BODIES[body](CardboxSizes.from_array(sizes)), CAMERA, at)

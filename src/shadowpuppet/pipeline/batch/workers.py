@@ -19,7 +19,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.silhouette_cache import Repeats
-from shadowpuppet.threads import POOLS
+from shadowpuppet.threads import THREAD_VARIABLES
 
 Outcome = dict[str, Any]
 """What came of a task, as `batch.task.do` tells it."""
@@ -114,7 +114,7 @@ class _Worker:
         self.number, self.task, self.film = number, None, ""
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
         path = os.pathsep.join([str(Path(__file__).parents[3]), *(entry or os.getcwd() for entry in sys.path)])
-        environment = os.environ | dict.fromkeys(POOLS, str(threads)) | {"PYTHONPATH": path, "PYTHONUTF8": "1"}
+        environment = os.environ | dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONPATH": path, "PYTHONUTF8": "1"}
         self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.pipeline.batch.worker", str(out)], env=environment,
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors, text=True, encoding="utf-8")
         threading.Thread(target=self._listen, args=(said,), daemon=True).start()

@@ -16,10 +16,10 @@ from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.camera.rasterize import place
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.monocular.pose_search import beside, search
+from shadowpuppet.tracking.monocular.pose_search import align_sideways, search_pose
 from shadowpuppet.tracking.monocular.settings import InitializationSettings
-from shadowpuppet.tracking.monocular.size_search import Guess, Hypotheses
-from shadowpuppet.tracking.monocular.whole_body import whole_person
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate, SizeSearch
+from shadowpuppet.tracking.monocular.whole_body import whole_from_estimate
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},
@@ -29,18 +29,18 @@ POSTURES: Mapping[str, Mapping[str, float]] = {
 """The known postures d_ref of the reference pictures, for O1, O2 and O3 in this order."""
 POSTURE_OF = dict(zip(SUBSETS, POSTURES, strict=True))
 """The posture that each subset of sizes is fitted in."""
-THICK = 1 / 60
+THINNEST_ROW = 1 / 60
 """Pixels that a row or column of a person has at least, as a share of the picture's height: specks and lines have less."""
-NEAREST, FARTHEST = 0.3, 2.0
+MIN_DISTANCE_RATIO, MAX_DISTANCE_RATIO = 0.3, 2.0
 """A distance that is told, over that at which the upper body (nearest), or the whole person or their level arms (farthest), look as
 large as in a reference: outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class SizeFit:
     """A guess after it was fitted to pictures."""
 
-    guess: Guess
+    guess: PersonEstimate
     curves: Mapping[str, tuple[tuple[float, ...], ...]]
     """For each subset of sizes, and of these for each search after another, the least cost (pixels) after every round."""
     overlaps: Mapping[str, float]
@@ -50,7 +50,7 @@ class Fit:
 
 
 def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping[str, Mask], *, height: float | None = None,
-                   distance: float | None = None, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> Fit:
+                   distance: float | None = None, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> SizeFit:
     """Algorithm 1: sizes from masks (H, W) of a person in the known postures `POSTURES`.
 
     Height (m, shoes on) or distance (m) fixes the scale; the average height is taken without either. The person may stand anywhere
@@ -65,9 +65,9 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     skeleton = make_body("cardbox", guess.sizes).skeleton
     poses = np.array([skeleton.pose(**POSTURES[name]) for name in names])
     picture = guess.picture(camera, body)
-    poses = np.array([beside(picture, mask, pose) for mask, pose in zip(masks, poses, strict=True)])
+    poses = np.array([align_sideways(picture, mask, pose) for mask, pose in zip(masks, poses, strict=True)])
     side = skeleton.dof_indices(["torso_y"])
-    hypotheses = Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings, body)
+    hypotheses = SizeSearch(camera, masks, poses, guess, SizePrior(guess.height), settings, body)
     curves: dict[str, list[tuple[float, ...]]] = {}
     for sweep in range(settings.sweeps):
         for subset, sizes in SUBSETS.items():
@@ -87,7 +87,7 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
 
 def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], *, height: float | None = None,
                 distance: float | None = None, sizes: Sizes | None = None, body: str | Make = "rounded",
-                settings: InitializationSettings | None = None) -> Fit:
+                settings: InitializationSettings | None = None) -> SizeFit:
     """Place and sizes without references, from masks (H, W) of the first seconds in any posture.
 
     The sizes are the average person's of the height (m, shoes on), or those given; places are tried with coarse poses in the first
@@ -106,14 +106,14 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
         raise TrackingError("nobody is found: the silhouettes of the first seconds are empty, or nearly all of the picture")
     guesses = [guess for k in sorted({0, len(seen) // 2}) for guess in _places(camera, seen[k], height, distance, sizes)]
     watched = [seen[k] for k in sorted({0, len(seen) // 2, len(seen) - 1})]
-    costs = [sum(search(guess.picture(camera, body), mask).cost for mask in watched) for guess in guesses]
+    costs = [sum(search_pose(guess.picture(camera, body), mask).cost for mask in watched) for guess in guesses]
     guess = guesses[int(np.argmin(costs))]
-    poses = np.array([search(guess.picture(camera, body), mask).pose for mask in seen])
+    poses = np.array([search_pose(guess.picture(camera, body), mask).pose for mask in seen])
     return refine(rng, camera, guess, seen, poses, free_sizes=sizes is None, free_distance=distance is None, body=body, settings=settings)
 
 
 def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None,
-                sizes: Sizes | None, body: str, settings: InitializationSettings) -> Fit:
+                sizes: Sizes | None, body: str, settings: InitializationSettings) -> SizeFit:
     """A whole body: the upper one is found first, for the legs may not be in the picture."""
     assert sizes is None or isinstance(sizes, BoneSizes)
     if height is None and sizes is not None:
@@ -122,25 +122,25 @@ def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     return as_whole(camera, list(filter(may_be_person, masks)), fit, body, sizes, distance)
 
 
-def as_whole(camera: Camera, masks: Sequence[Mask], fit: Fit, body: str, sizes: BoneSizes | None = None,
-             distance: float | None = None) -> Fit:
+def as_whole(camera: Camera, masks: Sequence[Mask], fit: SizeFit, body: str, sizes: BoneSizes | None = None,
+             distance: float | None = None) -> SizeFit:
     """The fit of an upper body as that of a whole one, with poses anew; sizes and distance (m), too, where they are not given.
 
     Overlaps stay the upper body's: they tell how well the person was measured.
     """
-    guess = whole_person(camera, masks, fit.guess, body, sizes, distance)
+    guess = whole_from_estimate(camera, masks, fit.guess, body, sizes, distance)
     picture = guess.picture(camera, body)
-    return replace(fit, guess=guess, poses=np.array([search(picture, mask).pose for mask in masks]))
+    return replace(fit, guess=guess, poses=np.array([search_pose(picture, mask).pose for mask in masks]))
 
 
-def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,
-           free_distance: bool = False, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> Fit:
+def refine(rng: np.random.Generator, camera: Camera, guess: PersonEstimate, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,
+           free_distance: bool = False, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> SizeFit:
     """Sizes, place and poses fitted to masks (H, W), in turn, with poses (K, D) to begin with.
 
     What straight arms do not tell apart (shoulder, upper arm, forearm), bent ones do.
     """
     settings = settings or InitializationSettings()
-    hypotheses = Hypotheses(camera, masks, np.array(poses, float), guess, SizePrior(guess.height), settings, body)
+    hypotheses = SizeSearch(camera, masks, np.array(poses, float), guess, SizePrior(guess.height), settings, body)
     every, dofs = range(len(masks)), np.arange(poses.shape[1])
     columns = hypotheses.columns(CardboxSizes.names() if free_sizes else (), distance=free_distance)
     curves: list[tuple[float, ...]] = []
@@ -151,10 +151,10 @@ def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequen
     return _fit(hypotheses, [str(k) for k in every], {"all": curves})
 
 
-def _fit(hypotheses: Hypotheses, names: Sequence[str], curves: Mapping[str, list[tuple[float, ...]]]) -> Fit:
+def _fit(hypotheses: SizeSearch, names: Sequence[str], curves: Mapping[str, list[tuple[float, ...]]]) -> SizeFit:
     """Hypotheses as they stand."""
     overlaps = dict(zip(names, hypotheses.overlaps(), strict=True))
-    return Fit(hypotheses.current(), {subset: tuple(each) for subset, each in curves.items()}, overlaps, hypotheses.poses().copy())
+    return SizeFit(hypotheses.current(), {subset: tuple(each) for subset, each in curves.items()}, overlaps, hypotheses.poses().copy())
 
 
 def _check_scale(height: float | None, distance: float | None) -> None:
@@ -178,7 +178,7 @@ def _checked(camera: Camera, references: Mapping[str, Mask]) -> dict[str, Mask]:
     return masks
 
 
-def _places(camera: Camera, mask: Mask, height: float | None, distance: float | None, sizes: CardboxSizes | None) -> list[Guess]:
+def _places(camera: Camera, mask: Mask, height: float | None, distance: float | None, sizes: CardboxSizes | None) -> list[PersonEstimate]:
     """People of plausible sizes at plausible places, with the crown at the mask's upper edge or, for raised arms, under it."""
     top = np.flatnonzero(mask.any(1))[0]
     centre = np.flatnonzero(mask.any(0)).mean()
@@ -191,7 +191,7 @@ def _places(camera: Camera, mask: Mask, height: float | None, distance: float | 
         of = sizes or sizes_from_height(tall)
         crown = of.torso_height + of.neck_gap + of.head_height
         for raised in (0.0, 0.1, 0.25, 0.4):
-            out.append(Guess(of, tall, far, float(ray / ray[2] * far @ up) - crown - raised * tall))
+            out.append(PersonEstimate(of, tall, far, float(ray / ray[2] * far @ up) - crown - raised * tall))
     return out
 
 
@@ -207,19 +207,19 @@ def _upper(sizes: CardboxSizes) -> float:
 
 def _check_distance(distance: float, tall: float, focal: float, name: str, mask: Mask) -> None:
     """Raise `TrackingError` where nobody so `tall` (m) who is so far away (m) looks as large as the mask of the posture `name`."""
-    thick = max(round(THICK * len(mask)), 2)
+    thick = max(round(THINNEST_ROW * len(mask)), 2)
     along = (np.flatnonzero(counts >= min(thick, counts.max())) for counts in (mask.sum(0), mask.sum(1)))
     wide, high = (max(int(found[-1] - found[0]), 1) for found in along)
     sizes = sizes_from_height(tall)
     least = focal * _upper(sizes) / high
     most = focal * tall / high if name == "side_arms_hanging" else focal * _span(sizes) / wide
-    for end, wrong in ((f"least {least:.1f}", distance < NEAREST * least), (f"most {most:.1f}", distance > FARTHEST * most)):
+    for end, wrong in ((f"least {least:.1f}", distance < MIN_DISTANCE_RATIO * least), (f"most {most:.1f}", distance > MAX_DISTANCE_RATIO * most)):
         if wrong:
             raise TrackingError(f"distance: found {distance:g} metres, expected at {end}, by how large a person of {tall:.2f} m is in "
                                 f"{name}")
 
 
-def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, distance: float | None) -> Guess:
+def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, distance: float | None) -> PersonEstimate:
     """Sizes from the height, and the place where a body of these sizes has its crown where the mask of the posture `name` has.
 
     Raises `TrackingError` where nobody who is so far away looks as large as in the mask.
@@ -238,4 +238,4 @@ def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, di
     up = place(camera, 0.0, 0.0)[:3, 2]
     crown = down / abs(down[2]) * far
     elevation = float(crown @ up) - (sizes.torso_height + sizes.neck_gap + sizes.head_height)
-    return Guess(sizes, tall, far, elevation)
+    return PersonEstimate(sizes, tall, far, elevation)

@@ -12,13 +12,13 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost, silhouette_costs
 
-GOOD = 40
+BEST_LIMBS = 40
 """So many of the coarse postures of a limb that were tried, the best, are worth beginning a filter's particles around."""
-SIDEWAYS = ("torso_y", "root_y")
+SIDEWAYS_DOFS = ("torso_y", "root_y")
 """The DOF that moves a body sideways."""
 
 
-class FirstPose(NamedTuple):
+class CoarsePose(NamedTuple):
     """What the search found."""
 
     pose: Array
@@ -29,7 +29,7 @@ class FirstPose(NamedTuple):
     """For each arm and leg all postures tried, (K, d), the best first."""
 
 
-def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
+def search_pose(picture: Picture, mask: NDArray[np.bool_]) -> CoarsePose:
     """The upright pose, facing the camera, and the coarse limbs of least cost (eq. 2) in a mask (H, W); of an upper body legs do not count.
 
     The torso is moved sideways with no arms drawn, then each arm is tried with the other not drawn, and once more with it; then the
@@ -52,10 +52,10 @@ def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
         costs = drawn.costs(observation, pose)(poses)
         ranked = np.argsort(costs, kind="stable")
         tried[limb], pose, least = library[ranked], poses[ranked[0]], float(costs[ranked[0]])
-    return FirstPose(pose, least, tried)
+    return CoarsePose(pose, least, tried)
 
 
-def beside(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
+def align_sideways(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
     """A pose (D,) moved sideways to where its silhouette has the least cost in a mask (H, W), whatever else is in the mask.
 
     What is seen of the legs counts wherever the body is: it is the same for all places.
@@ -67,7 +67,7 @@ def beside(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
 def _sideways(picture: Picture, pose: Array) -> tuple[NDArray[np.int64], Array]:
     """The DOF that moves the body sideways, and a pose (D,) at places (161, D) all over the picture's width."""
     skeleton = picture.body.skeleton
-    sideways = skeleton.dof_indices([name for name in SIDEWAYS if name in skeleton.dof_names])
+    sideways = skeleton.dof_indices([name for name in SIDEWAYS_DOFS if name in skeleton.dof_names])
     poses = np.repeat(pose[None], 161, axis=0)
     poses[:, sideways[0]] = np.linspace(-1, 1, len(poses)) * _half_width(picture)
     return sideways, poses

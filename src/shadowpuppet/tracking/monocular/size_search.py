@@ -21,14 +21,14 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Observation
 
-NAMES = CardboxSizes.names()
+SIZE_NAMES = CardboxSizes.names()
 MAY_BE_NEGATIVE = ("neck_gap", "shoulder_inset")
-GAP = 1 / 80
+CROTCH_GAP = 1 / 80
 """Rows, as a share of the picture's, in which a gap between the legs must be seen: one may be noise."""
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
+class PersonEstimate:
     """A person's sizes and place, as far as they are known."""
 
     sizes: Sizes
@@ -58,16 +58,16 @@ class Unknowns(NamedTuple):
     @classmethod
     def of(cls, vectors: NDArray[Any], dofs: int) -> Unknowns:
         """Vectors (N, 20 + K D) taken apart: views, so that what is written into these is written into the vectors."""
-        sizes, shift, poses = np.split(vectors, [len(NAMES), len(NAMES) + 2], axis=1)
+        sizes, shift, poses = np.split(vectors, [len(SIZE_NAMES), len(SIZE_NAMES) + 2], axis=1)
         return cls(sizes, shift, poses.reshape(len(vectors), -1, dofs))
 
 
-class Bodies:
+class LinearBodies:
     """Many people at once: joints and shapes of a body are linear in the sizes, so that none need be built for each hypothesis."""
 
     def __init__(self, body: str | Make) -> None:
         """`body`: one of `BODIES`, or a function of the 18 sizes. Raises `ShadowPuppetError` for one that is not linear in them."""
-        some, step = np.full(len(NAMES), 0.1), 0.01
+        some, step = np.full(len(SIZE_NAMES), 0.1), 0.01
         self.make = BODIES[body] if isinstance(body, str) else body
         self.body = self.make(CardboxSizes.from_array(some))
         self.slopes: list[Array] = []
@@ -92,16 +92,16 @@ class Bodies:
         return observation.area + added.astype(float)
 
 
-class Hypotheses:
+class SizeSearch:
     """Sizes, place and poses of one person in several pictures as one vector, some of which are drawn at a time."""
 
-    def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: Guess, prior: SizePrior,
+    def __init__(self, camera: Camera, masks: Sequence[Mask], poses: Array, guess: PersonEstimate, prior: SizePrior,
                  settings: InitializationSettings, body: str | Make) -> None:
         """Masks (H, W) of K pictures, and the guess and poses (K, D) to begin with."""
         self.camera, self.masks, self.guess, self.prior = camera, masks, guess, prior
         scale = pixel_scale(camera.size)
         self.weight, self.strain = settings.prior_weight * scale, settings.posture_weight * scale
-        self.bodies, self.body = Bodies(body), body
+        self.bodies, self.body = LinearBodies(body), body
         self.T_camera_base = place(camera, guess.distance, guess.elevation)
         self.dofs = poses.shape[1]
         self.vector = np.concatenate([guess.sizes.to_array(), np.zeros(2), poses.ravel()])
@@ -111,7 +111,7 @@ class Hypotheses:
     def columns(self, sizes: Sequence[str], *, distance: bool = False) -> NDArray[np.int64]:
         """Places in the vector of some sizes and of the body's place."""
         toward, up = self.places.shift[0]
-        return np.array([*(self.places.sizes[0, NAMES.index(name)] for name in sizes), *([toward] if distance else []), up])
+        return np.array([*(self.places.sizes[0, SIZE_NAMES.index(name)] for name in sizes), *([toward] if distance else []), up])
 
     def pose_columns(self, picture: int, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
         """Places in the vector of some DOF of a picture's pose."""
@@ -126,7 +126,7 @@ class Hypotheses:
         """Poses (K, D) as they stand."""
         return self.best.poses[0]
 
-    def current(self) -> Guess:
+    def current(self) -> PersonEstimate:
         """Sizes and place as they stand."""
         sizes, (toward, up) = self.best.sizes[0], self.best.shift[0].tolist()
         return replace(self.guess, sizes=CardboxSizes.from_array(sizes), distance=self.guess.distance - toward,
@@ -184,7 +184,7 @@ class Hypotheses:
     def bound(self, vectors: Array) -> None:
         """Sizes of vectors (N, ...) stay positive (only the gap and the inset may not be), poses within their limits."""
         sizes, _, poses = Unknowns.of(vectors, self.dofs)
-        np.clip(sizes, [-0.15 if name in MAY_BE_NEGATIVE else 0.01 for name in NAMES], 1.5, out=sizes)
+        np.clip(sizes, [-0.15 if name in MAY_BE_NEGATIVE else 0.01 for name in SIZE_NAMES], 1.5, out=sizes)
         np.clip(poses, *self.limits, out=poses)
 
     def overlaps(self) -> list[float]:
@@ -209,7 +209,7 @@ def _above_crotch(mask: Mask, legs: Mask, under: Mask) -> Mask:
     out[:, left:right] = under[:, left:right]
     limbs = mask & legs
     gap = np.all([out.any(1), ~(mask & out).any(1), limbs[:, :left].any(1), limbs[:, right:].any(1)], axis=0)
-    length = max(round(GAP * len(mask)), 2)
+    length = max(round(CROTCH_GAP * len(mask)), 2)
     runs = np.convolve(gap, np.ones(length), "valid") if length <= len(gap) else np.zeros(0)
     starts = np.flatnonzero(runs == length)
     out[starts[0] if len(starts) else 0 :] = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.body.segments import HELD, coarse_limbs, dofs_of, limbs_of, members_of, parts_of, steady
+from shadowpuppet.body.segments import PULLED_POINTS, coarse_limbs, dofs_of, keep_limb_directions, limbs_of, parts_of, segments_of
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
@@ -27,9 +27,9 @@ class FilterStage:
         self.picture, self.settings = picture, settings
         self.parts = tuple(dict.fromkeys(part.strip() for part in name.split("+")))
         skeleton = picture.body.skeleton
-        unknown = [part for part in self.parts if part not in members_of(skeleton)]
+        unknown = [part for part in self.parts if part not in segments_of(skeleton)]
         if unknown:
-            raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(members_of(skeleton))}")
+            raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(segments_of(skeleton))}")
         owner = {d: part for part in self.parts for d in dofs_of(skeleton, part).tolist()}
         self.dofs = np.array(sorted(owner), np.int64)
         self.legs = [limb for limb in limbs_of(skeleton) if limb.endswith("leg") and limb not in self.parts]
@@ -46,7 +46,7 @@ class FilterStage:
                                for d, turn in zip(self.dofs.tolist(), self.turns, strict=True)])
         self.scale = pixel_scale(picture.camera.size)
         self.sigma_cost = of[self.parts[0]].sigma_cost * self.scale
-        self.held = [name for part in self.parts for name in HELD[part]]
+        self.held = [name for part in self.parts for name in PULLED_POINTS[part]]
 
     def clamp(self, values: Array) -> Array:
         """Values (N, d) within the joint limits, if these are kept."""
@@ -58,7 +58,7 @@ class FilterStage:
         poses = np.repeat(pose[None], len(values) if values.ndim == 2 else 1, axis=0)
         poses[:, self.dofs] = values
         if self.moves_torso and self.legs:
-            poses = steady(self.picture.body.skeleton, pose, poses, self.legs)
+            poses = keep_limb_directions(self.picture.body.skeleton, pose, poses, self.legs)
         return poses if values.ndim == 2 else poses[0]
 
     def propose(self, cycle: int) -> Propose:

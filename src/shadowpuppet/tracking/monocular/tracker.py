@@ -82,13 +82,13 @@ class MonocularTracker:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` where nobody is
         there. `also`, and what is raised: as `step`."""
         mask = check_mask(mask, self.picture.camera.size)
-        found = pose_search.search(self.picture, mask)
+        found = pose_search.search_pose(self.picture, mask)
         observation, particles = self.observe(mask, found.pose, also), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
             for limb, tried in found.limbs.items():
                 if limb in stage.parts:
-                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = tried[np.arange(stage.number) % pose_search.GOOD]
+                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = tried[np.arange(stage.number) % pose_search.BEST_LIMBS]
             values = stage.clamp(diffuse(rng, poses[:, stage.dofs], stage.sigma))
             particles.append(evaluate(values, stage.weigh(observation, found.pose, found.pose)))
         state = self.judge(found.pose, particles, observation)
