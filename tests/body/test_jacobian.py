@@ -11,9 +11,9 @@ from scans import make_body as random_tree
 from scans import some_pose
 from scipy.spatial.transform import Rotation
 
-from shadowpuppet.body.jacobian import ROTATION, SMALL_ANGLE, TRANSLATION, VECTOR, exponential, make_chain, place_one
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.forward_kinematics import ROTATION, TRANSLATION, VECTOR
+from shadowpuppet.body.jacobian import SMALL_ANGLE, exponential, make_chain, place_one
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.evaluation.bench import naive_multi as naive
 
 pytestmark = pytest.mark.kernels

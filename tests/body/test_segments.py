@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.models import MODELS, WHOLE, average_sizes, make_body
 from shadowpuppet.body.segments import (
     PULLED_POINTS,
     SEGMENT_JOINTS,
@@ -17,12 +17,11 @@ from shadowpuppet.body.segments import (
     parts_of,
     segments_of,
 )
-from shadowpuppet.body.sizes import WHOLE
 
-BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in ALL}
+BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in MODELS}
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", MODELS)
 def test_every_angle_is_one_member_s(name):
     body = BODY[name]
     members = segments_of(body.skeleton)
@@ -34,7 +33,7 @@ def test_every_angle_is_one_member_s(name):
     assert {name for member in members for name in PULLED_POINTS[member]} <= set(body.landmark_names)
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", MODELS)
 def test_a_limb_s_parts_move_with_it_alone(name, rng):
     body = BODY[name]
     for limb in limbs_of(body.skeleton):

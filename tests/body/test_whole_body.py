@@ -8,9 +8,8 @@ from people import random_poses
 from scipy import ndimage
 
 from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, CYLINDER_SHARES, SOLE
-from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.models import MODELS, WHOLE, average_sizes, kind_of, make_body, sizes_kind
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
-from shadowpuppet.body.sizes import KINDS, WHOLE, kind_of, sizes_kind
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
@@ -85,7 +84,7 @@ def test_sizes_are_kept_checked_and_grow_with_the_height(name):
         make_body("cardbox", sizes)
     with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"):
         sizes_kind("ball")
-    assert set(ALL) == set(KINDS) > set(WHOLE)
+    assert set(MODELS) > set(WHOLE)
     assert kind_of(sizes) == name
 
 
@@ -159,7 +158,7 @@ def test_a_mirrored_pose_is_the_mirrored_person(name, rng):
     np.testing.assert_allclose(body.points(mirrored(body.skeleton, poses)), body.points(poses)[:, swap] * [1, -1, 1], atol=1e-12)
     low, high = body.skeleton.limits
     np.testing.assert_allclose(np.sort(mirrored(body.skeleton, np.stack([low, high])), axis=0), [low, high])
-    np.testing.assert_allclose(body.skeleton.strain(mirrored(body.skeleton, poses)), body.skeleton.strain(poses))
+    np.testing.assert_allclose(body.skeleton.posture_penalty(mirrored(body.skeleton, poses)), body.skeleton.posture_penalty(poses))
 
 
 def test_vectors_have_three_components_in_a_row():

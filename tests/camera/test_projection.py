@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from people import LENSES, camera, picture, random_poses
+from people import BODIES, LENSES, camera, picture, random_poses
 
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Joint, Skeleton
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE, make_lens
 from shadowpuppet.camera.rasterize import Picture

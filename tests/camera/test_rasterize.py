@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from mirror import mirrored
-from people import SIZES, camera, picture, random_poses
+from people import BODIES, SIZES, camera, draw_polygon, picture, random_poses, shapes_of
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.upper_body import BODIES, upper_body_skeleton
+from shadowpuppet.body.upper_body import upper_body_skeleton
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, count, draw_polygon, pack, place, unpack
+from shadowpuppet.camera.rasterize import Picture, count, pack, place, unpack
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
@@ -268,7 +268,7 @@ def test_points_in_the_world_are_those_in_the_camera_s_frame(rng):
 def test_legs_hang_from_the_waist_and_widen(twist):
     view = picture("rounded", camera((200, 220)), elevation=0.3)
     pose = view.body.skeleton.pose(torso_twist=twist)
-    legs, waist = view.legs(pose), unpack(view.draw(pose, view.body.shapes_of("waist")), 200)
+    legs, waist = view.legs(pose), unpack(view.draw(pose, shapes_of(view.body, "waist")), 200)
     rows = np.flatnonzero(legs.any(1))
     assert abs(rows[0] - np.flatnonzero(waist.any(1))[-1]) <= 3
     assert rows[-1] == 219

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, euler_angles, rotation_about
 from shadowpuppet.io.motion.table import read_joints

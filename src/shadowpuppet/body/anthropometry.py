@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
-from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CardboxSizes
+from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.geometry import Array
-
-Whole = TypeVar("Whole", bound=BoneSizes)
 
 AVERAGE_HEIGHT = 1.70
 """Stature (m) taken where neither height nor distance is known: the mean adult of ANSUR II (Gordon et al. 2014), women and men."""
@@ -68,22 +65,6 @@ ANATOMICAL_SHARES: Mapping[str, tuple[float, float]] = {
     "knee_width": (0.0690, 0.006), "calf_width": (0.0700, 0.006), "ankle_width": (0.0419, 0.004), "foot_width": (0.0577, 0.004),
 }  # fmt: skip
 """The sizes of `anatomical`; breadths, depths, girths over pi and the foot rounded from ANSUR II (Gordon et al. 2014)."""
-
-
-def shares_of(kind: type[BoneSizes]) -> Mapping[str, tuple[float, float]]:
-    """The sizes of a whole body as fractions of the stature, and their deviations."""
-    return ANATOMICAL_SHARES if issubclass(kind, AnatomicalSizes) else CYLINDER_SHARES
-
-
-def whole_sizes_from_height(kind: type[Whole], height: float) -> Whole:
-    """Sizes of a whole body, `AnatomicalSizes` or `CylinderSizes`, of the average person of a height (m, shoes on)."""
-    return whole_sizes_from_bones(kind, {}, height - SOLE)
-
-
-def whole_sizes_from_bones(kind: type[Whole], lengths: Mapping[str, float], stature: float | None = None) -> Whole:
-    """Sizes of a whole body where some are known (m); the others as the average person of the stature, which is by default theirs."""
-    stature = stature_of(lengths) if stature is None else stature
-    return kind(**{name: lengths.get(name, share * stature) for name, (share, _) in shares_of(kind).items()})
 
 
 def stature_of(lengths: Mapping[str, float]) -> float:

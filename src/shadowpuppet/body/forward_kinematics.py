@@ -12,8 +12,9 @@ _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298
 _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
            -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11)  # fmt: skip
 _QUARTER = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
-SHIFT, TURN, VECTOR = 0, 1, 2
-"""Kinds of DOF: a shift along an axis, a turn about one, a component of a rotation vector (three in a row)."""
+TRANSLATION, ROTATION, VECTOR = 0, 1, 2
+DOF_KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
+"""Kinds of DOF: along an axis, about an axis, a component of a rotation vector (three in a row)."""
 
 
 @device
@@ -74,7 +75,7 @@ def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma:
         for d in range(first[j], first[j + 1]):
             for n in range(value.size):
                 value[n] = signs[d] * poses[min(begin + n, poses.shape[0] - 1), d]
-            if kinds[d] == TURN:
+            if kinds[d] == ROTATION:
                 sines(value, sine, cosine)
                 _turn(T[j], (axes[d] + 1) % 3, (axes[d] + 2) % 3, sine, cosine)
             elif kinds[d] == VECTOR:

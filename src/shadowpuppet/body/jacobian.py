@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.skeleton import AXES, Skeleton
+from shadowpuppet.body.forward_kinematics import TRANSLATION, VECTOR
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 
-TRANSLATION, ROTATION, VECTOR = 0, 1, 2
-KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
 MAX_STEP = 0.5
 """No DOF moves farther than this (rad or m) in one iteration of a refinement."""
 SMALL_ANGLE = 1e-4
@@ -48,13 +47,9 @@ class Chain(NamedTuple):
 
 def make_chain(skeleton: Skeleton) -> Chain:
     """The arrays of a skeleton without couplings."""
-    parents, first, *_ = skeleton.tree
-    owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs], np.int64)
-    axes = np.array([AXES[dof.axis][0] for dof in skeleton.dofs], np.int64)
-    signs = np.array([AXES[dof.axis][1] for dof in skeleton.dofs])
-    kinds = np.array([KINDS[dof.kind] for dof in skeleton.dofs], np.int64)
-    return Chain(parents.astype(np.int64), np.ascontiguousarray(skeleton.offsets[0]), first.astype(np.int64), owners, axes, signs, kinds,
-                 *skeleton.limits)
+    parents, first, axes, signs, kinds, *_ = skeleton.tree
+    owners = np.repeat(np.arange(len(parents)), np.diff(first))
+    return Chain(parents, np.ascontiguousarray(skeleton.offsets[0]), first, owners, axes, signs, kinds, *skeleton.limits)
 
 
 @kernel

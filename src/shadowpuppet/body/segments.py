@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.angles import rotation_angles
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.skeleton import Dof, Skeleton
-from shadowpuppet.body.upper_body import SIDES
+from shadowpuppet.body.skeleton import SIDES, Dof, Skeleton
 from shadowpuppet.geometry import Array, rotation_about
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 
 
@@ -108,13 +107,6 @@ class Body:
     def landmark_names(self) -> tuple[str, ...]:
         """Names of the landmarks, L of them."""
         return tuple(self.landmarks)
-
-    def shapes_of(self, *parts: str) -> NDArray[np.int64]:
-        """Indices of the shapes of some parts. Raises `ShadowPuppetError` for a part that the body lacks."""
-        unknown = set(parts) - set(self.parts)
-        if unknown:
-            raise ShadowPuppetError(f"body {self.name!r}: unknown part {choices(unknown)}; there are: {choices(set(self.parts))}")
-        return np.array([i for i, part in enumerate(self.parts) if part in parts], np.int64)
 
     def points(self, poses: ArrayLike, root: ArrayLike | None = None, names: Iterable[str] | None = None) -> Array:
         """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to; all, or those named."""

@@ -219,25 +219,3 @@ class AnatomicalSizes(BoneSizes):
     def offsets(cls) -> tuple[str, ...]:
         """As of the bones; toes may point inward."""
         return *super().offsets(), "toe_out"
-
-
-KINDS: dict[str, type[Sizes]] = {
-    **dict.fromkeys(("rounded", "cardbox", "boxes"), CardboxSizes),
-    "anatomical": AnatomicalSizes,
-    "cylinders": CylinderSizes,
-}
-"""The sizes that each body is made from."""
-WHOLE = ("anatomical", "cylinders")
-"""Bodies of the whole person, which stand in the world."""
-
-
-def sizes_kind(name: str) -> type[Sizes]:
-    """The sizes that a body is made from. Raises `ShadowPuppetError` with the names there are."""
-    if name not in KINDS:
-        raise ShadowPuppetError(f"unknown body {name!r}; there are: {choices(KINDS)}")
-    return KINDS[name]
-
-
-def kind_of(sizes: Sizes) -> str:
-    """Name of a body that is made from such sizes; of several the first."""
-    return next(name for name, kind in KINDS.items() if isinstance(sizes, kind))

@@ -10,14 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body.forward_kinematics import SHIFT, TURN, VECTOR, place_all, place_points
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import BLOCK
 
 AXES = {"x": (0, 1.0), "y": (1, 1.0), "z": (2, 1.0), "-x": (0, -1.0), "-y": (1, -1.0), "-z": (2, -1.0)}
-
-KINDS = {"translation": SHIFT, "rotation": TURN, "vector": VECTOR}
+SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -120,12 +117,14 @@ class Skeleton:
     def tree(self) -> tuple:
         """What kernels need: parents (J,), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,), of each coupling joint
         and DOF (C, 2) and shift (C, 3), and the numbers of all joints (J,)."""
+        from shadowpuppet.body.forward_kinematics import DOF_KINDS  # late, as below: bodies are named without loading Numba
+
         parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
         owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
         first = np.searchsorted(owners, np.arange(len(self.joints) + 1))
         axes = np.array([AXES[dof.axis][0] for dof in self.dofs], np.int64)
         signs = np.array([AXES[dof.axis][1] for dof in self.dofs], float)
-        kinds = np.array([KINDS[dof.kind] for dof in self.dofs], np.int64)
+        kinds = np.array([DOF_KINDS[dof.kind] for dof in self.dofs], np.int64)
         pairs = [(self.joint_index(c.joint), self.dof_indices([c.dof])[0]) for c in self.couplings]
         shifts = np.array([c.shift for c in self.couplings], float).reshape(-1, 3)
         return parents, first, axes, signs, kinds, np.array(pairs, np.int64).reshape(-1, 2), shifts, np.arange(len(self.joints))
@@ -150,7 +149,7 @@ class Skeleton:
         """Rest of every DOF, and how far below and above it is still usual, three arrays (D,)."""
         return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
 
-    def strain(self, poses: ArrayLike) -> Array:
+    def posture_penalty(self, poses: ArrayLike) -> Array:
         """How unusual poses (N, D) are: squared deviations from rest, summed (N,); each DOF adds at most 9, three deviations' worth.
 
         The bound leaves a posture that is plainly seen alone, and still decides where the picture says little.
@@ -189,15 +188,25 @@ class Skeleton:
 
         `offsets` (N, J, 3) gives every pose a skeleton of its own measures.
         """
+        from shadowpuppet.body.forward_kinematics import place_all
+
         offsets = self.offsets if offsets is None else offsets
-        poses, size = self.checked(poses), min(BLOCK, max(len(poses), 1))
-        place_all(poses, joints, self.tree, offsets, np.ascontiguousarray(root[:3]), transforms,
-                  np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size)))
+        poses = self.checked(poses)
+        place_all(poses, joints, self.tree, offsets, np.ascontiguousarray(root[:3]), transforms, *self._buffers(len(poses)))
 
     def points(self, poses: ArrayLike, joints: NDArray[np.int64], places: Array, root: ArrayLike | None = None) -> Array:
         """Points (N, P, 3), metres, fixed to `joints` (P,) at `places` (P, 3) in their frames, of poses (N, D); `root` as in `forward`."""
+        from shadowpuppet.body.forward_kinematics import place_points
+
         poses, root = self.checked(poses), np.eye(4) if root is None else np.asarray(root, float)
-        out, size = np.empty((len(poses), len(joints), 3)), min(BLOCK, max(len(poses), 1))
+        out = np.empty((len(poses), len(joints), 3))
         place_points(poses, self.tree, self.offsets, np.ascontiguousarray(root[:3]), joints, np.ascontiguousarray(places, float), out,
-                     np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size)))
+                     *self._buffers(len(poses)))
         return out
+
+    def _buffers(self, number: int) -> tuple[Array, Array]:
+        """Memory for the kernels: joints (J, 3, 4, B) of a block of poses, and intermediate values (6, B)."""
+        from shadowpuppet.jit import BLOCK
+
+        size = min(BLOCK, max(number, 1))
+        return np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size))

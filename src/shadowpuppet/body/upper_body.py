@@ -16,10 +16,8 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body, Hulls, Quads
 from shadowpuppet.body.sizes import CardboxSizes
-from shadowpuppet.body.skeleton import Coupling, Dof, Joint, Skeleton
+from shadowpuppet.body.skeleton import SIDES, Coupling, Dof, Joint, Skeleton
 from shadowpuppet.geometry import Array
-
-SIDES = ("left", "right")
 
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
@@ -207,5 +205,3 @@ def rounded(sizes: CardboxSizes) -> Body:
                 _landmarks(sizes), _hem(sizes))
 
 
-BODIES = {"cardbox": cardbox, "boxes": boxes, "rounded": rounded}
-"""Upper bodies, from 18 sizes."""

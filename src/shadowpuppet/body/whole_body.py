@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
 from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CylinderSizes
-from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.body.skeleton import SIDES, Dof, Joint, Skeleton
 
 LIMB_AXES = {
     "up": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -161,7 +161,6 @@ def cylinders(sizes: CylinderSizes) -> Body:
     return _body("cylinders", cylinder_skeleton(sizes), parts, _landmarks(sizes, ("pelvis", sizes.trunk_height)))
 
 
-SIDES = ("left", "right")
 Bounds = tuple[float, float]
 Three = tuple[float, float, float]
 FREE = (-np.inf, np.inf)

@@ -214,11 +214,6 @@ def place(camera: Camera, distance: float, elevation: float) -> Array:
     return rigid(R, R @ np.array([-distance, 0.0, elevation]))
 
 
-def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """One convex polygon of corners (K, 2), pixels, drawn into an empty mask (H, W)."""
-    return unpack(polygon_bits(corners, size), size[0])
-
-
 def polygon_bits(corners: ArrayLike, size: tuple[int, int]) -> Bits:
     """One convex polygon of corners (K, 2), pixels, as bits of a mask."""
     corners = np.asarray(corners, float).reshape(-1, 2)

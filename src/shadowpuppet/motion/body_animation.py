@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.geometry import Array, align
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.motion import Motion
 
@@ -187,25 +187,15 @@ def base_in_world(body: Body, motion: Motion) -> tuple[Array, float]:
     names = [name for name in motion.joint_names if name in body.landmark_names]
     wanted = motion.joints[known][:, [motion.joint_names.index(name) for name in names]]
     ours = body.points(motion.poses[known], names=names)
-    root = fitted(ours.reshape(-1, 3), wanted.reshape(-1, 3))
+    root = align(ours.reshape(-1, 3), wanted.reshape(-1, 3)).matrix
     off = _off(root, ours, wanted)
     if off > JOINT_TOLERANCE:
-        some = np.stack([fitted(a, b) for a, b in zip(ours, wanted)])
+        some = align(ours, wanted).matrix
         off, root = _off(some, ours, wanted), np.tile(np.eye(4), (len(motion), 1, 1))
         root[known] = some
     return root, off
 
 
-def fitted(points: Array, targets: Array) -> Array:
-    """The rigid transform (4, 4) that brings points (N, 3) as near to targets (N, 3) as can be (Kabsch 1976)."""
-    a, b = points.mean(0), targets.mean(0)
-    U, _, V = np.linalg.svd((points - a).T @ (targets - b))
-    R = V.T @ np.diag([1, 1, np.sign(np.linalg.det(V.T @ U.T))]) @ U.T
-    return rigid(R, b - R @ a)
-
-
 def _off(root: Array, points: Array, targets: Array) -> float:
     moved = points @ np.swapaxes(root[..., :3, :3], -1, -2) + root[..., None, :3, 3]
     return float(np.linalg.norm(moved - targets, axis=2).max())
-
-

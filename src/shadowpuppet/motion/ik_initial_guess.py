@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.angles import angles_over_time
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array, rotation_about, unit
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.plausibility import SIDES, leftward, midpoint, positions_of
+from shadowpuppet.motion.plausibility import leftward, midpoint, positions_of
 
 STRAIGHT = 0.15
 """Where the sine of a bend is under this, a limb's turn about itself is rather what it would be without any."""

@@ -14,15 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.anthropometry import shares_of, stature_of, whole_sizes_from_bones
-from shadowpuppet.body.models import make_body
+from shadowpuppet.body.anthropometry import stature_of
+from shadowpuppet.body.models import WHOLE, make_body, shares_of, sizes_kind, whole_sizes_from_bones
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import MIN_SIZE, WHOLE, BoneSizes, sizes_kind
+from shadowpuppet.body.sizes import MIN_SIZE, BoneSizes
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.ik_initial_guess import initial_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.plausibility import SIDES, check_person, positions_of
+from shadowpuppet.motion.plausibility import check_person, positions_of
 
 OUTLIER = 0.1
 """A joint farther from the body than this (m) pulls ever less: it was measured wrongly."""

@@ -6,11 +6,11 @@ import warnings
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array, unit
 from shadowpuppet.motion.motion import JointTable
 
-SIDES = ("left", "right")
 NEEDED_JOINTS = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "knee") for side in SIDES)
 """Joints without which a pose of the whole body says little; and the pelvis or both hips."""
 TRUNK_LENGTH = (0.2, 0.8)

@@ -9,7 +9,8 @@ from itertools import chain, islice
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.sizes import WHOLE, CardboxSizes
+from shadowpuppet.body.models import WHOLE
+from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError

@@ -6,11 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from people import camera, random_poses
+from people import BODIES, camera, random_poses
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePrior, sizes_from_height
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.person import wrong_posture

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from people import camera, picture
+from people import BODIES, camera, picture
 
 from shadowpuppet.body.segments import coarse_arms, parts_of
-from shadowpuppet.body.upper_body import BODIES, SIDES
+from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.silhouette_cost import Observation
 

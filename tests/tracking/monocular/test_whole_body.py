@@ -9,9 +9,8 @@ import pytest
 from people import camera
 
 from shadowpuppet.body.anthropometry import sizes_from_height
-from shadowpuppet.body.models import average_sizes, make_body, whole_from_upper
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body, whole_from_upper
 from shadowpuppet.body.segments import keep_limb_directions
-from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.pipeline.options import Options

@@ -6,7 +6,7 @@ import actor
 import numpy as np
 import pytest
 
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE
 from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import Evidence, Stage
 from shadowpuppet.tracking.multiview.pose_search import HEADINGS, placed, search

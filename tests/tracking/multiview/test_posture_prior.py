@@ -8,7 +8,7 @@ import actor
 import numpy as np
 import pytest
 
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE
 from shadowpuppet.tracking.multiview.posture_prior import ARMS, BOUND, LEAST, LEGS, SEEN, WIDER, Usual, usual_arms, usual_postures
 from shadowpuppet.tracking.multiview.proposals import GLOBAL_DOFS
 

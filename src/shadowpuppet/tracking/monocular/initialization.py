@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
-from shadowpuppet.body.models import Make, make_body
-from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, WHOLE, BoneSizes, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.body.models import WHOLE, Make, make_body
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, BoneSizes, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.camera.rasterize import place

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from shadowpuppet.body.models import BodyName
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
 
@@ -36,7 +37,7 @@ class PartSettings:
 class MonocularSettings:
     """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
-    body: Literal["cardbox", "boxes", "rounded", "anatomical", "cylinders"] = "rounded"
+    body: BodyName = "rounded"
     """The body's model: of the upper body (the first three), or of the whole person, legs and all."""
     resampling: Literal["deterministic", "stratified", "systematic", "multinomial", "residual"] = "deterministic"
     """DRS (Algorithm 4), SRS (Algorithm 3), or another scheme in SRS's place."""
@@ -66,7 +67,7 @@ class MonocularSettings:
     motion_reach: Positive = 0.3
     """From about this distance on (m) the pull grows no more: what plainly moved farther is found there."""
     posture_weight: NonNegative = 20.0
-    """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.strain`)."""
+    """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.posture_penalty`)."""
     limits: bool = True
     """Whether joint limits are kept."""
     recover: bool = True

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.anthropometry import SizePrior
-from shadowpuppet.body.models import Make, make_body
+from shadowpuppet.body.models import MODELS, Make, make_body
 from shadowpuppet.body.sizes import CardboxSizes, Sizes
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture, place
@@ -66,9 +65,9 @@ class LinearBodies:
     """Many people at once: joints and shapes of a body are linear in the sizes, so that none need be built for each hypothesis."""
 
     def __init__(self, body: str | Make) -> None:
-        """`body`: one of `BODIES`, or a function of the 18 sizes. Raises `ShadowPuppetError` for one that is not linear in them."""
+        """`body`: the name of an upper body, or a function of the 18 sizes. Raises `ShadowPuppetError` for one that is not linear in them."""
         some, step = np.full(len(SIZE_NAMES), 0.1), 0.01
-        self.make = BODIES[body] if isinstance(body, str) else body
+        self.make = MODELS[body].make if isinstance(body, str) else body
         self.body = self.make(CardboxSizes.from_array(some))
         self.slopes: list[Array] = []
         moved = [self._measures(some + step * unit) for unit in np.eye(len(some))]
@@ -145,7 +144,7 @@ class SizeSearch:
         sizes, shift, poses = Unknowns.of(vectors, self.dofs)
         total = self.weight * self.prior.penalty(sizes)
         for k in pictures:
-            total += self.strain * self.bodies.body.skeleton.strain(poses[:, k])
+            total += self.strain * self.bodies.body.skeleton.posture_penalty(poses[:, k])
             total += self.bodies.costs(self.camera, self.T_camera_base, observations[k], poses[:, k], sizes, shift)
         return total
 
