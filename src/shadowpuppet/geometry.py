@@ -175,7 +175,8 @@ def clear_order(rotations: Array) -> str:
 
 
 def smoothest_path(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
-    """The path (T, 3) through candidates (T, K, 3) of least squared steps plus own costs (T, K) (Viterbi 1967). `wraps` (3,): periodic axes."""
+    """The path (T, 3) through candidates (T, K, 3) of least squared steps plus own costs (T, K) (Viterbi 1967). `wraps` (3,): which axes
+    are periodic."""
     steps = candidates[1:, None, :] - candidates[:-1, :, None]
     steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
     between = (steps**2).sum(3)

@@ -1,4 +1,4 @@
-"""Rotations of joints to the angles of their degrees of freedom."""
+"""Rotations of joints to the values of their degrees of freedom."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from shadowpuppet.geometry import Array, euler_angles, smoothest_path, unit
 
 
 def rotation_angles(rotations: Array, dofs: Sequence[Dof]) -> Array:
-    """Values (N, 3) of three DOF that make rotations (N, 3, 3), each on the branch that is best within the limits."""
+    """Values (N, 3) of three DOF that make rotations (N, 3, 3); of the possible triples the one that exceeds the limits least."""
     candidates, low, high = _candidates(rotations, dofs)
     return candidates[np.arange(len(candidates)), _excess(candidates, low, high).argmin(1)]
 
 
 def angles_over_time(rotations: Array, dofs: Sequence[Dof]) -> Array:
-    """Values (T, 3) of three DOF that make rotations (T, 3, 3), on the branch that limits and neighbours in time want."""
+    """Values (T, 3) of three DOF that make rotations (T, 3, 3): the smoothest path that keeps near the limits."""
     candidates, low, high = _candidates(rotations, dofs)
     free = ~np.isfinite(low)
     values = smoothest_path(candidates, _excess(candidates, low, high), wraps=free)
@@ -26,7 +26,8 @@ def angles_over_time(rotations: Array, dofs: Sequence[Dof]) -> Array:
 
 
 def _candidates(rotations: Array, dofs: Sequence[Dof]) -> tuple[Array, Array, Array]:
-    """Both triples of values (N, 2, 3) that make rotations (N, 3, 3), each angle in the turn about its limits' middle; and the limits."""
+    """Both triples of values (N, 2, 3) that make rotations (N, 3, 3), each angle within half a turn of its limits' middle; and the
+    limits."""
     from scipy.spatial.transform import Rotation
 
     low, high = np.array([dof.low for dof in dofs]), np.array([dof.high for dof in dofs])
@@ -42,6 +43,6 @@ def _candidates(rotations: Array, dofs: Sequence[Dof]) -> tuple[Array, Array, Ar
 
 
 def _excess(candidates: Array, low: Array, high: Array) -> Array:
-    """Squared excess (N, K) of candidates (N, K, 3) over limits; of those within them the small are a little better."""
+    """Squared excess (N, K) of candidates (N, K, 3) over the limits, and a small preference for small angles."""
     over = np.maximum(low - candidates, 0) + np.maximum(candidates - high, 0)
     return (np.where(np.isfinite(over), over, 0) ** 2).sum(2) + 1e-6 * (candidates**2).sum(2)

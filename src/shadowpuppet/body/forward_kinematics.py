@@ -1,4 +1,4 @@
-"""Forward kinematics of a block of poses side by side: kernels that know trees of joints as arrays only."""
+"""Forward kinematics of blocks of poses: kernels on trees of joints as arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DOF_KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
 
 @device
 def sines(angles, sine, cosine):  # pragma: no cover
-    """Sine and cosine (B,) of angles (B,), right to the last bit or two for angles under 1e5 rad; the C library's do not vectorise."""
+    """Sine and cosine (B,) of angles (B,), to the last bit or two for angles under 1e5 rad; the C library's do not vectorise."""
     s0, s1, s2, s3, s4, s5 = _SINE
     c0, c1, c2, c3, c4, c5 = _COSINE
     for n in range(angles.size):
@@ -37,7 +37,7 @@ def sines(angles, sine, cosine):  # pragma: no cover
 
 @device
 def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no cover
-    """The transforms (3, 4, B) of joint `j` before its DOF: its parent's, shifted by its offset (3, B), which follows its couplings."""
+    """Transforms (3, 4, B) of joint `j` before its DOF: the parent's, shifted by the joint's offset (3, B) and couplings."""
     parent, coupled, shifts = tree[0][j], tree[5], tree[6]
     own, last = T[j], poses.shape[0] - 1
     for r in range(3):
@@ -63,10 +63,10 @@ def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no
 
 @kernel
 def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma: no cover
-    """Transforms of `joints` in a block T (J, 3, 4, B), of the B poses from `begin` on (the last again where they end).
+    """Transforms of `joints` into a block T (J, 3, 4, B), for B poses from `begin` on; past the end the last pose is repeated.
 
-    Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Called with
-    arguments of the same types from everywhere (all joints are `tree[7]`, no range), it is compiled once.
+    Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Always
+    called with arguments of the same types (all joints are `tree[7]`, no range), so that it is compiled once.
     """
     first, axes, signs, kinds = tree[1], tree[2], tree[3], tree[4]
     value, sine, cosine = work[3], work[4], work[5]
@@ -92,7 +92,7 @@ def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma:
 
 @device
 def _turn(T, a, b, sine, cosine):  # pragma: no cover
-    """Columns a and b of transforms (3, 4, B) turned by angles (B,)."""
+    """Rotate columns a and b of transforms (3, 4, B) by angles (B,)."""
     for r in range(3):
         u, v = T[r, a], T[r, b]
         for n in range(sine.size):
@@ -102,10 +102,10 @@ def _turn(T, a, b, sine, cosine):  # pragma: no cover
 
 @device
 def _turn_by_vector(T, work):  # pragma: no cover
-    """Transforms (3, 4, B) turned by rotation vectors, the first rows of `work` (6, B): Rodrigues' formula, row by row.
+    """Rotate transforms (3, 4, B) by the rotation vectors in the first rows of `work` (6, B): Rodrigues' formula, row by row.
 
-    A row w becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle: no digits are lost
-    near zero.
+    A row w becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle, which loses no
+    digits near zero.
     """
     u, v, w, half, sine, cosine = work[0], work[1], work[2], work[3], work[4], work[5]
     for n in range(half.size):
@@ -124,7 +124,7 @@ def _turn_by_vector(T, work):  # pragma: no cover
 
 @device
 def load_joints(transforms, begin, T):  # pragma: no cover
-    """Transforms (N, J, 3, 4) from `begin` on, as far as there are any, into a block (J, 3, 4, B)."""
+    """Copy transforms (N, J, 3, 4) from `begin` on into a block (J, 3, 4, B)."""
     for n in range(min(T.shape[3], transforms.shape[0] - begin)):
         for j in range(T.shape[0]):
             for r in range(3):
@@ -134,7 +134,7 @@ def load_joints(transforms, begin, T):  # pragma: no cover
 
 @kernel
 def place_all(poses, joints, tree, offsets, root, out, T, work):  # pragma: no cover
-    """Transforms of `joints` into `out` (N, J, 3, 4), which holds those of the others. Room: T (J, 3, 4, B), work (6, B)."""
+    """Transforms of `joints` into `out` (N, J, 3, 4), which holds those of the others. Work arrays: T (J, 3, 4, B), work (6, B)."""
     for begin in range(0, poses.shape[0], T.shape[3]):
         load_joints(out, begin, T)
         place_joints(poses, begin, joints, tree, offsets, root, T, work)
@@ -147,7 +147,7 @@ def place_all(poses, joints, tree, offsets, root, out, T, work):  # pragma: no c
 
 @kernel
 def place_points(poses, tree, offsets, root, joints, places, out, T, work):  # pragma: no cover
-    """Points (N, P, 3) at `places` (P, 3) in the frames of `joints` (P,). Room: T (J, 3, 4, B), work (6, B)."""
+    """Points (N, P, 3) at `places` (P, 3) in the frames of `joints` (P,). Work arrays: T (J, 3, 4, B), work (6, B)."""
     for begin in range(0, poses.shape[0], T.shape[3]):
         place_joints(poses, begin, tree[7], tree, offsets, root, T, work)
         for i in range(joints.size):

@@ -1,4 +1,4 @@
-"""Torso, arms and legs of a body: the joints, degrees of freedom and parts of each, and coarse postures of a limb."""
+"""Torso, arms and legs of a body: their joints, degrees of freedom and parts, and coarse postures of a limb."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ def _both(torso: tuple[str, ...], arm: tuple[str, ...], leg: tuple[str, ...]) ->
 
 
 SEGMENT_JOINTS = _both(("pelvis", "torso", "chest", "head"), ("shoulder", "elbow"), ("hip", "knee", "ankle"))
-"""Joints that a member may have."""
+"""Joints that each segment may have."""
 PULLED_POINTS = _both(("left_shoulder", "right_shoulder"), ("elbow", "hand"), ("knee", "ankle"))
-"""Points by which each member is held where it was."""
+"""Landmarks by which the motion cost pulls each segment to where it was."""
 UNOBSERVED_DOFS = ("root_x",)
-"""DOF that one camera's silhouettes do not tell: how far away the person is stays as it was found."""
+"""DOF that one camera's silhouettes do not show: the person's distance is kept as it was found."""
 
 
 def segments_of(skeleton: Skeleton) -> tuple[str, ...]:
-    """The members that a skeleton has."""
+    """The segments that a skeleton has: torso, arms, legs."""
     return tuple(name for name, joints in SEGMENT_JOINTS.items() if set(joints) & set(skeleton.joint_names))
 
 
@@ -38,25 +38,25 @@ def limbs_of(skeleton: Skeleton) -> tuple[str, ...]:
     return tuple(name for name in segments_of(skeleton) if name != "torso")
 
 
-def dofs_of(skeleton: Skeleton, member: str) -> NDArray[np.int64]:
-    """Indices of a member's DOF that are sought in silhouettes."""
-    return np.flatnonzero([dof.joint in SEGMENT_JOINTS[member] and dof.name not in UNOBSERVED_DOFS for dof in skeleton.dofs])
+def dofs_of(skeleton: Skeleton, segment: str) -> NDArray[np.int64]:
+    """Indices of a segment's DOF, without `UNOBSERVED_DOFS`."""
+    return np.flatnonzero([dof.joint in SEGMENT_JOINTS[segment] and dof.name not in UNOBSERVED_DOFS for dof in skeleton.dofs])
 
 
-def parts_of(body: Body, member: str) -> list[str]:
-    """Names of the parts that lie wholly on a member."""
-    joints = [i for i, name in enumerate(body.skeleton.joint_names) if name in SEGMENT_JOINTS[member]]
+def parts_of(body: Body, segment: str) -> list[str]:
+    """Names of the body parts that lie wholly on a segment."""
+    joints = [i for i, name in enumerate(body.skeleton.joint_names) if name in SEGMENT_JOINTS[segment]]
     inside = np.flatnonzero(np.isin(body.shapes.joints, joints).all(1))
     return list(dict.fromkeys(body.parts[shape] for shape in inside))
 
 
 def coarse_limbs(skeleton: Skeleton, limb: str) -> Array:
-    """Postures (K, d) of an arm or leg, rad, all over its range, in its own DOF. Made once, read-only."""
+    """Coarse postures (K, d) of an arm or leg over its whole range, rad, in its own DOF. Cached, read-only."""
     return _coarse(tuple(skeleton.dofs[d] for d in dofs_of(skeleton, limb)))
 
 
 def keep_limb_directions(skeleton: Skeleton, before: Array, poses: Array, limbs: Iterable[str]) -> Array:
-    """Poses (N, D) with some limbs turned in their first joint so that they point as in the pose `before` (D,), as far as limits allow."""
+    """Poses (N, D) with some limbs turned in their first joint so that they point as in the pose `before` (D,), within limits."""
     poses, (low, high) = poses.copy(), skeleton.limits
     for limb in limbs:
         joint = skeleton.joint_index(SEGMENT_JOINTS[limb][0])
@@ -71,7 +71,7 @@ def keep_limb_directions(skeleton: Skeleton, before: Array, poses: Array, limbs:
 
 @cache
 def coarse_arms() -> Array:
-    """Arms (K, 4), rad, of upper bodies: abduction, forward, roll, flexion. A straight arm has no roll. Made once, read-only."""
+    """Coarse arms (K, 4) of upper bodies, rad: abduction, forward, roll, flexion. A straight arm has no roll. Cached, read-only."""
     bent = [(roll, flexion) for roll in (-80, -40, 0, 45, 90) for flexion in (45, 90, 130)]
     arms = np.radians([(*shoulder, *elbow) for shoulder in product((0, 20, 45, 70, 90, 110, 135, 165), (0, 40, 80))
                        for elbow in ((0, 5), *bent)])  # fmt: skip
@@ -81,7 +81,7 @@ def coarse_arms() -> Array:
 
 @cache
 def _coarse_legs() -> Array:
-    """Legs (K, 4), rad: abduction, forward, twist, flexion of the knee."""
+    """Coarse legs (K, 4), rad: abduction, forward, twist, flexion of the knee."""
     return np.radians(list(product((-5, 5, 20, 45), (-25, 0, 25, 55, 90), (0, 35), (5, 40, 80, 115))))
 
 
@@ -105,4 +105,4 @@ BONES = (
     ("pelvis", "left_hip"), ("left_hip", "left_knee"), ("left_knee", "left_ankle"),
     ("pelvis", "right_hip"), ("right_hip", "right_knee"), ("right_knee", "right_ankle"),
 )
-"""Pairs of joints with a bone between them."""
+"""Pairs of landmarks joined by a bone."""
