@@ -69,7 +69,7 @@ def sample(rng: np.random.Generator, cost: Callable[[Array], Array], side: int, 
 
 
 def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose: Array, weight: float, temperature: float) -> Array:
-    """Mean places (6, 3) of the joints of `metrics.UPPER`, world: both arms sampled in turn, the torso as in `pose` (D,)."""
+    """Mean places (6, 3) of the joints of `metrics.UPPER_JOINTS`, world: both arms sampled in turn, the torso as in `pose` (D,)."""
     skeleton, pose = picture.body.skeleton, pose.copy()
     observation, places = Observation.without_legs(mask, picture, pose), {}
     for sweep, side in ((sweep, side) for sweep in range(SWEEPS) for side in SIDES):

@@ -98,7 +98,7 @@ def test_what_is_nearer_hides_what_is_behind(body, behind):
     image = np.zeros((120, 160, 3), np.uint8)
     draw_model(image, picture, pose)
     both = image[arm & torso].astype(float)
-    hues = np.array([drawing.SIDES["left"], drawing.MIDDLE], float)
+    hues = np.array([drawing.SIDE_COLOURS["left"], drawing.MIDDLE_COLOUR], float)
     nearest = (both @ (hues / np.linalg.norm(hues, axis=1, keepdims=True)).T).argmax(1)
     assert len(nearest) > 40
     assert (nearest == behind).mean() > 0.85

@@ -133,7 +133,7 @@ def test_the_truth_itself_has_no_error():
 def test_plane_and_depth_make_up_the_distance_and_turn_with_the_world(pair, vector):
     """A camera that turns with the world sees the same."""
     run, truth = pair
-    level = Camera("cam", (4, 4), [[1, 0, 0], [0, 1, 0], [0, 0, 1]], T_camera_world=rigid(metrics.LEVEL, [1, 2, 3]))
+    level = Camera("cam", (4, 4), [[1, 0, 0], [0, 1, 0], [0, 0, 1]], T_camera_world=rigid(metrics.LEVEL_CAMERA, [1, 2, 3]))
     T = rigid(rotation_from_vector(vector), np.zeros(3))
     turned = Camera("cam", (4, 4), level.matrix, T_camera_world=level.T_camera_world @ np.linalg.inv(T))
     moved = [JointTable(t.times, t.names, transform(T, t.positions)) for t in pair]

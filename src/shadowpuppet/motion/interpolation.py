@@ -1,4 +1,4 @@
-"""Times at a constant rate, which some files have instead of times."""
+"""Motion at a constant rate: uniform sampling times of a film, and resampling by splines."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 
 FRAME_TOLERANCE = 0.2
-"""Share of a step by which a frame may lie off its place: films' times are rounded to milliseconds, cameras' tremble."""
+"""Share of a step by which a frame may lie off a uniform time: films' times are rounded to milliseconds, cameras' jitter."""
 MAX_FRAMES = 10_000_000
-"""Frames; so many make no motion."""
+"""Upper bound of the number of frames."""
 SINGLE_FRAME_RATE = 30.0
-"""Frames/s of one frame."""
+"""Rate (frames/s) of a single frame."""
 
 
 class UniformSampling(NamedTuple):
-    """Times that are a step apart, and the frames that belong to them."""
+    """Uniform times, and the frames at them."""
 
     rate: float
     """Frames/s."""
     times: Array
     """Seconds, of shape (K,)."""
     frames: NDArray[np.int64] | None
-    """The frame of each time (K,), -1 where there is none; None: frames lie between, and values must be found anew."""
+    """The frame at each time (K,), -1 where it is missing; None if frames lie between the times and values must be interpolated."""
 
 
 def uniform_sampling(times: ArrayLike) -> UniformSampling:
-    """Times a step apart that go through frames at times (T,), seconds: those of a film with frames missing, or of their median step.
+    """Uniform times through frames at times (T,), seconds: those of a film with frames missing, else in steps of their median.
 
-    Raises `ShadowPuppetError` where there is no frame, or far too many would be missing.
+    Raises `ShadowPuppetError` without any frame, or if far too many would be missing.
     """
     times = np.asarray(times, float)
     if len(times) < 2:
@@ -55,19 +55,19 @@ def uniform_sampling(times: ArrayLike) -> UniformSampling:
 
 
 def _rounded(rate: float) -> float:
-    """A rate as it was meant, where it is nearly that of films: 29.97 for 29.97003."""
+    """A rate to six digits: 29.97 for 29.97003."""
     return float(f"{rate:.6g}")
 
 
 END_TOLERANCE = 1e-6
-"""Share of a step by which the last new time may lie past the end, for rounding's sake."""
+"""Share of a step by which the last new time may exceed the end, for rounding."""
 
 
 def resample(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
-    """Times (K,), a step of 1 / rate apart from the first on, and the values (K, ...) there of values (T, ...) at times (T,), seconds.
+    """Times (K,) at `rate` from the first on, and values (K, ...) there, of values (T, ...) at times (T,), seconds.
 
-    By cubic splines through what is known; not a number where either neighbour in time is none. Angles must have been unwrapped.
-    Nothing is smoothed: what is faster than half the new rate is not taken out. Raises `ShadowPuppetError`.
+    Cubic splines through runs of known values; not a number between unknown ones. Angles must be unwrapped. Frequencies above half the
+    new rate are not filtered out. Raises `ShadowPuppetError`.
     """
     times, values = np.asarray(times, float), np.asarray(values, float)
     if times.ndim != 1 or not len(times) or len(times) != len(values) or not (np.diff(times) > 0).all() or not np.isfinite(times).all():
@@ -81,13 +81,13 @@ def resample(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, A
 
 
 def resample_table(table: JointTable, rate: float) -> JointTable:
-    """Joints at another frame rate; see `resampled`."""
+    """A joint table at another frame rate; see `resample`."""
     times, positions = resample(table.times, table.positions, rate)
     return JointTable(times, table.names, positions)
 
 
 def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
-    """Values (T,) at wanted times (K,): a spline for each run of known ones."""
+    """Values (T,) at wanted times (K,), by one spline for each run of known values."""
     from scipy.interpolate import make_interp_spline
 
     out = np.full(len(wanted), np.nan)
@@ -100,6 +100,6 @@ def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
 
 
 def _runs(known: ArrayLike) -> list[tuple[int, int]]:
-    """Starts and ends of the runs of what is true in (T,)."""
+    """Starts and ends of the runs of true values in (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], np.asarray(known, bool), [False]]).astype(int)))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
