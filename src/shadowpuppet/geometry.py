@@ -33,10 +33,8 @@ def rotation_from_vector(vector: ArrayLike) -> Array:
 
 
 def vector_from_rotation(R: ArrayLike) -> Array:
-    """Rotation vector (3,), radians, at most pi long, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`.
-
-    Uses the best-fitting quaternion (Bar-Itzhack 2000), which stays exact near half a turn, where sines vanish.
-    """
+    """Rotation vector (3,), radians, at most pi long, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`. Uses the
+    best-fitting quaternion (Bar-Itzhack 2000), which stays exact near half a turn, where sines vanish."""
     (a, b, c), (d, e, f), (g, h, i) = np.asarray(R, float)
     K = np.array([[a - e - i, b + d, c + g, h - f], [b + d, e - a - i, f + h, c - g], [c + g, f + h, i - a - e, d - b],
                   [h - f, c - g, d - b, a + e + i]])
@@ -93,11 +91,9 @@ class Alignment(NamedTuple):
 
 
 def align(points: ArrayLike, targets: ArrayLike, scaled: bool = False) -> Alignment:
-    """The rotation, translation and, if `scaled`, scale that bring points (..., P, 3) nearest to targets, by least squares (Kabsch 1976).
-
-    Leading axes are aligned independently. Pairs that are not finite are left out; with fewer than three left the result is not a
-    number. The rotation is never a reflection.
-    """
+    """The rotation, translation and, if `scaled`, scale that bring points (..., P, 3) nearest to targets, by least squares (Kabsch
+    1976). Leading axes are aligned independently. Pairs that are not finite are left out; with fewer than three left the result is not a
+    number. The rotation is never a reflection."""
     points, targets = np.asarray(points, float), np.asarray(targets, float)
     known = (np.isfinite(points) & np.isfinite(targets)).all(-1, keepdims=True)
     count = known.sum(-2)
@@ -123,10 +119,8 @@ GIMBAL_COSINE = 1e-7
 
 
 def euler_angles(R: Array, axes: Sequence[int]) -> Array:
-    """Angles (N, 3), rad, about three different axes, each as turned by those before, that make rotations (N, 3, 3).
-
-    The middle angle is within a quarter turn. In gimbal lock the first angle is zero.
-    """
+    """Angles (N, 3), rad, about three different axes, each as turned by those before, that make rotations (N, 3, 3). The middle angle is
+    within a quarter turn. In gimbal lock the first angle is zero."""
     i, j, k = axes
     e = 1 if (j - i) % 3 == 1 else -1
     second = np.arcsin(np.clip(e * R[:, i, k], -1, 1))
@@ -141,11 +135,9 @@ def _singular(R: Array, axes: Sequence[int]) -> NDArray[np.bool_]:
 
 
 def continuous_angles(rotations: Array, order: str, limits: ArrayLike | None = None) -> Array:
-    """Euler angles (T, 3), rad, in `order` that make rotations (T, 3, 3) and change least from frame to frame.
-
-    Two triples of angles, and any whole turns, make each rotation. The path of least steps is taken, so angles may pass half a turn;
-    of equal paths the one that exceeds `limits` (3, 2), rad, least.
-    """
+    """Euler angles (T, 3), rad, in `order` that make rotations (T, 3, 3) and change least from frame to frame. Two triples of angles,
+    and any whole turns, make each rotation. The path of least steps is taken, so angles may pass half a turn; of equal paths the one
+    that exceeds `limits` (3, 2), rad, least."""
     axes = ["XYZ".index(axis) for axis in order]
     low, high = np.reshape([-np.pi, np.pi] * 3 if limits is None else limits, (3, 2)).T
     middle = (low + high) / 2

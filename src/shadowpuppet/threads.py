@@ -15,10 +15,8 @@ THREAD_VARIABLES = (THREADS_VARIABLE, *(f"{library}_NUM_THREADS" for library in 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Context in which BLAS uses one thread.
-
-    Our matrices are small: more threads gain nothing, and on busy cores waiting for one another made the whole seven times slower.
-    """
+    """Context in which BLAS uses one thread. Our matrices are small: more threads gain nothing, and on busy cores waiting for one
+    another made the whole seven times slower."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):

@@ -18,7 +18,8 @@ from shadowpuppet.evaluation.bench import naive_multi as naive
 
 pytestmark = pytest.mark.kernels
 BODIES = {"tree": random_tree(), **{name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}}
-ANGLES = (0.0, 1e-12, 1e-6, 0.99 * SMALL_ANGLE, 1.01 * SMALL_ANGLE, 1e-3, 0.5, 2.0, np.pi - 1e-6, np.pi, np.pi + 1e-6, 5.0, 2 * np.pi - 1e-3)
+ANGLES = (0.0, 1e-12, 1e-6, 0.99 * SMALL_ANGLE, 1.01 * SMALL_ANGLE, 1e-3, 0.5, 2.0, np.pi - 1e-6, np.pi, np.pi + 1e-6, 5.0,
+          2 * np.pi - 1e-3)
 
 
 def turned(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -63,11 +63,9 @@ def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no
 
 @kernel
 def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma: no cover
-    """Transforms of `joints` into a block T (J, 3, 4, B), for B poses from `begin` on; past the end the last pose is repeated.
-
-    Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Always
-    called with arguments of the same types (all joints are `tree[7]`, no range), so that it is compiled once.
-    """
+    """Transforms of `joints` into a block T (J, 3, 4, B), for B poses from `begin` on; past the end the last pose is repeated. Each is
+    the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Always called with
+    arguments of the same types (all joints are `tree[7]`, no range), so that it is compiled once."""
     first, axes, signs, kinds = tree[1], tree[2], tree[3], tree[4]
     value, sine, cosine = work[3], work[4], work[5]
     for j in joints:
@@ -102,11 +100,9 @@ def _turn(T, a, b, sine, cosine):  # pragma: no cover
 
 @device
 def _turn_by_vector(T, work):  # pragma: no cover
-    """Rotate transforms (3, 4, B) by the rotation vectors in the first rows of `work` (6, B): Rodrigues' formula, row by row.
-
-    A row w becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle, which loses no
-    digits near zero.
-    """
+    """Rotate transforms (3, 4, B) by the rotation vectors in the first rows of `work` (6, B): Rodrigues' formula, row by row. A row w
+    becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle, which loses no digits
+    near zero."""
     u, v, w, half, sine, cosine = work[0], work[1], work[2], work[3], work[4], work[5]
     for n in range(half.size):
         half[n] = max(0.5 * np.sqrt(u[n] * u[n] + v[n] * v[n] + w[n] * w[n]), 1e-150)

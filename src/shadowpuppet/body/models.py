@@ -97,10 +97,8 @@ MIN_STOUTNESS, MAX_STOUTNESS = 0.75, 1.35
 
 
 def whole_from_upper(name: str, sizes: CardboxSizes, height: float) -> BoneSizes:
-    """Sizes of a whole body from those of an upper body and the height (m, shoes on).
-
-    Arms and shoulders are taken over; trunk and head are as much wider than average as the upper body's; the rest is average.
-    """
+    """Sizes of a whole body from those of an upper body and the height (m, shoes on). Arms and shoulders are taken over; trunk and head
+    are as much wider than average as the upper body's; the rest is average."""
     kind, stature, fore = sizes_kind(name), height - SOLE, sizes.forearm_length
     assert issubclass(kind, BoneSizes)
     known = {"shoulder_distance": sizes.shoulder_width - 2 * sizes.shoulder_inset, "upper_arm_length": sizes.upper_arm_length,

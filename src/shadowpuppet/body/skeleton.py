@@ -30,9 +30,7 @@ class Joint:
 @dataclass(frozen=True)
 class Dof:
     """A degree of freedom: a rotation about or a translation along an axis of its joint's frame, or a component of a rotation vector.
-
-    The components x, y, z of a rotation vector follow each other; no posture within a full turn is singular.
-    """
+    The components x, y, z of a rotation vector follow each other; no posture within a full turn is singular."""
 
     name: str
     joint: str
@@ -59,11 +57,9 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Joints, parents before children, and degrees of freedom, grouped by joint in the order in which they act.
-
-    A joint's transform is its parent's, times its offset and couplings, times its DOF one after another. A pose is an array (D,) in the
-    order of `dofs`; functions take arrays of poses (N, D).
-    """
+    """Joints, parents before children, and degrees of freedom, grouped by joint in the order in which they act. A joint's transform is
+    its parent's, times its offset and couplings, times its DOF one after another. A pose is an array (D,) in the order of `dofs`;
+    functions take arrays of poses (N, D)."""
 
     joints: tuple[Joint, ...]
     dofs: tuple[Dof, ...]
@@ -150,10 +146,8 @@ class Skeleton:
         return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
 
     def posture_penalty(self, poses: ArrayLike) -> Array:
-        """Penalty (N,) of unusual poses (N, D): squared deviations from rest in units of the spread, each bounded by 9, summed.
-
-        The bound lets a clearly visible posture win, while the term still decides where the image says little.
-        """
+        """Penalty (N,) of unusual poses (N, D): squared deviations from rest in units of the spread, each bounded by 9, summed. The
+        bound lets a clearly visible posture win, while the term still decides where the image says little."""
         rest, below, above = self.rest_and_spread
         off = np.asarray(poses, float) - rest
         squared = (off / np.where(off < 0, below, above)) ** 2
@@ -184,10 +178,8 @@ class Skeleton:
         return out
 
     def forward_some(self, poses: Array, joints: NDArray[np.int64], transforms: Array, root: Array, offsets: Array | None = None) -> None:
-        """Recompute in place only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are used as they are.
-
-        `offsets` (N, J, 3): the joints' offsets of each pose, for people of different sizes.
-        """
+        """Recompute in place only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are used as they are. `offsets` (N,
+        J, 3): the joints' offsets of each pose, for people of different sizes."""
         from shadowpuppet.body.forward_kinematics import place_all
 
         offsets = self.offsets if offsets is None else offsets

@@ -46,11 +46,9 @@ degrees (Ludewig et al. 2009)."""
 
 
 def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleton:
-    """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm.
-
-    The pelvis shifts along Y and twists; the torso turns on it about the middle of its lower edge. With `clavicles` the shoulders follow
-    the arms a little, which is not in the paper.
-    """
+    """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm. The pelvis shifts along Y and twists;
+    the torso turns on it about the middle of its lower edge. With `clavicles` the shoulders follow the arms a little, which is not in
+    the paper."""
     joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
@@ -165,10 +163,8 @@ def boxes(sizes: CardboxSizes) -> Body:
 
 
 def rounded(sizes: CardboxSizes) -> Body:
-    """Hulls of ellipsoids, with neck, sloping shoulders and hands, from the same 18 sizes. Not in the paper.
-
-    Two crossed cards look 0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance.
-    """
+    """Hulls of ellipsoids, with neck, sloping shoulders and hands, from the same 18 sizes. Not in the paper. Two crossed cards look 0.7
+    times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance."""
     s, skeleton = sizes, upper_body_skeleton(sizes, clavicles=True)
     crown = s.torso_height + s.neck_gap + s.head_height
     neck, arm, fore, palm = 0.35 * s.head_width, s.upper_arm_width / 2, s.elbow_width / 2, s.hand_width / 2

@@ -90,9 +90,7 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
 
 def cylinder_skeleton(sizes: CylinderSizes) -> Skeleton:
     """The 25 DOF of Ni 2008 (II): torso 6; head, upper arms and upper legs 3 each, as angles about Y, X, Z; lower arms and legs 1 each.
-
-    With a limb level to the side (abduction 90 degrees) flexion and twist coincide; angles stay unwrapped.
-    """
+    With a limb level to the side (abduction 90 degrees) flexion and twist coincide; angles stay unwrapped."""
     s = sizes
     joints = [Joint("pelvis", None), Joint("head", "pelvis", (0.0, 0.0, s.trunk_height))]
     dofs = [*_root(), *_angles("head", ("y", "x", "z"), ("flexion", "bend", "twist"), ((-70, 75), (-55, 55), (-90, 90)), (0, 0, 0),
@@ -230,11 +228,8 @@ def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
 
 
 def anatomical(sizes: AnatomicalSizes) -> Body:
-    """32 DOF, 17 tapered elliptic limbs.
-
-    Tapers of arms and legs and their offsets from the bone are fractions of the widths, measured on a mesh of a person; the rest of the
-    shape is our own.
-    """
+    """32 DOF, 17 tapered elliptic limbs. Tapers of arms and legs and their offsets from the bone are fractions of the widths, measured
+    on a mesh of a person; the rest of the shape is our own."""
     sides = [limb for limbs in (_arm, _leg) for side in SIDES for limb in limbs(side, sizes)]
     return _body("anatomical", anatomical_skeleton(sizes), [*_trunk(sizes), *sides], _landmarks(sizes, ("chest", sizes.thorax_height)))
 

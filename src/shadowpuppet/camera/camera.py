@@ -19,10 +19,8 @@ REACH_STEPS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A calibrated camera. Axes follow OpenCV: x right, y down, z forward; pixel centres are at integers.
-
-    Raises `CalibrationError`, naming the camera and the field, for impossible values.
-    """
+    """A calibrated camera. Axes follow OpenCV: x right, y down, z forward; pixel centres are at integers. Raises `CalibrationError`,
+    naming the camera and the field, for impossible values."""
 
     name: str
     size: tuple[int, int]
@@ -77,10 +75,8 @@ class Camera:
 
     @classmethod
     def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam") -> Camera:
-        """A level camera at the world's origin, known only by its horizontal field of view (radians).
-
-        The world is the camera's own: x to its right, y along the optical axis, z up.
-        """
+        """A level camera at the world's origin, known only by its horizontal field of view (radians). The world is the camera's own: x
+        to its right, y along the optical axis, z up."""
         if not 0 < fov < np.pi:
             raise CalibrationError(f"camera {name!r}: fov: found {np.degrees(fov):g} degrees, expected between 0 and 180")
         focal = size[0] / (2 * np.tan(fov / 2))
@@ -94,11 +90,9 @@ class Camera:
         return inverse(self.T_camera_world)[:3, 3]
 
     def project(self, points_world: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera.
-
-        Points beyond the lens's `reach` are extrapolated in proportion, as in `projection`: distortion polynomials, fitted inside the
-        picture, turn back there and would map points far outside into it.
-        """
+        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera. Points beyond the lens's `reach`
+        are extrapolated in proportion, as in `projection`: distortion polynomials, fitted inside the picture, turn back there and would
+        map points far outside into it."""
         points = transform(self.T_camera_world, points_world)
         flat = points.reshape(-1, 3)
         ahead = flat[:, 2] > 1e-9

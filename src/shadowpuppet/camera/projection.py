@@ -18,11 +18,8 @@ is valid."""
 
 
 def make_lens(camera: Camera) -> Lens:
-    """A camera as kernels use it.
-
-    Distortion polynomials are fitted inside the picture; somewhere outside they turn back, or mirror, and would draw into the picture
-    what lies far out. Beyond that radius points are extrapolated in proportion.
-    """
+    """A camera as kernels use it. Distortion polynomials are fitted inside the picture; somewhere outside they turn back, or mirror, and
+    would draw into the picture what lies far out. Beyond that radius points are extrapolated in proportion."""
     bends = bool(camera.fisheye or camera.distortion.any())
     return camera.matrix, camera.distortion, camera.fisheye, bends, camera.reach
 
@@ -30,9 +27,7 @@ def make_lens(camera: Camera) -> Lens:
 @kernel
 def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # pragma: no cover
     """Quads (1 or N, S, 4, 3) of a block of joints T (J, 3, 4, B), clipped at the near plane: corners X, Y (S, 5, B), `counts` (S, B).
-
-    Unused corners repeat the last one. `quads` of N people: those from `begin` on. `work`: (12, B).
-    """
+    Unused corners repeat the last one. `quads` of N people: those from `begin` on. `work`: (12, B)."""
     size = X.shape[2]
     for i in range(which.size):
         q, behind = which[i], 0

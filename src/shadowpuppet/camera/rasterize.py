@@ -72,10 +72,8 @@ class Picture:
 
     def polygons(self, transforms: Array, which: NDArray[np.int64],
                  arrays: tuple[Array, ...] | None = None) -> tuple[Array, NDArray[np.int64]]:
-        """Outlines of some shapes: corners (N, S, K, 2), pixels, and their number (N, S), 0 if all is behind the camera.
-
-        `arrays`: those of `Body.shapes` with a leading axis N, for bodies of different sizes.
-        """
+        """Outlines of some shapes: corners (N, S, K, 2), pixels, and their number (N, S), 0 if all is behind the camera. `arrays`: those
+        of `Body.shapes` with a leading axis N, for bodies of different sizes."""
         block = self._block(len(which), min(BLOCK, max(len(transforms), 1)))
         corners = np.empty((len(transforms), len(which), block[1].shape[1], 2))
         counts = np.empty((len(transforms), len(which)), np.int64)
@@ -135,10 +133,8 @@ class Picture:
         return unpack(self.leg_bits(pose, spread), self.camera.size[0])
 
     def leg_bits(self, pose: ArrayLike, spread: float = np.radians(25)) -> Bits:
-        """Bits of the region where the legs of a pose (D,) may be: below the waist's lower edge, widening by `spread` (rad) to each side.
-
-        An upper body ends at the waist, so pixels below say nothing about it. For a body with legs the region is empty.
-        """
+        """Bits of the region where the legs of a pose (D,) may be: below the waist's lower edge, widening by `spread` (rad) to each
+        side. An upper body ends at the waist, so pixels below say nothing about it. For a body with legs the region is empty."""
         width, height = self.camera.size
         if self.body.hem is None:
             return self.empty()
@@ -159,11 +155,8 @@ class Picture:
     def added(self, poses: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits, joints: NDArray[np.int64] | None = None,
               measures: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
         """Change of eq. 2, pixels (N,), by drawing some shapes of poses (N, D) over the mask `fixed`: new pixels outside the silhouette
-        less those inside.
-
-        `joints`: those that move, if not all; the others stay as in the first pose. `measures`: for bodies of different sizes, the
-        joints' offsets (N, J, 3) and the arrays of `Body.shapes` with a leading axis N.
-        """
+        less those inside. `joints`: those that move, if not all; the others stay as in the first pose. `measures`: for bodies of
+        different sizes, the joints' offsets (N, J, 3) and the arrays of `Body.shapes` with a leading axis N."""
         shape = self.empty().shape
         if silhouette.shape != shape or fixed.shape != shape:  # the kernel would write past their ends
             raise ShadowPuppetError(f"masks of {silhouette.shape} and {fixed.shape} words x rows, expected the camera's {shape}")
@@ -200,11 +193,9 @@ class Picture:
 
 
 def place(camera: Camera, distance: float, elevation: float) -> Array:
-    """T_camera_base (4, 4): the frame of Liu 2011's model, X toward the camera, Y to the image's right, Z up.
-
-    Its origin, the middle of the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation` metres
-    above it. Z is the world's up if the camera is oriented, else the camera's own, as in the paper.
-    """
+    """T_camera_base (4, 4): the frame of Liu 2011's model, X toward the camera, Y to the image's right, Z up. Its origin, the middle of
+    the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation` metres above it. Z is the
+    world's up if the camera is oriented, else the camera's own, as in the paper."""
     up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -1.0, 0.0])
     if abs(up[2]) > 0.9:  # it looks straight down or up: its own frame
         up = np.array([0.0, -1.0, 0.0])
@@ -240,11 +231,9 @@ def _project(begin, shapes, which, lens, block):  # pragma: no cover
 
 @kernel
 def _compare(poses, joints, frame, shapes, which, lens, width, masks, block, page, added, drawn):  # pragma: no cover
-    """For each pose the pixels (N,) that its shapes add to the mask `fixed` outside the silhouette, less those inside.
-
-    Joints that do not move stay as in the first pose. `masks`: silhouette and fixed, (C, H) each, and work arrays for outside and
-    inside, (C, rows). `drawn` (N or 0, C, H) receives the drawn masks.
-    """
+    """For each pose the pixels (N,) that its shapes add to the mask `fixed` outside the silhouette, less those inside. Joints that do
+    not move stay as in the first pose. `masks`: silhouette and fixed, (C, H) each, and work arrays for outside and inside, (C, rows).
+    `drawn` (N or 0, C, H) receives the drawn masks."""
     tree, offsets, root = frame
     silhouette, fixed, outside, inside = masks
     words, height = silhouette.shape

@@ -39,11 +39,9 @@ _popcount: Any = np.bitwise_count if config.DISABLE_JIT else _ctpop  # pyright: 
 
 @kernel
 def find_edges(X, Y, counts, width, height, boxes, lines):  # pragma: no cover
-    """Boxes (S, 6, B) and edge lines (S, K, 3, B) of polygons with corners X, Y (S, K, B), `counts` (S, B) of them.
-
-    A box: first row, end of rows, least and greatest x; no rows if nothing is visible. A line: x in the first row of the box's first
-    strip, x increment per row, and its side: negative bounds the polygon on the left, positive on the right, 0 not at all.
-    """
+    """Boxes (S, 6, B) and edge lines (S, K, 3, B) of polygons with corners X, Y (S, K, B), `counts` (S, B) of them. A box: first row,
+    end of rows, least and greatest x; no rows if nothing is visible. A line: x in the first row of the box's first strip, x increment
+    per row, and its side: negative bounds the polygon on the left, positive on the right, 0 not at all."""
     size = X.shape[2]
     for s in range(X.shape[0]):
         x, y, box, count = X[s], Y[s], boxes[s], 0
@@ -92,10 +90,8 @@ def _enclose(x, y, count, box, area):  # pragma: no cover
 
 @device
 def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma: no cover
-    """First pixel and end of each row's span between three lines on the left and three on the right, (3, 2) each: x, x increment per row.
-
-    Rows before `begin` and from `stop` on are empty. `again`: intersect with the spans that are there already.
-    """
+    """First pixel and end of each row's span between three lines on the left and three on the right, (3, 2) each: x, x increment per
+    row. Rows before `begin` and from `stop` on are empty. `again`: intersect with the spans that are there already."""
     x0, x1, x2 = lefts[0, 0], lefts[1, 0], lefts[2, 0]
     s0, s1, s2 = lefts[0, 1], lefts[1, 1], lefts[2, 1]
     y0, y1, y2 = rights[0, 0], rights[1, 0], rights[2, 0]
@@ -112,10 +108,8 @@ def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma:
 
 @device
 def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
-    """Lines (K, 3, B) of polygon `n` sorted into left and right, (K + 3, 2) each; returns the larger number.
-
-    Both sides are padded with lines that bound nothing, to three more than that.
-    """
+    """Lines (K, 3, B) of polygon `n` sorted into left and right, (K + 3, 2) each; returns the larger number. Both sides are padded with
+    lines that bound nothing, to three more than that."""
     nl, nr = 0, 0
     for v in range(lines.shape[0]):
         x, slope, side = lines[v, 0, n], lines[v, 1, n], lines[v, 2, n]
@@ -132,10 +126,8 @@ def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
 
 @inline_kernel
 def draw_outline(s, n, boxes, lines, width, page):  # pragma: no cover
-    """Set the bits of polygon `n` of shape `s` on a page, and extend the page's dirty range.
-
-    A row's span is the intersection of all edges' half planes, so the edges' lines may be extended past their ends.
-    """
+    """Set the bits of polygon `n` of shape `s` on a page, and extend the page's dirty range. A row's span is the intersection of all
+    edges' half planes, so the edges' lines may be extended past their ends."""
     bits, dirty, lefts, rights, first, end = page[0], page[1], page[2][0], page[2][1], page[3][0], page[3][1]
     r0, r1 = np.int64(boxes[s, 0, n]), np.int64(boxes[s, 1, n])
     if r1 <= r0:

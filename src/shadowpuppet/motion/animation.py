@@ -21,11 +21,8 @@ SAME_PLACE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """Joints, parents before children, over time.
-
-    The world is in metres, Z up. The joints' own axes at rest are those of animation files: a person stands along Y and looks along Z.
-    Raises `ShadowPuppetError` for wrong shapes.
-    """
+    """Joints, parents before children, over time. The world is in metres, Z up. The joints' own axes at rest are those of animation
+    files: a person stands along Y and looks along Z. Raises `ShadowPuppetError` for wrong shapes."""
 
     names: tuple[str, ...]
     """Names of the J joints."""
@@ -86,9 +83,7 @@ class Animation:
 
     def at(self, times: ArrayLike) -> Animation:
         """The animation at other times (K,): interpolated along the shortest rotation between known frames, held before and after them.
-
-        Raises `ShadowPuppetError` if no frame is known.
-        """
+        Raises `ShadowPuppetError` if no frame is known."""
         times, frames = np.asarray(times, float), np.flatnonzero(self.known)
         if not len(frames):
             raise ShadowPuppetError("found no frame in which the whole skeleton is known, expected one at least")

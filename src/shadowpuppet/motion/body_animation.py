@@ -170,11 +170,9 @@ def motion_animation(body: Body, motion: Motion) -> tuple[Animation, float]:
 
 
 def base_in_world(body: Body, motion: Motion) -> tuple[Array, float]:
-    """The body's frame in a run's world, aligned to the joints, and the largest distance (m) left.
-
-    One transform (4, 4) for all frames, as for fixed cameras; one for each frame (T, 4, 4) where that does not fit, as after a live run
-    measured the person anew. Raises `ShadowPuppetError` without any pose.
-    """
+    """The body's frame in a run's world, aligned to the joints, and the largest distance (m) left. One transform (4, 4) for all frames,
+    as for fixed cameras; one for each frame (T, 4, 4) where that does not fit, as after a live run measured the person anew. Raises
+    `ShadowPuppetError` without any pose."""
     known = motion.known
     if not known.any():
         raise ShadowPuppetError("found no frame with a pose, expected one at least")

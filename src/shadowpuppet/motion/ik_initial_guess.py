@@ -80,11 +80,9 @@ def _swing(parent: Array, along: Array, up: int) -> Array:
 
 
 def _limb(parent: Array, along: Array, bend: Array) -> Array:
-    """Frames (T, 3, 3) of limbs along unit vectors (T, 3) whose lower segments, along `bend` (T, 3), bend toward +x.
-
-    A straight limb's frame follows the last frame without twist, and slowly returns to the shortest rotation from hanging, which jumps
-    where a limb points straight up.
-    """
+    """Frames (T, 3, 3) of limbs along unit vectors (T, 3) whose lower segments, along `bend` (T, 3), bend toward +x. A straight limb's
+    frame follows the last frame without twist, and slowly returns to the shortest rotation from hanging, which jumps where a limb points
+    straight up."""
     bend = np.where(np.isfinite(bend), bend, 0)
     leftward = bend - (bend * along).sum(1)[:, None] * along
     calm = _swing(parent, along, up=-1)[:, :, 0] * (1 - (parent[:, :, 2] * along).sum(1)).clip(0, 1)[:, None]

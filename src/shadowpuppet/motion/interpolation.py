@@ -31,10 +31,8 @@ class UniformSampling(NamedTuple):
 
 
 def uniform_sampling(times: ArrayLike) -> UniformSampling:
-    """Uniform times through frames at times (T,), seconds: those of a film with frames missing, else in steps of their median.
-
-    Raises `ShadowPuppetError` without any frame, or if far too many would be missing.
-    """
+    """Uniform times through frames at times (T,), seconds: those of a film with frames missing, else in steps of their median. Raises
+    `ShadowPuppetError` without any frame, or if far too many would be missing."""
     times = np.asarray(times, float)
     if len(times) < 2:
         if not len(times):
@@ -64,11 +62,9 @@ END_TOLERANCE = 1e-6
 
 
 def resample(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
-    """Times (K,) at `rate` from the first on, and values (K, ...) there, of values (T, ...) at times (T,), seconds.
-
-    Cubic splines through runs of known values; not a number between unknown ones. Angles must be unwrapped. Frequencies above half the
-    new rate are not filtered out. Raises `ShadowPuppetError`.
-    """
+    """Times (K,) at `rate` from the first on, and values (K, ...) there, of values (T, ...) at times (T,), seconds. Cubic splines
+    through runs of known values; not a number between unknown ones. Angles must be unwrapped. Frequencies above half the new rate are
+    not filtered out. Raises `ShadowPuppetError`."""
     times, values = np.asarray(times, float), np.asarray(values, float)
     if times.ndim != 1 or not len(times) or len(times) != len(values) or not (np.diff(times) > 0).all() or not np.isfinite(times).all():
         raise ShadowPuppetError(f"times: found {times.shape} for values {values.shape}, expected a finite, increasing one for each value")

@@ -116,9 +116,7 @@ def _of_limb(limbs: Limbs, n: int) -> _Patch:
 
 def _tube(radii: Array, length: float, shear: Array, caps: Array) -> tuple[Array, NDArray[np.int64]]:
     """A closed tapered elliptic cylinder along z from the origin, with domes of heights `caps`: points (V, 3) and triangles (F, 3).
-
-    radii (2, 2): of the ellipses at start and end, along x and y; shear (2,): offset of the end along them.
-    """
+    radii (2, 2): of the ellipses at start and end, along x and y; shear (2,): offset of the end along them."""
     falls = np.pi / 2 * np.arange(1, DOME_RINGS) / DOME_RINGS
     start = [(0.0, np.cos(fall), -caps[0] * np.sin(fall)) for fall in falls[::-1]]
     end = [(1.0, np.cos(fall), caps[1] * np.sin(fall)) for fall in falls]

@@ -124,10 +124,8 @@ def accelerations(table: JointTable) -> Array:
 
 
 def jitter(table: JointTable) -> float:
-    """Root mean square acceleration of joints, m/s^2; not a number without three consecutive known frames.
-
-    It includes the motion's own and grows with the frame rate: compare it with that of the truth, or of another run of the film.
-    """
+    """Root mean square acceleration of joints, m/s^2; not a number without three consecutive known frames. It includes the motion's own
+    and grows with the frame rate: compare it with that of the truth, or of another run of the film."""
     squares = (accelerations(table) ** 2).sum(2)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(squares.mean())) if squares.size else np.nan
@@ -143,11 +141,9 @@ def bone_lengths(table: JointTable) -> dict[str, dict[str, float]]:
 
 def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[str] | None = None, *,
              camera: Camera | None = None, start: int = 0, cameras: int = 1) -> dict[str, Any]:
-    """All metrics of a motion, for metrics.json; see `joint_errors` for the arguments.
-
-    Run and truth are compared at common times (`synchronization.at_common_times`), whatever their rates. With several `cameras` costs
-    are m^2, and no errors along or across one camera's axis are given.
-    """
+    """All metrics of a motion, for metrics.json; see `joint_errors` for the arguments. Run and truth are compared at common times
+    (`synchronization.at_common_times`), whatever their rates. With several `cameras` costs are m^2, and no errors along or across one
+    camera's axis are given."""
     run = motion.table
     if truth is not None and len(motion):
         run, truth = at_common_times(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))

@@ -68,11 +68,8 @@ class MotionFrame(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """A tracked motion; `motion[10:20]` is a part of it.
-
-    Unknown values are not a number: poses and joints of lost and absent frames always. Raises `ShadowPuppetError` for wrong shapes,
-    times that do not increase, or an unknown status.
-    """
+    """A tracked motion; `motion[10:20]` is a part of it. Unknown values are not a number: poses and joints of lost and absent frames
+    always. Raises `ShadowPuppetError` for wrong shapes, times that do not increase, or an unknown status."""
 
     body_name: str
     dof_names: tuple[str, ...]
@@ -156,10 +153,8 @@ class MotionBuilder:
         return len(self._status)
 
     def append(self, frame: MotionFrame) -> MotionFrame:
-        """Add a frame, later than those before; returns it as stored: all arrays, blank if lost or absent.
-
-        Raises `ShadowPuppetError`, and adds nothing, for a wrong shape, time or status.
-        """
+        """Add a frame, later than those before; returns it as stored: all arrays, blank if lost or absent. Raises `ShadowPuppetError`,
+        and adds nothing, for a wrong shape, time or status."""
         kept = self._checked(frame)
         self._rows.extend([kept.time, kept.cost, kept.overlap])
         for values in (kept.pose, kept.pose_sd, kept.joints, kept.joint_sd):

@@ -21,10 +21,8 @@ BENT = np.radians(25)
 
 
 def check_person(table: JointTable, source: str = "joints") -> None:
-    """Raise a `ShadowPuppetError` if joints are missing, not in metres, upside down, or left and right are swapped.
-
-    Warns if the trunk lies level most of the time, which suggests that Y is up.
-    """
+    """Raise a `ShadowPuppetError` if joints are missing, not in metres, upside down, or left and right are swapped. Warns if the trunk
+    lies level most of the time, which suggests that Y is up."""
     missing = [name for name in NEEDED_JOINTS if name not in table.names]
     if "pelvis" not in table.names and not {"left_hip", "right_hip"} <= set(table.names):
         missing = ["pelvis (or left_hip and right_hip)", *missing]

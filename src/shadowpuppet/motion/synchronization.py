@@ -29,10 +29,8 @@ OTHER_OFFSET, RIVAL_FACTOR, RIVAL_MARGIN = 0.3, 1.15, 0.01
 
 
 def match(times: ArrayLike, truth_times: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """For each time of the truth (T,) the index of the nearest of `times` (increasing), and whether it is within half a step.
-
-    The step is the truth's median one; a truth of one frame accepts any.
-    """
+    """For each time of the truth (T,) the index of the nearest of `times` (increasing), and whether it is within half a step. The step
+    is the truth's median one; a truth of one frame accepts any."""
     times, truth_times = np.asarray(times, float), np.asarray(truth_times, float)
     index = nearest(times, truth_times)
     half = 0.5 * np.median(np.diff(truth_times)) if len(truth_times) > 1 else np.inf
@@ -46,11 +44,8 @@ def step_of(times: ArrayLike) -> float:
 
 
 def at_times(table: JointTable, times: ArrayLike) -> JointTable:
-    """A table's joints at other times (T,), seconds, increasing, by linear interpolation.
-
-    Not a number where a neighbouring frame lacks the joint, the two are more than 1.5 steps apart, or beyond the ends; there a frame
-    within a tenth of a step is used as it is.
-    """
+    """A table's joints at other times (T,), seconds, increasing, by linear interpolation. Not a number where a neighbouring frame lacks
+    the joint, the two are more than 1.5 steps apart, or beyond the ends; there a frame within a tenth of a step is used as it is."""
     times, own, places = np.asarray(times, float), table.times, table.positions
     if len(own) == 0:
         return JointTable(times, table.names, np.full((len(times), *places.shape[1:]), np.nan))
@@ -67,10 +62,8 @@ def at_times(table: JointTable, times: ArrayLike) -> JointTable:
 
 
 def at_common_times(run: JointTable, truth: JointTable) -> tuple[JointTable, JointTable]:
-    """Both tables at the same times: the truth's, or the run's if the truth has more frames a second.
-
-    Where the run has no frames the truth's times remain, thinned to the run's rate, so that left-out frames count as lost.
-    """
+    """Both tables at the same times: the truth's, or the run's if the truth has more frames a second. Where the run has no frames the
+    truth's times remain, thinned to the run's rate, so that left-out frames count as lost."""
     slow = step_of(run.times)
     if len(run.times) == 0 or not step_of(truth.times) < DENSER_TRUTH * slow < np.inf:
         return at_times(run, truth.times), truth
@@ -96,11 +89,9 @@ class Offset(NamedTuple):
 
 
 def find_offset(run: JointTable, truth: JointTable) -> Offset:
-    """The offset to add to the truth's times so that joints have equal speeds at equal times, in whatever worlds they are.
-
-    Minimises the mean square difference of the shared joints' speeds, over offsets at which half of the shorter motion overlaps; refined
-    between steps; of equally good ones the smallest. Raises `ShadowPuppetError` if no offset stands out.
-    """
+    """The offset to add to the truth's times so that joints have equal speeds at equal times, in whatever worlds they are. Minimises the
+    mean square difference of the shared joints' speeds, over offsets at which half of the shorter motion overlaps; refined between
+    steps; of equally good ones the smallest. Raises `ShadowPuppetError` if no offset stands out."""
     names = [name for name in run.names if name in truth.names]
     ours, theirs = run.select(names), truth.select(names)
     step = max(step_of(run.times), step_of(truth.times))

@@ -39,10 +39,8 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MonocularTracker:
-    """Liu 2011: tracks a body in one camera's silhouettes by a hierarchical particle filter (Algorithm 2).
-
-    Causal: no pose uses a later frame. The same generator state and masks give the same poses.
-    """
+    """Liu 2011: tracks a body in one camera's silhouettes by a hierarchical particle filter (Algorithm 2). Causal: no pose uses a later
+    frame. The same generator state and masks give the same poses."""
 
     picture: Picture
     settings: MonocularSettings = field(default_factory=MonocularSettings)

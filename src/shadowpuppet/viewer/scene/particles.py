@@ -108,7 +108,7 @@ class Rerun:
 
     def _root(self) -> Array:
         """Where the body's frame stands in the world (4, 4)."""
-        known = np.isfinite(self.motion.poses).all(1) & np.isfinite(self.motion.joints).all((1, 2))
+        known = self.motion.known
         if not known.any():
             raise ShadowPuppetError("found no frame with a pose, expected one at least")
         columns = [self.motion.joint_names.index(name) for name in self.names]
