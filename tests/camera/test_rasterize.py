@@ -277,6 +277,18 @@ def test_legs_hang_from_the_waist_and_widen(twist):
     assert widths[-1] - widths[0] == pytest.approx(2 * np.tan(np.radians(25)) * (len(rows) - 1), abs=3)
 
 
+@pytest.mark.parametrize("twist", [1.2, -1.2])
+def test_legs_begin_in_the_middle_of_a_hem_that_is_seen_aslant(twist):
+    view = picture("rounded", camera((200, 220)), distance=1.0, elevation=0.0)
+    pose = view.body.skeleton.pose(torso_twist=twist)
+    T = view.transforms(pose[None])[0, view.body.skeleton.joint_index("pelvis")]
+    hem = view.body.hem
+    assert hem is not None
+    ends = naive.to_pixels(view.camera, hem @ T[:, :3].T + T[:, 3])[:, 1]
+    assert np.ptp(ends) > 8
+    assert abs(np.flatnonzero(view.legs(pose).any(1))[0] - ends.mean()) <= 1
+
+
 def test_legs_out_of_the_picture_or_behind_the_camera_are_nowhere():
     assert not picture(elevation=-2.0).legs(np.zeros(12)).any()
     assert not picture(distance=-2.0).legs(np.zeros(12)).any()

@@ -435,3 +435,53 @@ def test_costs_of_many_sizes_are_those_of_bodies_built_one_by_one(body, rng):
         at = place(CAMERA, 2.8 - shift[n, 0], 0.15 + shift[n, 1])
         alone = Picture(BODIES[body](CardboxSizes.from_array(sizes)), CAMERA, at)
         assert abs(found[n] - silhouette_costs(alone, Observation.of(mask, ignore), poses[n : n + 1])[0]) <= 2
+
+
+# Where a search begins, and how it narrows -----------------------------------------------------------------------------
+
+BRIEF = InitializationSettings(hypotheses=2, rounds=1, sweeps=1)
+"""Hardly any search: what comes back is where it began."""
+
+
+def test_with_a_distance_alone_people_of_all_heights_are_tried():
+    child = PersonEstimate(sizes_from_height(1.2), 1.2, 2.0, -0.2)
+    mask = seen(BODIES["rounded"](child.sizes).skeleton.pose(left_shoulder_abduction=0.3, right_shoulder_abduction=0.2), guess=child)
+    found = find_person(np.random.default_rng(0), CAMERA, [mask], distance=2.0, settings=BRIEF).guess
+    assert found.distance == 2.0
+    assert found.height == pytest.approx(1.2, abs=0.1)
+
+
+def test_arms_over_the_head_are_not_taken_for_the_head():
+    pose = BODIES["rounded"](SOMEONE).skeleton.pose(left_shoulder_abduction=2.8, right_shoulder_abduction=2.8)
+    mask = seen(pose)
+    found = find_person(np.random.default_rng(0), CAMERA, [mask], height=1.78, distance=2.8, settings=BRIEF)
+    assert crown(found.guess) == pytest.approx(crown(TRUE), abs=0.1)
+    assert min(found.overlaps.values()) > 0.6
+
+
+def test_each_sweep_halves_the_noise_and_frees_the_arms_after_the_first(monkeypatch):
+    asked = []
+
+    def search(self, rng, columns, pictures, settings, sigma, scale=True):
+        asked.append((pictures[0], len(columns), sigma))
+        return [1.0]
+
+    monkeypatch.setattr(SizeSearch, "search", search)
+    settings = InitializationSettings(sigma=0.08, sweeps=3)
+    fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=settings)
+    o1, o2, o3 = (len(sizes) + 2 for sizes in SUBSETS.values())  # and up, and the place to the side
+    sizes = [[o1, o2, o3]] + 2 * [[o1 + len(SUBSETS["O3"]), o2, o3]]
+    assert asked == [(k, sizes[sweep][k], 0.08 / 2**sweep) for sweep in range(3) for k in range(3)]
+
+
+def test_a_search_s_noise_shrinks_from_round_to_round(monkeypatch):
+    drawn = []
+    poses = np.array([BODIES["rounded"](SOMEONE).skeleton.pose(**POSTURES["front_t_pose"])])
+    settings = InitializationSettings(hypotheses=2000, share=1.0, shrink=0.5, rounds=4, prior_weight=0.0)
+    search = SizeSearch(CAMERA, [references()["front_t_pose"]], poses, TRUE, SizePrior(1.78), settings, "rounded")
+    monkeypatch.setattr(search, "costs", lambda vectors, *_: (drawn.append(vectors), np.arange(len(vectors), dtype=float))[1])
+    columns = search.columns(["torso_height", "waist_height"])
+    search.search(np.random.default_rng(0), columns, [0], settings, 0.02, scale=False)
+    np.testing.assert_allclose([vectors[1:, columns].std(0).mean() for vectors in drawn], 0.02 * 0.5 ** np.arange(4), rtol=0.05)
+    others = np.setdiff1d(np.arange(drawn[0].shape[1]), columns)
+    assert all((vectors[:, others] == vectors[:1, others]).all() for vectors in drawn)

@@ -38,6 +38,13 @@ def test_the_paper_s_stages_of_four_dof_and_table_i_s_noise():
     assert [s.number for s in (torso, left, right)] == [200] * 3
 
 
+@pytest.mark.parametrize("name", ["torso", "left_arm", FLAT])
+def test_the_paper_s_stages_have_none_of_our_additions(name):
+    assert type(stage(name)) is FilterStage
+    for addition in ({"explore": 1}, {"motion_weight": 1.0}, {"posture_weight": 1.0}, {"estimate": "mean"}):
+        assert type(stage(name, **addition)) is ExtendedStage
+
+
 @pytest.mark.parametrize(("name", "number", "dofs"), [
     (FLAT, 600, 12), ("right_arm+left_arm", 400, 8), (" torso + left_arm ", 400, 8), ("torso+torso", 200, 4),
 ])  # fmt: skip

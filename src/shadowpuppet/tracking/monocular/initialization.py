@@ -133,7 +133,8 @@ def as_whole(camera: Camera, masks: Sequence[Mask], fit: SizeFit, body: str, siz
 
 
 def refine(rng: np.random.Generator, camera: Camera, initial: PersonEstimate, masks: Sequence[Mask], poses: Array, *,
-           free_sizes: bool = True, free_distance: bool = False, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> SizeFit:
+           free_sizes: bool = True, free_distance: bool = False, body: str | Make = "rounded",
+           settings: InitializationSettings | None = None) -> SizeFit:
     """Sizes, place and poses fitted to masks (H, W) in turn, from initial poses (K, D). Bent arms separate sizes that straight arms do
     not (shoulder, upper arm, forearm)."""
     settings = settings or InitializationSettings()

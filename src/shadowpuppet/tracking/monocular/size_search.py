@@ -21,7 +21,6 @@ from shadowpuppet.tracking.monocular.settings import InitializationSettings, pix
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 SIZE_NAMES = CardboxSizes.names()
-MAY_BE_NEGATIVE = ("neck_gap", "shoulder_inset")
 CROTCH_GAP = 1 / 80
 """Height, as a share of the picture's, of a visible gap between the legs: less may be noise."""
 
@@ -182,7 +181,7 @@ class SizeSearch:
     def bound(self, vectors: Array) -> None:
         """Clip sizes to positive values (gap and inset may be negative) and poses to their limits, in place."""
         sizes, _, poses = SearchVector.of(vectors, self.dofs)
-        np.clip(sizes, [-0.15 if name in MAY_BE_NEGATIVE else 0.01 for name in SIZE_NAMES], 1.5, out=sizes)
+        np.clip(sizes, [-0.15 if name in CardboxSizes.offsets() else 0.01 for name in SIZE_NAMES], 1.5, out=sizes)
         np.clip(poses, *self.limits, out=poses)
 
     def overlaps(self) -> list[float]:
