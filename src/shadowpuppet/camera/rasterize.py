@@ -166,7 +166,7 @@ class Picture:
                  measures: tuple[Array, ...] | None = None, drawn: Bits | None = None) -> NDArray[np.int64]:
         tree, offsets, root = self._frame
         frame, shapes = (tree, offsets if measures is None else measures[0], root), self._shapes(measures and measures[1:])
-        joints = self._every if joints is None else joints
+        joints = tree[7] if joints is None else joints
         block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses), np.int64)
         with BUFFER_LOCK:
@@ -182,10 +182,6 @@ class Picture:
             page = make_page(words, height, block[1].shape[1])
             self._rooms[shapes, size] = block, page, (np.zeros_like(page[0]), np.zeros_like(page[0]))
         return self._rooms[shapes, size]
-
-    @cached_property
-    def _every(self) -> NDArray[np.int64]:
-        return np.arange(len(self.body.skeleton.joints))
 
     @cached_property
     def _rooms(self) -> dict[tuple[int, int], tuple]:
