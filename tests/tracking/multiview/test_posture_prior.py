@@ -57,7 +57,7 @@ def test_an_arm_s_postures_are_those_of_the_whole(name):
 def test_what_the_surface_shows_is_never_unusual(name, rng):
     """Arms and legs; nor are place and heading."""
     skeleton = actor.body(name).skeleton
-    usual, pose = Usual.of(skeleton), np.clip(skeleton.usual[0], *skeleton.limits)
+    usual, pose = Usual.of(skeleton), np.clip(skeleton.rest_and_spread[0], *skeleton.limits)
     moved = pose + rng.normal(0, 1, len(pose)) * np.array([dof.joint.startswith(SEEN) or dof.name in GLOBAL_DOFS for dof in skeleton.dofs])
     np.testing.assert_allclose(usual.strain(np.stack([pose, moved])), 0, atol=1e-12)
     for d, dof in enumerate(skeleton.dofs):
