@@ -87,7 +87,7 @@ def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
     from scipy.interpolate import make_interp_spline
 
     out = np.full(len(wanted), np.nan)
-    for start, end in _runs(np.isfinite(values)):
+    for start, end in true_runs(np.isfinite(values)):
         inside = (wanted >= times[start]) & (wanted <= times[end - 1])
         if inside.any():
             spline = make_interp_spline(times[start:end], values[start:end], k=min(3, end - start - 1))
@@ -95,7 +95,7 @@ def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
     return out
 
 
-def _runs(known: ArrayLike) -> list[tuple[int, int]]:
+def true_runs(known: ArrayLike) -> list[tuple[int, int]]:
     """Starts and ends of the runs of true values in (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], np.asarray(known, bool), [False]]).astype(int)))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]

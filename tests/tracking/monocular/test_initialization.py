@@ -196,7 +196,7 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
     here, there = of.vector[None].copy(), of.vector[None].copy()
     there[:, of.columns([], distance=True)[0]] -= farther
     moved = there.copy()
-    of.scale(moved, of.vector)
+    of.scale_with_distance(moved, of.vector)
     assert moved[0, 0] == pytest.approx(SOMEONE.head_width * (2.8 + farther) / 2.8)
     scaled, left, as_it_was = (of.costs(v, range(3), of.observe())[0] for v in (moved, there, here))
     assert left > as_it_was + 1000
