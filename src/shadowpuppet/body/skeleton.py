@@ -70,11 +70,11 @@ class Skeleton:
             names = [each.name for each in named]
             if twice := [name for name in names if names.count(name) > 1]:
                 raise ShadowPuppetError(f"{what} {twice[0]!r}: found {names.count(twice[0])} of this name, expected one")
-        seen: set[str] = set()
+        earlier: set[str] = set()
         for joint in self.joints:
-            if joint.parent is not None and joint.parent not in seen:
+            if joint.parent is not None and joint.parent not in earlier:
                 raise ShadowPuppetError(f"joint {joint.name!r}: its parent {joint.parent!r} must stand before it")
-            seen.add(joint.name)
+            earlier.add(joint.name)
         order = [self.joint_index(dof.joint) for dof in self.dofs]
         if order != sorted(order):
             raise ShadowPuppetError("degrees of freedom must be grouped by joint, in the joints' order")

@@ -83,10 +83,10 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
     points = picture.body.points(pose[None], picture.T_camera_base)[0]
     names = picture.body.landmark_names
     pixels = dict(zip(names, _pixels(picture, points)))
-    seen = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
-    bones = [(seen[a], seen[b], _side(b)) for a, b in BONES if a in seen and b in seen]
+    visible = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
+    bones = [(visible[a], visible[b], _side(b)) for a, b in BONES if a in visible and b in visible]
     joints = {name for bone in BONES for name in bone}
-    dots = [_point(seen[name]) for name in names if name in seen and name in joints]
+    dots = [_point(visible[name]) for name in names if name in visible and name in joints]
     unit = max(1.0, image.shape[0] / 240)
     for extra, dark in ((2, True), (0, False)):  # a dark rim, so that bones stand out from any clothes
         for a, b, colour in bones:

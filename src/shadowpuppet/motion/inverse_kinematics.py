@@ -94,11 +94,11 @@ def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | N
     if body not in WHOLE:
         raise ShadowPuppetError(f"body {body!r}: found a body without legs or none, expected one of {choices(WHOLE)}")
     check_person(joints, source)
-    someone = sizes or whole_sizes_from_bones(sizes_kind(body), _bone_lengths(joints))  # pyright: ignore[reportArgumentType]
-    start = make_body(body, someone)
+    person = sizes or whole_sizes_from_bones(sizes_kind(body), _bone_lengths(joints))  # pyright: ignore[reportArgumentType]
+    start = make_body(body, person)
     table = joints.select([name for name in start.landmark_names if name in joints.names])
-    problem = _Problem(body, table, someone, _observable_sizes(start, someone, table.names) if sizes is None else ())
-    return problem.result(*problem.solve(initial_poses(start, table), someone.to_array()))
+    problem = _Problem(body, table, person, _observable_sizes(start, person, table.names) if sizes is None else ())
+    return problem.result(*problem.solve(initial_poses(start, table), person.to_array()))
 
 
 class _Linear(NamedTuple):
@@ -166,10 +166,10 @@ class _Problem:
 
     def result(self, poses: Array, values: Array) -> FittedPoses:
         """The solution, with unknown frames blanked."""
-        body, seen = self.body(values), self.known.sum(1) > 0
-        places = np.where(seen[:, None, None], self._places(body, poses), np.nan)
+        body, measured = self.body(values), self.known.any(1)
+        places = np.where(measured[:, None, None], self._places(body, poses), np.nan)
         distances = np.where(self.known, np.linalg.norm(places - self.table.positions, axis=2), np.nan)
-        return FittedPoses(self.name, self.kind.from_array(values), self.table.times, np.where(seen[:, None], poses, np.nan),
+        return FittedPoses(self.name, self.kind.from_array(values), self.table.times, np.where(measured[:, None], poses, np.nan),
                            JointTable(self.table.times, self.table.names, places), distances)  # fmt: skip
 
     def _places(self, body: Body, poses: Array) -> Array:

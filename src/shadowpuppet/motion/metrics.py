@@ -149,12 +149,12 @@ def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[s
         run, truth = at_common_times(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))
     errors = None if truth is None else joint_errors(run, truth, joints, camera=camera)
     names = errors.names if errors else joints or default_joints(run, run)
-    said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
+    figures: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
                             "overlap": statistics(motion.overlap), "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
                             "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(motion.table)}
     if truth is not None and errors is not None:
-        said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
-    return said
+        figures |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
+    return figures
 
 
 def _check_joints(names: tuple[str, ...], run: JointTable, truth: JointTable) -> None:
@@ -170,8 +170,8 @@ def _check_joints(names: tuple[str, ...], run: JointTable, truth: JointTable) ->
 
 def _offsets(delta: Array) -> Array:
     """Each frame's mean difference (T, 1, 3) over the known joints."""
-    seen = np.isfinite(delta).all(2, keepdims=True)
-    return np.where(seen, delta, 0).sum(1, keepdims=True) / np.maximum(seen.sum(1, keepdims=True), 1)
+    known = np.isfinite(delta).all(2, keepdims=True)
+    return np.where(known, delta, 0).sum(1, keepdims=True) / np.maximum(known.sum(1, keepdims=True), 1)
 
 
 def _summary(values: dict[str, Array]) -> dict[str, float]:

@@ -75,20 +75,20 @@ def _check_sides(table: JointTable, trunk: Array, source: str) -> None:
         raise ShadowPuppetError(f"{source}: found the left shoulder over the right hip most of the time: have left and right changed "
                                 "places?")
     ahead = np.cross(leftward(table), unit(trunk))
-    wrong, seen = _bends(table, ahead, ("hip", "knee", "ankle"), -1)
+    wrong, bent = _bends(table, ahead, ("hip", "knee", "ankle"), -1)
     what = "knees bend forward"
-    if seen < 20:
-        wrong, seen = _bends(table, ahead, ("shoulder", "elbow", "wrist"), 1, hanging=-unit(trunk))
+    if bent < 20:
+        wrong, bent = _bends(table, ahead, ("shoulder", "elbow", "wrist"), 1, hanging=-unit(trunk))
         what = "the elbows of hanging arms bend backward"
-    if seen >= 20 and wrong > 0.7 * seen:
-        raise ShadowPuppetError(f"{source}: {what} in {wrong} of {seen} places where they are bent: have left and right changed places, "
+    if bent >= 20 and wrong > 0.7 * bent:
+        raise ShadowPuppetError(f"{source}: {what} in {wrong} of {bent} places where they are bent: have left and right changed places, "
                                 "or is the motion mirrored (an axis with the wrong sign)?")
 
 
 def _bends(table: JointTable, ahead: Array, chain: tuple[str, str, str], sign: int, hanging: Array | None = None) -> tuple[int, int]:
     """Counts over frames and sides: how often a chain's middle joint bends against `sign` along `ahead` (T, 3), and how often it is
     bent."""
-    wrong = seen = 0
+    wrong = total = 0
     for side in SIDES:
         a, b, c = (positions_of(table, f"{side}_{name}") for name in chain)
         upper, lower = unit(b - a), unit(c - b)
@@ -96,10 +96,10 @@ def _bends(table: JointTable, ahead: Array, chain: tuple[str, str, str], sign: i
         bent = along < np.cos(BENT)
         if hanging is not None:
             bent &= (upper * hanging).sum(1) > 0.7
-        beside = ((lower - along[:, None] * upper) * ahead).sum(1)
-        bent &= np.abs(beside) > 0.3 * np.sin(BENT)
-        wrong, seen = wrong + int((bent & (beside * sign < 0)).sum()), seen + int(bent.sum())
-    return wrong, seen
+        ahead_bend = ((lower - along[:, None] * upper) * ahead).sum(1)
+        bent &= np.abs(ahead_bend) > 0.3 * np.sin(BENT)
+        wrong, total = wrong + int((bent & (ahead_bend * sign < 0)).sum()), total + int(bent.sum())
+    return wrong, total
 
 
 def _median(values: Array) -> float:
