@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -154,7 +154,7 @@ def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
     return np.arange(len(count)) - (len(theirs) - 1), np.where(enough, errors, np.nan)
 
 
-def nearest(times: Array, wanted: Array) -> NDArray[np.int64]:
+def nearest(times: NDArray[Any], wanted: NDArray[Any]) -> NDArray[np.int64]:
     """Index of the nearest of `times` (increasing) to each wanted one; the earlier of two equally near."""
     after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     before, after = after - 1, np.minimum(after, len(times) - 1)
