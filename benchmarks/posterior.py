@@ -17,7 +17,7 @@ import numpy as np
 from cases import Case
 from proving_ground import HERE, made
 
-from shadowpuppet.body.upper_body import SIDES
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import UPPER_JOINTS
@@ -82,7 +82,7 @@ def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose
             return poses
 
         def cost(arms: Array, put=put, silhouette=silhouette) -> Array:
-            return silhouette(put(arms)) + weight * skeleton.strain(put(arms))
+            return silhouette(put(arms)) + weight * skeleton.posture_penalty(put(arms))
 
         sign = 1 if side == "left" else -1
         arms = sample(rng, cost, sign, skeleton.limits[0][dofs], skeleton.limits[1][dofs], temperature)

@@ -9,7 +9,7 @@ import numpy as np
 
 from papers.ni2008.inputs import Case
 from papers.ni2008.tracks import Track
-from shadowpuppet.body.whole_body import SIDES
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from people import SIZES, random_poses
 
 from shadowpuppet.body.forward_kinematics import sines
-from shadowpuppet.body.skeleton import AXES, Coupling, Dof, Joint, Skeleton
-from shadowpuppet.body.upper_body import SHOULDER_RISE, SIDES, upper_body_skeleton
+from shadowpuppet.body.skeleton import AXES, SIDES, Coupling, Dof, Joint, Skeleton
+from shadowpuppet.body.upper_body import SHOULDER_RISE, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK

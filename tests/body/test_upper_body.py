@@ -14,7 +14,8 @@ from people import BODIES, SIZES, random_poses, shapes_of
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body, Hulls, Quads  # fmt: skip
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.body.upper_body import FOREARM, HAND_POINT, SIDES, TO_TIP, boxes, cardbox, rounded  # fmt: skip
+from shadowpuppet.body.skeleton import SIDES  # fmt: skip
+from shadowpuppet.body.upper_body import FOREARM, HAND_POINT, TO_TIP, boxes, cardbox, rounded  # fmt: skip
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from people import BODIES, camera, picture
 
 from shadowpuppet.body.segments import coarse_arms, parts_of
-from shadowpuppet.body.upper_body import SIDES
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.silhouette_cost import Observation
 
