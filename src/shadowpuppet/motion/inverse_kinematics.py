@@ -166,7 +166,7 @@ class _Problem:
 
     def result(self, poses: Array, values: Array) -> FittedPoses:
         """The solution, with unknown frames blanked."""
-        body, measured = self.body(values), self.known.any(1)
+        body, measured = self.body(values), np.asarray(self.known.any(1))
         places = np.where(measured[:, None, None], self._places(body, poses), np.nan)
         distances = np.where(self.known, np.linalg.norm(places - self.table.positions, axis=2), np.nan)
         return FittedPoses(self.name, self.kind.from_array(values), self.table.times, np.where(measured[:, None], poses, np.nan),

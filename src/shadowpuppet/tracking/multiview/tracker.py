@@ -104,7 +104,7 @@ class MultiviewTracker:
     def search(self, rng: np.random.Generator, evidence: Evidence) -> MultiviewState:
         """A state from nothing but this frame."""
         weigh = self.weigh(evidence)
-        found = pose_search.search_pose(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
+        found = pose_search.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
         state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
         for _ in range(SETTLE_CYCLES):
             state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)
