@@ -4,7 +4,7 @@
 
 Every row is a choice of settings, the same for all recordings. Sizes come from the reference pictures and what recording.toml says;
 no truth and, but for the rows that say so, no exact masks are used. For each seed the person is fitted anew. Errors are means over
-both shoulders, elbows and hands (`metrics.UPPER`), in millimetres; `aligned` is over shoulders, elbows and wrists.
+both shoulders, elbows and hands (`metrics.UPPER_JOINTS`), in millimetres; `aligned` is over shoulders, elbows and wrists.
 """
 
 from __future__ import annotations

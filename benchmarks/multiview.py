@@ -35,7 +35,7 @@ from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
-from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.learn_prior import prior_from_files
 from shadowpuppet.pipeline.options import make_options
@@ -171,7 +171,7 @@ def run(path: Path, name: str, seed: int, folder: Path) -> dict[str, Any]:
 
 def measures(table: JointTable, truth: JointTable) -> dict[str, Any]:
     """Errors over the limb joints, mm, and how many frames of the truth are lost; `parts`: RMSE of both sides' joints."""
-    found = joint_errors(table, truth, LIMBS).summary()
+    found = joint_errors(table, truth, LIMB_JOINTS).summary()
     parts = {part: float(np.sqrt(np.mean([found["joints"][f"{side}_{part}"]["rmse_mm"] ** 2 for side in ("left", "right")])))
              for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")}
     return {"rmse": found["rmse_mm"], "mean": found["mean_mm"], "p95": found["p95_mm"], "max": found["max_mm"], "far": 100 * found["far"],

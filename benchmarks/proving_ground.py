@@ -25,7 +25,7 @@ from cases import Case
 
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.synthetic import proving_ground, synthesize
-from shadowpuppet.tracking.monocular.initialization import Guess
+from shadowpuppet.tracking.monocular.initialization import PersonEstimate
 
 HERE = Path(__file__).resolve().parent.parent / "build" / "proving_ground"
 SHOWN = ("mean", "plane", "depth", "far", "aligned", "cost", "jitter", "ms")
@@ -79,7 +79,7 @@ def _case(path: Path, masks: bool) -> Case:
 
 
 @cache
-def _person(path: Path, masks: bool, body: str, seed: int) -> Guess:
+def _person(path: Path, masks: bool, body: str, seed: int) -> PersonEstimate:
     return _case(path, masks).person(make_options({"masks": masks, "tracker": {"body": body}}), np.random.default_rng([seed, 0]))
 
 

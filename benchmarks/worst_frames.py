@@ -24,7 +24,7 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.inverse_kinematics import fit_poses
-from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.video import open_frames, write_image
 
@@ -34,13 +34,13 @@ FOUND, TRUE, EXACT, TILE, MARGIN = (0, 0, 255), (0, 255, 0), (255, 255, 255), 40
 
 def worst(run: JointTable, truth: JointTable, count: int, apart: float = 0.5) -> list[int]:
     """Frames of the truth with the greatest mean error, `apart` seconds or more from one another, in order of time; tells them."""
-    errors = 1000 * joint_errors(run, truth, LIMBS).distance
+    errors = 1000 * joint_errors(run, truth, LIMB_JOINTS).distance
     chosen: list[int] = []
     for n in np.argsort(-np.nan_to_num(errors.mean(1), nan=-1)):
         if len(chosen) < count and all(abs(truth.times[n] - truth.times[m]) >= apart for m in chosen):
             chosen.append(int(n))
     for n in sorted(chosen):
-        far = ", ".join(f"{name} {error:.0f}" for name, error in zip(LIMBS, errors[n]) if error > 50)
+        far = ", ".join(f"{name} {error:.0f}" for name, error in zip(LIMB_JOINTS, errors[n]) if error > 50)
         print(f"frame {n}, {truth.times[n]:.2f} s: {errors[n].mean():.0f} mm; over 50 mm: {far or 'none'}")
     return sorted(chosen)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.anthropometry import sizes_from_height
-from shadowpuppet.body.upper_body import BODIES
+from shadowpuppet.body.models import make_body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.geometry import Array
@@ -28,7 +28,7 @@ SPREAD = 0.1
 def make_picture(body: str, size: tuple[int, int] = SIZE) -> Picture:
     """A person of 1.75 m, 2.5 m before a camera with a field of view of 60 degrees."""
     camera = Camera.from_fov(size, np.radians(60))
-    return Picture(BODIES[body](sizes_from_height(1.75)), camera, place(camera, 2.5, -0.1))
+    return Picture(make_body(body, sizes_from_height(1.75)), camera, place(camera, 2.5, -0.1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.silhouette_cache import Repeats
-from shadowpuppet.threads import POOLS, child_environment
+from shadowpuppet.threads import THREAD_VARIABLES, child_environment
 
 Outcome = dict[str, Any]
 """What `batch.task.do` returned for a task."""
@@ -107,7 +107,7 @@ class _Worker:
         self.task: Task | None = None
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
         self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.pipeline.batch.worker", str(out)], text=True,
-                                        encoding="utf-8", env=child_environment(dict.fromkeys(POOLS, str(threads))),
+                                        encoding="utf-8", env=child_environment(dict.fromkeys(THREAD_VARIABLES, str(threads))),
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors)
         threading.Thread(target=self._listen, args=(messages,), daemon=True).start()
 
