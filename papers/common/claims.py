@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 SURE = 2.0
 """Standard errors from which on a difference between two sets of runs counts as one."""
 HEADER = ("paper said", "where", "we got", "same conclusion?")
-ANSWERS = {True: "yes", False: "**no**", None: "cannot be told"}
+ANSWERS = {True: "yes", False: "**no**", None: "inconclusive"}
 
 
 @dataclass(frozen=True)
@@ -62,5 +62,5 @@ def difference(first: ArrayLike, second: ArrayLike) -> Difference:
 
 
 def all_of(answers: Sequence[bool | None]) -> bool | None:
-    """Whether all are so: one no is a no, else one that cannot be told leaves it open."""
+    """Whether all are so: one no is a no, else one that is inconclusive leaves it open."""
     return False if False in answers else None if None in answers else True
