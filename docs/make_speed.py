@@ -45,7 +45,7 @@ KEYS = {
 
 
 def tables(found: dict[str, Any]) -> str:
-    """What was found, as tables in Markdown."""
+    """The results as Markdown tables."""
     here, raw = found["environment"], found["raw"]
     lines = [f"{here['cpu']} ({here['llvm_cpu']}), {here['cores']} cores, {here['vectors']}; Python {here['python']}, "
              f"NumPy {here['numpy']}, Numba {here['numba']}, OpenCV {here['opencv-python-headless']}.",
