@@ -190,7 +190,7 @@ def test_gains_are_told_motion_by_motion():
     of = errors(0.06, 0.1)
     of["DRS"][:, 2:] += 0.09
     said = figure_6_7.by_motion(case, of)
-    assert said == "What DRS gains over SRS, motion by motion (lab): wave: elbow +40, hand +60 mm; bow: elbow -50, hand -30 mm."
+    assert said == "Improvement of DRS over SRS for each motion (lab): wave: elbow +40, hand +60 mm; bow: elbow -50, hand -30 mm."
 
 
 @pytest.mark.parametrize(("drs", "srs", "same"), [(100, 200, True), (200, 100, False), (100, 100, None)])
