@@ -5,7 +5,7 @@
 Each run is what `shadowpuppet track` does, through `shadowpuppet.pipeline.batch`: a second start does what is missing. Recordings are
 those of the proving grounds (`synthetic.proving_ground`, `synthetic.proving_rings`), made where they are missing. The error is that of
 joints in millimetres, a frame that is lost counting 500; `se` is the standard error of its difference from the study's first row, in pairs
-of recording and seed: what is within two of them is not told apart. Tables go into docs/ablations.md, and, once all studies are done,
+of recording and seed: differences within two of them are not significant. Tables go into docs/ablations.md, and, once all studies are done,
 pictures into docs/assets.
 """
 
@@ -213,13 +213,13 @@ def table(found: Mapping[str, Result], axis: str) -> str:
 def said(found: Mapping[str, Result]) -> str:
     """What is told apart from the first row, in a sentence."""
     first, *others = found.items()
-    kinds: dict[str, list[str]] = {"better": [], "worse": [], "not told apart": []}
+    kinds: dict[str, list[str]] = {"better": [], "worse": [], "not significant": []}
     for name, one in others:
         if np.isfinite(se := _se(one, first[1])):
             apart = one.errors.mean() - first[1].errors.mean()
-            kinds["not told apart" if abs(apart) <= 2 * se else "better" if apart < 0 else "worse"].append(name)
+            kinds["not significant" if abs(apart) <= 2 * se else "better" if apart < 0 else "worse"].append(name)
     told = [f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names]
-    return f"Beside {first[0]}: {'; '.join(told)}." if told else ""
+    return f"Compared with {first[0]}: {'; '.join(told)}." if told else ""
 
 
 def write_page(results: Mapping[str, Mapping[str, Result]], page: Path = PAGE) -> None:

@@ -4,8 +4,8 @@
 
 The recordings (`synthetic.proving_ground`) are made where they are missing, some 5 s each, in build/proving_ground. From video, sizes from
 the references, as `shadowpuppet track` does it. A row is a choice of settings; the table has its means over recordings and seeds, and
-`se`, the standard error of the mean error against the first row's, in pairs of the same recording and seed: what is within two of
-them is not told apart. `--picture` draws error against time for the rows of `TRADE`.
+`se`, the standard error of the mean error against the first row's, in pairs of the same recording and seed: differences within
+two of them are not significant. `--picture` draws error against time for the rows of `TRADE`.
 """
 
 from __future__ import annotations

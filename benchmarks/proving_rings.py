@@ -5,7 +5,8 @@
 The recordings (`synthetic.proving_rings`) are made where they are missing, in build/rings. Of each, silhouettes and surface points are
 taken once and the person is measured once for every body, as `shadowpuppet track` does it; then every row tracks the same frames. A row is
 a choice of settings; the table has means and medians of the RMSE over recordings and seeds, and `se`, the standard error of its difference
-from the first row's, in pairs of the same recording: what is within two of them is not told apart. `ms` are of one core, hull included.
+from the first row's, in pairs of the same recording: differences within two of them are not significant. `ms` are of one core,
+hull included.
 """
 
 from __future__ import annotations

@@ -25,10 +25,10 @@ KEYS = {
     "mono.segment_ms": ("segmentation, ms a frame", ".2f"),
     "mono.track_ms": ("filter, ms a frame", ".2f"),
     "mono.write_ms": ("writing, ms a frame", ".2f"),
-    "mono.peak_mb": ("memory at most, MB", ".0f"),
-    "mono.growth_mb": ("memory's growth over the film, MB", ".1f"),
-    "mono.compile_s": ("start to first pose, all kernels compiled anew, s", ".1f"),
-    "mono.start_s": ("start to first pose, kernels there, s", ".1f"),
+    "mono.peak_mb": ("peak memory, MB", ".0f"),
+    "mono.growth_mb": ("memory growth over the film, MB", ".1f"),
+    "mono.compile_s": ("start to first pose, empty kernel cache, s", ".1f"),
+    "mono.start_s": ("start to first pose, kernels cached, s", ".1f"),
     "multi.points": ("seven cameras: surface points of a frame", ".0f"),
     "multi.hull_ms": ("visual hull, ms a frame", ".1f"),
     "multi.force_us": ("forces, us a particle and iteration", ".1f"),
@@ -38,12 +38,12 @@ KEYS = {
     "multi.forces_fps": ("frames/s from masks, `hybrid` with forces, one core", ".0f"),
     "multi.fps": ("frames/s from masks, default preset, one core", ".0f"),
     "multi.chain_fps": ("frames/s from film to pose, default preset, two cores", ".0f"),
-    "multi.peak_mb": ("memory at most, MB", ".0f"),
+    "multi.peak_mb": ("peak memory, MB", ".0f"),
 }
 
 
 def tables(found: dict[str, Any]) -> str:
-    """What was found, as tables in Markdown."""
+    """The results as Markdown tables."""
     here, raw = found["environment"], found["raw"]
     lines = [f"{here['cpu']} ({here['llvm_cpu']}), {here['cores']} cores, {here['vectors']}; Python {here['python']}, "
              f"NumPy {here['numpy']}, Numba {here['numba']}, OpenCV {here['opencv-python-headless']}.",

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 SURE = 2.0
 """A difference between two sets of runs counts from this many standard errors."""
 HEADER = ("paper said", "where", "we got", "same conclusion?")
-ANSWERS = {True: "yes", False: "**no**", None: "cannot be told"}
+ANSWERS = {True: "yes", False: "**no**", None: "inconclusive"}
 
 
 @dataclass(frozen=True)

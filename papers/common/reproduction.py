@@ -97,7 +97,7 @@ def count(results: Sequence[Summary]) -> str:
     """A sentence on how many claims hold."""
     same = [claim["same"] for result in results for claim in result["claims"]]
     return (f"Of {len(same)} conclusions {same.count(True)} are the same here, {same.count(False)} are not, and for {same.count(None)} the "
-            "runs do not tell. What counts as the same is said in each row, and computed.")
+            "runs are inconclusive. The criterion for 'the same' is stated in each row, and the answer is computed.")
 
 
 def claims(folders: Sequence[Sequence[Summary]]) -> str:

@@ -27,11 +27,6 @@ QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.r
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
-
-
-@pytest.fixture(scope="module")
 def run(recording, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "run"
     assert cli.run(["track", str(recording), "-o", str(folder), "--quiet", "--overlay", *QUICK]) == 0
@@ -270,11 +265,6 @@ def test_a_wrong_file_of_settings_is_said_by_name(shell, recording, tmp_path, te
 
 
 # Bad input
-
-
-@pytest.fixture
-def spoilt(recording, tmp_path):
-    return made.copied(recording, tmp_path / "spoilt")
 
 
 def test_a_missing_film(shell, spoilt):

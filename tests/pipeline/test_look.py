@@ -34,11 +34,6 @@ QUICK = {"rounds": 20, "patience": 5, "sweeps": 2}
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
-
-
-@pytest.fixture(scope="module")
 def look(recording):
     return look_at(recording)
 

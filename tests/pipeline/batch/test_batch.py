@@ -40,11 +40,6 @@ FLAGS = ["--masks", "--tracker.explore", "20", "--initialization.rounds", "20", 
          "--initialization.sweeps", "2"]
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory) -> Path:
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
-
-
 class Notes(BatchListener):
     """Keeps what it is told."""
 
