@@ -313,6 +313,6 @@ def test_measuring_needs_no_plots(tmp_path):
     import sys
 
     run_that_errs(tmp_path)
-    code = f"import sys\nfrom shadowpuppet import cli\ncli.run(['evaluate', {str(tmp_path / 'run')!r}, '--json'])\n" \
+    code = f"import sys\nfrom shadowpuppet.cli.app import run\nrun(['evaluate', {str(tmp_path / 'run')!r}, '--json'])\n" \
            "print('matplotlib' in sys.modules, 'cv2' in sys.modules, file=sys.stderr)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr == "False False\n"
