@@ -95,6 +95,31 @@ def test_what_is_lost_counts_in_every_way():
     assert aligned_errors(measured(lost), lost, TRUTH)["rigid"] == pytest.approx(250, abs=5)
 
 
+def test_a_lost_root_joint_loses_its_frames_from_the_root_alone():
+    run = noisy(0.001)
+    gone = run.positions.copy()
+    gone[:30, NAMES.index("pelvis")] = np.nan
+    rootless = JointTable(run.times, run.names, gone)
+    distances = aligned_distances(measured(rootless), rootless, TRUTH)
+    assert (distances.pop("root")[:30] == 0.5).all()
+    assert all((d < 0.05).all() for d in distances.values())
+
+
+@pytest.mark.parametrize("way", ["none", "whole", "frame_offset", "root", "rigid", "similar"])
+def test_a_truth_with_gaps_is_compared_where_it_is_known(way):
+    run, gaps = noisy(), TRUTH.positions.copy()
+    gaps[:20, NAMES.index("left_knee")] = np.nan
+    gaps[40:45] = np.nan
+    truth = JointTable(TRUTH.times, TRUTH.names, gaps)
+    errors = measured(run, truth)
+    distance, whole = aligned_distances(errors, run, truth)[way], aligned_distances(measured(run), run, TRUTH)[way]
+    knee = LIMBS.index("left_knee")
+    assert np.isfinite(aligned_errors(errors, run, truth)[way])
+    assert not errors.known[:20, knee].any()
+    assert not errors.lost.any()
+    assert distance[errors.known] == pytest.approx(whole[errors.known], abs=0.02)
+
+
 # Axes, worlds
 
 
@@ -138,6 +163,12 @@ def test_humaneva_s_error_is_the_mean_over_its_fifteen():
               for t in range(len(run.times))]
     found = humaneva_error(run, TRUTH)
     assert (found["mean_mm"], found["sd_mm"]) == pytest.approx((1000 * np.mean(frames), 1000 * np.std(frames)))
+    gaps = TRUTH.positions.copy()
+    gaps[:7, NAMES.index("left_knee")] = np.nan
+    partly = humaneva_error(run, JointTable(TRUTH.times, TRUTH.names, gaps))
+    assert (partly["mean_mm"], partly["frames"]) == (pytest.approx(1000 * np.mean(frames[7:])), len(frames) - 7)
+    gaps[:, NAMES.index("left_knee")] = np.nan
+    assert humaneva_error(run, JointTable(TRUTH.times, TRUTH.names, gaps)) == {"missing": {"run": [], "truth": ["left_knee"]}}
     fewer = TRUTH.select([name for name in NAMES if name != "head"])
     assert humaneva_error(run, fewer) == {"missing": {"run": [], "truth": ["head"]}}
 

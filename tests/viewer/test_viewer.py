@@ -612,6 +612,51 @@ def test_a_library_that_cannot_be_guarded_is_not_used(monkeypatch):
     assert library.serve is plain
 
 
+def test_servers_that_begin_at_once_are_guarded_one_after_another(monkeypatch):
+    pytest.importorskip("viser")
+    import threading
+    import time
+
+    import viser
+    import websockets.asyncio.server as library
+
+    from shadowpuppet.viewer.web.server import close_server, open_server
+
+    starting, together, guards = [], [], []
+
+    class Server:
+        def __init__(self, host: str, port: int, **_: object) -> None:
+            starting.append(self)
+            together.append(len(starting))
+            self.port = port
+            guards.append(library.serve)
+            library.serve(None)
+            time.sleep(0.05)
+            starting.remove(self)
+
+        def get_port(self) -> int:
+            return self.port
+
+        def stop(self) -> None: ...
+
+    def plain(*_: object, **__: object) -> None: ...
+
+    monkeypatch.setattr(library, "serve", plain)
+    monkeypatch.setattr(viser, "ViserServer", Server)
+    opened: list = []
+    threads = [threading.Thread(target=lambda: opened.append(open_server(port=0))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for server in opened:
+        close_server(server)
+    assert together == [1, 1, 1, 1]
+    assert len(opened) == len(set(map(id, guards))) == 4
+    assert plain not in guards
+    assert library.serve is plain
+
+
 def test_without_viser_the_command_says_how_to_get_it(tmp_path):
     code = ("import sys; sys.modules['viser'] = None\n"
             "import importlib.util as u; find = u.find_spec\n"

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, merged, plain_values, validate
 
 
 def pixel_scale(size: tuple[int, int]) -> float:
@@ -101,7 +101,7 @@ def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None =
     """
     if preset not in PRESETS:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(PRESETS)}")
-    return validate(MonocularSettings, _merge(_plain(MonocularSettings()), PRESETS[preset], overrides or {}), source)
+    return validate(MonocularSettings, merged(plain_values(MonocularSettings()), PRESETS[preset], overrides or {}), source)
 
 
 @checked
