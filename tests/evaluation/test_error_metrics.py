@@ -13,15 +13,15 @@ from numpy.testing import assert_allclose
 
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.evaluation.error_metrics import (
+    acceleration_errors,
     aligned_distances,
     aligned_errors,
     axis_errors,
-    bend_errors,
     bone_errors,
+    hinge_errors,
     humaneva_error,
-    losses,
-    motion_errors,
-    worlds,
+    pose_losses,
+    world_difference,
 )
 from shadowpuppet.evaluation.joint_angles import dof_errors, wrapped
 from shadowpuppet.geometry import rotation_from_vector
@@ -138,7 +138,7 @@ def test_axes_have_signs_and_leave_out_what_is_lost():
 @given(st.floats(0.2, 3.0))
 def test_another_world_is_told_by_what_one_rigid_motion_makes_good(angle):
     run = turned(noisy(0.01), [0, 0, angle], [2, -1, 0])
-    found = worlds(measured(run), run, TRUTH)
+    found = world_difference(measured(run), run, TRUTH)
     assert found["apart"]
     assert found["rotation_deg"] == pytest.approx(np.degrees(angle), abs=1)
     assert np.abs(found["axis"][2]) == pytest.approx(1, abs=0.02)
@@ -147,10 +147,10 @@ def test_another_world_is_told_by_what_one_rigid_motion_makes_good(angle):
 
 def test_a_bad_run_is_not_taken_for_another_world():
     bad = noisy(0.3)
-    assert not worlds(measured(bad), bad, TRUTH)["apart"]
-    assert not worlds(measured(noisy()), noisy(), TRUTH)["apart"]
+    assert not world_difference(measured(bad), bad, TRUTH)["apart"]
+    assert not world_difference(measured(noisy()), noisy(), TRUTH)["apart"]
     nothing = JointTable(TRUTH.times, TRUTH.names, np.full_like(TRUTH.positions, np.nan))
-    assert worlds(measured(nothing), nothing, TRUTH) == {}
+    assert world_difference(measured(nothing), nothing, TRUTH) == {}
 
 
 # Posture, motion, bones
@@ -178,18 +178,18 @@ def test_an_elbow_is_as_far_bent_as_it_is():
         wrist = [0.3 + 0.25 * np.cos(bend), 0.25 * np.sin(bend), 0]
         return JointTable(np.zeros(1), ("left_shoulder", "left_elbow", "left_wrist"), np.array([[[0, 0, 0], [0.3, 0, 0], wrist]]))
 
-    found = bend_errors(arm(np.radians(100)), arm(np.radians(70)))
+    found = hinge_errors(arm(np.radians(100)), arm(np.radians(70)))
     assert found == {"left_elbow": pytest.approx({"bias": 30, "mean": 30, "rmse": 30})}
-    assert bend_errors(arm(np.pi), arm(0.0))["left_elbow"]["mean"] == pytest.approx(180)
+    assert hinge_errors(arm(np.pi), arm(0.0))["left_elbow"]["mean"] == pytest.approx(180)
 
 
 def test_accelerations_are_compared_where_both_are_known():
     run = moved(TRUTH, 0.5 * 2.0 * (TRUTH.times**2)[:, None, None] * np.array([1.0, 0, 0]))
-    found = motion_errors(run, TRUTH)
+    found = acceleration_errors(run, TRUTH)
     assert found["difference_m_s2"] == pytest.approx(2)
     assert found["run_m_s2"] > found["truth_m_s2"]
     short = JointTable(TRUTH.times[:2], TRUTH.names, TRUTH.positions[:2])
-    assert motion_errors(short, short) == {}
+    assert acceleration_errors(short, short) == {}
 
 
 def test_bones_that_are_longer_or_change_are_told():
@@ -217,7 +217,7 @@ def test_gaps_are_counted(status, expected):
     motion = Motion(body_name="cardbox", dof_names=("a",), joint_names=("neck",), times=np.arange(T, dtype=float), poses=nothing,
                     pose_sd=nothing, joints=np.full((T, 1, 3), np.nan), joint_sd=np.full((T, 1, 3), np.nan), cost=nothing[:, 0],
                     overlap=nothing[:, 0], status=np.array([words[sign] for sign in status]))
-    assert losses(motion) == pytest.approx(expected)
+    assert pose_losses(motion) == pytest.approx(expected)
 
 
 # Angles

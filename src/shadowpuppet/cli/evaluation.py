@@ -70,27 +70,27 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
 
 
 def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
-    from shadowpuppet.evaluation.summary_text import WAYS, said_root
+    from shadowpuppet.evaluation.summary_text import WAYS, root_text
 
     yield metrics_table(measured)
     if "errors" in measured:
         aligned = measured["aligned_mm"]
         yield error_table(measured["errors"])
         yield table("mean error, mm, run and truth laid over each other", ("", "mm"),
-                    ((text.format(root=said_root(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
+                    ((text.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
     if "angles_deg" in measured:
         yield table("", ("turned at", "by degrees, rmse"), ((name, f"{value:.1f}") for name, value in measured["angles_deg"].items()))
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    from shadowpuppet.evaluation.summary_text import bones_words, clock_words, coverage_words, losses_words, world_words
+    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, losses_text, world_text
 
-    yield "no pose", losses_words(measured["losses"])
+    yield "no pose", losses_text(measured["losses"])
     if "errors" not in measured:
         return
-    yield "clock", clock_words(measured["clock"])
+    yield "clock", clock_text(measured["clock"])
     if measured["world"]:
-        yield "world", world_words(measured["world"])
+        yield "world", world_text(measured["world"])
     if axes := measured["axes_mm"]:
         yield "axes", ", ".join(f"{x} {axes[x]['mean']:+.1f} (rmse {axes[x]['rmse']:.1f})" for x in "xyz") + " mm, run less truth"
     if "mean_mm" in (human := measured["humaneva"]):
@@ -101,8 +101,8 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "moves", (f"accelerations of {moves['run_m_s2']:.1f} m/s2, the truth's {moves['truth_m_s2']:.1f}; they differ by "
                         f"{moves['difference_m_s2']:.1f} in the mean")
     if measured["bone_errors"]:
-        yield "bones", bones_words(measured["bone_errors"])
-    yield "intervals", coverage_words(measured["coverage"])
+        yield "bones", bones_text(measured["bone_errors"])
+    yield "intervals", coverage_text(measured["coverage"])
     if "dofs_deg" in measured:
         dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]
         lines = [", ".join(dofs[n : n + DOFS_IN_ROW]) for n in range(0, len(dofs), DOFS_IN_ROW)]

@@ -12,7 +12,7 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.pipeline.options import Options
 
 if TYPE_CHECKING:
-    from shadowpuppet.viewer.scene.show import Show
+    from shadowpuppet.viewer.scene.scene import Scene
 
     ViewFlags = Any
 else:
@@ -26,7 +26,7 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
                                               "motion: .amc, .bvh, .c3d, .csv, .npz, .parquet, .trc.")],
          other: Annotated[Path | None, Parameter(help="A second one, shown beside the first.")] = None, /, *,
          beside: Annotated[Path | None, flag("The same as OTHER.")] = None,
-         apart: Annotated[float, flag("Metres between the two; 0: one over the other.")] = 1.5,
+         apart: Annotated[float, flag("Metres cut_scene the two; 0: one over the other.")] = 1.5,
          truth: Annotated[Path | None, flag("Truth of a run, in place of its recording's.")] = None,
          recording: Annotated[Path | None, flag("Recording of a run, if it was moved.")] = None,
          start: Annotated[float | None, flag("Seconds at which it starts.")] = None,
@@ -48,24 +48,24 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
     _check(other, beside, html, pictures, port)
     options = options_from(flags, config)
     with terminal(quiet) as listener:
-        from shadowpuppet.viewer.scene.of_run import beside as side_by_side
-        from shadowpuppet.viewer.scene.open_any import between, show_of
+        from shadowpuppet.viewer.scene.of_run import side_by_side
+        from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
         from shadowpuppet.viewer.web.page import check_page, write_page
-        from shadowpuppet.viewer.web.serve import first_wish
+        from shadowpuppet.viewer.web.serve import default_view
 
         if html is not None:
             check_page(html)
         listener.begin("reading")
-        show = show_of(what, options, truth, recording)
+        show = open_scene(what, options, truth, recording)
         if (second := other or beside) is not None:
-            show = side_by_side(show, show_of(second, options), apart)
-        show = between(show, start, end)
-        for problem in show.lacks:
+            show = side_by_side(show, open_scene(second, options), apart)
+        show = cut_scene(show, start, end)
+        for problem in show.problems:
             listener.warn(problem)
         if html is None:
             listener.stop()
             return _serve(show, listen, port, not no_open, quiet)
-        write_page(html, show, first_wish(show, pictures), listener)
+        write_page(html, show, default_view(show, pictures), listener)
     if not quiet:
         print(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
 
@@ -80,15 +80,15 @@ def _check(other: Path | None, beside: Path | None, html: Path | None, pictures:
         raise SettingsError(f"flags: beside: found {beside} and {other}, expected one of them")
 
 
-def _serve(show: Show, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
+def _serve(show: Scene, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
     """Serve the page until Ctrl-C."""
     import contextlib
     import webbrowser
 
     from shadowpuppet.live.display.choice import has_screen
-    from shadowpuppet.viewer.web.serve import look
+    from shadowpuppet.viewer.web.serve import serve_scene
 
-    def told(address: str) -> None:
+    def ready(address: str) -> None:
         if not quiet:
             print(f"{show.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
         if opening and has_screen():
@@ -96,4 +96,4 @@ def _serve(show: Show, listen: str, port: int | None, opening: bool, quiet: bool
                 webbrowser.open(address)
 
     with contextlib.suppress(KeyboardInterrupt):
-        look(show, listen, port, told=told)
+        serve_scene(show, listen, port, ready=ready)
