@@ -112,7 +112,7 @@ def test_what_a_plot_refers_to_is_there_and_its_own(plain_page):
     assert wanted <= {*read.ids}
     of_other_plots = [name for name in read.ids if read.ids.count(name) > 1 and not re.search(r"-(figure|axes|patch|line2d)", name)]
     owners = {name.split("-")[0] for name in read.ids}
-    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "coverage_chart"} <= owners
+    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "coverage"} <= owners
     assert len({name for name in of_other_plots if name.split("-")[0] not in owners}) == 0
 
 

@@ -516,16 +516,16 @@ def test_what_is_wished_for_is_drawn(tracked, rig):
             surface = show.hull(float(show.times[n])).points
             assert len(drawn) == POINTS
             assert np.linalg.norm(drawn[:100, None] - surface[None], axis=2).min(1).max() < 0.003
-            assert stage.cameras[0].handle.image.shape == (120, 160, 3)
-        near = stage.cameras[1].handle.scale
+            assert stage.frustums[0].handle.image.shape == (120, 160, 3)
+        near = stage.frustums[1].handle.scale
         stage.look_through(1)
-        beyond = np.linalg.norm(stage.cameras[1].camera.centre - show.middle)
-        assert stage.cameras[1].handle.scale / stage.cameras[1].volume > beyond
+        beyond = np.linalg.norm(show.cameras[1].camera.centre - show.middle)
+        assert stage.frustums[1].handle.scale / stage.frustums[1].volume > beyond
         stage.look_through(None)
-        assert stage.cameras[1].handle.scale == pytest.approx(near)
+        assert stage.frustums[1].handle.scale == pytest.approx(near)
         stage.options.hull = stage.options.cameras = False
         stage.to(0.5)
-        assert (stage._hull.visible, stage.cameras[0].handle.visible) == (False, False)
+        assert (stage._hull.visible, stage.frustums[0].handle.visible) == (False, False)
         stage.close()
         server.scene.reset()
         show = open_scene(tracked)

@@ -171,14 +171,14 @@ def fit_over_time(of: Evaluation) -> str:
 
 def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
     """Found against stated coverage of the intervals."""
-    with _drawing("honesty", (3.6, 3.3)) as (figure, axes):
+    with _drawing("coverage", (3.6, 3.3)) as (figure, axes):
         stated = [float(level) for level in levels]
         axes.plot([0, 100], [0, 100], color="#c4c9d0", lw=1.2, label="honest")
         axes.plot(stated, [100 * coverage[f"within_{level}"] for level in levels], "o-", color=BLUE, label="this run")
         axes.set(xlim=(0, 100), ylim=(0, 100), xlabel="stated, %", ylabel="of the truth within, %")
         axes.set_aspect("equal")
         axes.legend(loc="upper left")
-        return _svg(figure, "honesty")
+        return _svg(figure, "coverage")
 
 
 class _drawing:
