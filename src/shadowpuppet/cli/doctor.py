@@ -98,8 +98,8 @@ def examine() -> list[Finding]:
                 warnings.simplefilter("ignore")
                 found += check()
         except Exception as error:
-            told = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            found.append(Finding(name, "broken", told[:300], REPAIR if needed else "", needed))
+            info = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            found.append(Finding(name, "broken", info[:300], REPAIR if needed else "", needed))
     return found
 
 
@@ -119,18 +119,18 @@ def _python() -> Iterator[Finding]:
 
 def _libraries() -> Iterator[Finding]:
     wanted = [text for text in metadata.requires("shadowpuppet") or [] if "extra ==" not in text]
-    told, bad = [], []
+    info, bad = [], []
     for text in wanted:
         name = re.split(r"[^\w.-]", text, maxsplit=1)[0]
         try:
             import_module(MODULES.get(name, name.replace("-", "_")))
-            told.append(f"{name} {metadata.version(name)}")
+            info.append(f"{name} {metadata.version(name)}")
         except Exception as error:
             bad.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
     if bad:
         yield Finding("libraries", "broken", "; ".join(bad), REPAIR, True)
     else:
-        yield Finding("libraries", "works", ", ".join(told), needed=True)
+        yield Finding("libraries", "works", ", ".join(info), needed=True)
 
 
 def _kernels() -> Iterator[Finding]:
@@ -150,15 +150,15 @@ def _kernels() -> Iterator[Finding]:
 def _cache() -> Iterator[Finding]:
     from shadowpuppet.body.forward_kinematics import place_all
 
-    told = getattr(getattr(place_all, "_cache", None), "cache_path", "")
+    info = getattr(getattr(place_all, "_cache", None), "cache_path", "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         yield Finding("compiled code", "missing", "NUMBA_DISABLE_JIT is set: nothing is compiled, which is very slow",
                       "unset NUMBA_DISABLE_JIT")  # fmt: skip
-    elif not told or not _writable(Path(told)):
-        yield Finding("compiled code", "missing", f"cannot be kept{f' in {told}' if told else ''}: it is compiled anew at every start, "
+    elif not info or not _writable(Path(info)):
+        yield Finding("compiled code", "missing", f"cannot be kept{f' in {info}' if info else ''}: it is compiled anew at every start, "
                       "which takes up to half a minute", "set NUMBA_CACHE_DIR to a folder of your own that can be written")  # fmt: skip
     else:
-        yield Finding("compiled code", "works", f"kept in {told}")
+        yield Finding("compiled code", "works", f"kept in {info}")
 
 
 def _films() -> Iterator[Finding]:
@@ -186,8 +186,8 @@ def _codecs() -> Iterator[Finding]:
 
     there = [name for name, codec in CODECS.items() if _has_codec(av, codec)]
     lacking = [name for name in CODECS if name not in there]
-    told = f"{', '.join(there)} can be read" + (f"; not {', '.join(lacking)}" if lacking else "")
-    yield Finding("codecs", "missing" if lacking else "works", told, "turn such films into H.264 first" if lacking else "")
+    info = f"{', '.join(there)} can be read" + (f"; not {', '.join(lacking)}" if lacking else "")
+    yield Finding("codecs", "missing" if lacking else "works", info, "turn such films into H.264 first" if lacking else "")
 
 
 def _has_codec(av: object, name: str) -> bool:
@@ -203,10 +203,10 @@ def _processor() -> Iterator[Finding]:
     from shadowpuppet.threads import LIMIT, thread_limit, usable_cores
 
     known = environment()
-    told = f"{known['cpu']}; {usable_cores()} of {known['cores']} cores may be used; Numba sees {known['vectors']}"
-    told += f"; {LIMIT} is {thread_limit()}" if thread_limit() is not None else ""
+    info = f"{known['cpu']}; {usable_cores()} of {known['cores']} cores may be used; Numba sees {known['vectors']}"
+    info += f"; {LIMIT} is {thread_limit()}" if thread_limit() is not None else ""
     slow = known["vectors"] in ("AVX", "none known") and platform.machine().lower() in ("x86_64", "amd64")
-    yield Finding("processor", "missing" if slow else "works", told, "all works, at half the speed or less" if slow else "")
+    yield Finding("processor", "missing" if slow else "works", info, "all works, at half the speed or less" if slow else "")
 
 
 # Extras and devices

@@ -34,8 +34,8 @@ def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
     assert of.table is not None
     assert of.errors is not None
     errors, times = 1000 * np.where(of.errors.known, of.errors.distance, np.nan), of.table.times
-    seen = np.isfinite(errors).any(1)
-    t, low, quarter, middle, high, top = _binned(times[seen], _spread(errors[seen]))
+    known = np.isfinite(errors).any(1)
+    t, low, quarter, middle, high, top = _binned(times[known], _spread(errors[known]))
     with _drawing("time", (10, 3.7), rows=2, ratios=(14, 1)) as (figure, (axes, strip)):
         axes.fill_between(t, low, top, color=BLUE, alpha=0.13, lw=0, label="all joints")
         axes.fill_between(t, quarter, high, color=BLUE, alpha=0.25, lw=0, label="middle half")
@@ -63,11 +63,11 @@ def by_joint_and_time(of: Evaluation) -> str:
     with _drawing("map", (10, 0.6 + 0.21 * len(rows))) as (figure, axes):
         from matplotlib import colormaps
 
-        shown = np.ma.masked_invalid(rows)
-        top = float(np.percentile(shown.compressed(), 99)) if shown.count() else 1.0
+        masked = np.ma.masked_invalid(rows)
+        top = float(np.percentile(masked.compressed(), 99)) if masked.count() else 1.0
         edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:] + 1e-9])
         colours = colormaps["YlOrBr"].with_extremes(bad="#6b7078")
-        image = axes.pcolormesh(edges, np.arange(len(rows) + 1), shown, cmap=colours, vmin=0, vmax=top, rasterized=True)
+        image = axes.pcolormesh(edges, np.arange(len(rows) + 1), masked, cmap=colours, vmin=0, vmax=top, rasterized=True)
         axes.set_yticks(np.arange(len(rows)) + 0.5, [name.replace("_", " ") for name in of.errors.names], fontsize=8.5)
         axes.invert_yaxis()
         axes.grid(False)

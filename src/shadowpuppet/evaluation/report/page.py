@@ -80,8 +80,8 @@ def _silhouettes(of: Evaluation) -> str:
             "is needed.</p>")
     if not len(of.run.motion):
         return head + "<p>The run has no frames.</p>"
-    said = "Above the overlap (intersection over union), below the cost: the area in which model and silhouette differ."
-    return head + figure(charts.fit_over_time(of), said)
+    note = "Above the overlap (intersection over union), below the cost: the area in which model and silhouette differ."
+    return head + figure(charts.fit_over_time(of), note)
 
 
 def _under(of: Evaluation) -> str:
@@ -93,9 +93,9 @@ def _under(of: Evaluation) -> str:
 def _errors(of: Evaluation, chosen: Sequence[ReportFrame]) -> Iterator[str]:
     marks = {each.letter: each.time for each in chosen if not each.typical}
     yield "<h2>Error over time</h2>"
-    said = ("Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, and all of them. Letters "
+    note = ("Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, and all of them. Letters "
             "are the worst frames, shown below; the strip tells the run's own status.")
-    yield figure(charts.over_time(of, marks), said)
+    yield figure(charts.over_time(of, marks), note)
     yield figure(charts.by_joint_and_time(of), "The same by joint, darker where it is farther off; grey where the run has no pose.")
 
 
@@ -111,13 +111,13 @@ def _frames(of: Evaluation, chosen: Sequence[ReportFrame], shots: Mapping[str, b
 
 def _shot(of: Evaluation, each: ReportFrame, image: bytes) -> str:
     motion = of.run.motion
-    said = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
-    said += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
+    note = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
+    note += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
     worst = ", ".join(f"{plain(name.replace('_', ' '))} {off:.0f}" for name, off in each.worst)
     error = f"<b>{each.error:.0f} mm</b> in the mean; farthest off: {worst}. " if each.error == each.error else ""
     data = base64.b64encode(image).decode()
     return (f'<figure><img alt="frame {each.frame}" src="data:image/jpeg;base64,{data}"><figcaption><span class="badge'
-            f'{" usual" if each.typical else ""}">{each.letter}</span> {error}{", ".join(said)}{", a usual frame" if each.typical else ""}'
+            f'{" usual" if each.typical else ""}">{each.letter}</span> {error}{", ".join(note)}{", a usual frame" if each.typical else ""}'
             "</figcaption></figure>")
 
 
@@ -159,6 +159,6 @@ def _intervals(of: Evaluation) -> str:
     cells = ((name.replace("_", " "), *(f"{100 * row[f'within_{level}']:.0f}" for level in LEVELS), f"{row['rms_z']:.2f}",
               f"{row['sd_mean_mm']:.1f}") for name, row in coverage["joints"].items())  # fmt: skip
     by_joint = table(["joint", *(f"{level} %" for level in LEVELS), "rms z", "mean sd, mm"], rows(cells))
-    said = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
-    return f'{text}<div class="pair">{figure(charts.coverage_chart(coverage, list(LEVELS)), said)}<div>{by_joint}</div></div>'
+    note = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
+    return f'{text}<div class="pair">{figure(charts.coverage_chart(coverage, list(LEVELS)), note)}<div>{by_joint}</div></div>'
 

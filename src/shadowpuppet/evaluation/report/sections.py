@@ -12,8 +12,8 @@ from shadowpuppet.motion.metrics import FAR, LOST
 
 def cards(of: Evaluation) -> str:
     """Cards with the main figures."""
-    made = "".join(f'<div class="card"><span class="name">{name}</span><b>{value} <small>{unit}</small></b><span>{said}</span></div>'
-                   for name, value, unit, said in _cards(of))
+    made = "".join(f'<div class="card"><span class="name">{name}</span><b>{value} <small>{unit}</small></b><span>{items}</span></div>'
+                   for name, value, unit, items in _cards(of))
     return f'<div class="cards">{made}</div>'
 
 
@@ -81,8 +81,8 @@ def joint_table(of: Evaluation) -> str:
 def alignments_table(of: Evaluation) -> str:
     """Table of mean errors after each alignment."""
     aligned = of.measured["aligned_mm"]
-    said = ((words.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, words in WAYS.items() if way in aligned)
-    return table(["", "mean, mm"], rows(said))
+    items = ((words.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, words in WAYS.items() if way in aligned)
+    return table(["", "mean, mm"], rows(items))
 
 
 def axes_table(of: Evaluation) -> str:
@@ -90,8 +90,8 @@ def axes_table(of: Evaluation) -> str:
     axes = of.measured["axes_mm"]
     if not axes:
         return "<p>No joint is known in both.</p>"
-    said = ((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}") for axis in "xyz")
-    return table(["", "mean, mm", "sd", "rmse"], rows(said))
+    items = ((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}") for axis in "xyz")
+    return table(["", "mean, mm", "sd", "rmse"], rows(items))
 
 
 def body_tables(of: Evaluation) -> str:
@@ -115,17 +115,17 @@ def body_tables(of: Evaluation) -> str:
 
 def _angles(angles: Mapping[str, Mapping[str, float]]) -> str:
     """Table of errors of angles."""
-    said = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
-    return table(["", "run less truth", "mean size", "rmse"], rows(said))
+    items = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
+    return table(["", "run less truth", "mean size", "rmse"], rows(items))
 
 
 def definitions_section(of: Evaluation) -> str:
     """Definitions of the figures."""
-    said = [("Overlap", "Intersection over union of drawn body and silhouette, from 0 to 1, as recorded by the run."),
+    items = [("Overlap", "Intersection over union of drawn body and silhouette, from 0 to 1, as recorded by the run."),
             ("Cost", "The area in which drawn body and silhouette differ (XOR), as recorded by the run.")]
     if of.errors is not None:
         root = plain(root_text(of.measured["aligned_mm"]))
-        said = [
+        items = [
             ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
                             f"has no pose, each joint counts {1000 * LOST:.0f} mm, so that leaving out bad frames never helps. "
                             "<span class=formula>rmse = √(mean of d²)</span>."),
@@ -138,16 +138,16 @@ def definitions_section(of: Evaluation) -> str:
             ("Bent", "The angle between the bones before and after an elbow or knee; 0 is straight."),
             ("Times", "Run and truth are compared at the times of the slower one; the other is interpolated between frames at most one and "
                       "a half steps apart, and never beyond its ends."),
-            *said,
+            *items,
         ]
-    return "<h2>What the figures mean</h2>" + definitions(said)
+    return "<h2>What the figures mean</h2>" + definitions(items)
 
 
 def run_facts(of: Evaluation) -> str:
     """Facts about the run."""
     info, measured = of.run.info, of.measured
     settings = of.run.settings
-    said = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")),
+    items = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")),
             ("Body", of.run.motion.body_name),
             ("Preset and seed", f"{settings.get('preset', 'default')}, {settings.get('seed', 'unknown')}" if settings else None),
             ("Frames", ", ".join(f"{count} {status}" for status, count in measured["status"].items())),
@@ -156,6 +156,6 @@ def run_facts(of: Evaluation) -> str:
             ("World", world_text(measured["world"]) if measured.get("world") else None),
             ("Made with", ", ".join(f"{name} {version}" for name, version in info.get("versions", {}).items()))]
     joints = f"; joints compared: {', '.join(of.errors.names)}" if of.errors is not None else ""
-    return ("<h2>The run</h2>" + definitions((name, plain(text)) for name, text in said if text)
+    return ("<h2>The run</h2>" + definitions((name, plain(text)) for name, text in items if text)
             + f"<footer>Made by shadowpuppet evaluate. All of it is in this file{plain(joints.replace('_', ' '))}.</footer>")
 

@@ -52,8 +52,8 @@ def body_of(path: Path, prior: MotionPrior) -> Body:
         body = make_body(name, average_sizes(name, AVERAGE_HEIGHT))
         if prior.names and set(prior.names) <= set(body.skeleton.dof_names):
             return body
-    told = f"{prior.names[0]}, ..." if prior.names else "none"
-    raise FormatError(f"{path}: names: found {told}, expected degrees of freedom of one of {', '.join(ALL)}")
+    names = f"{prior.names[0]}, ..." if prior.names else "none"
+    raise FormatError(f"{path}: names: found {names}, expected degrees of freedom of one of {', '.join(ALL)}")
 
 
 def sampled_motion(rng: np.random.Generator, prior: MotionPrior, frames: int) -> Array:
