@@ -32,10 +32,10 @@ SETTLED = 6000
 """Milliseconds after which all is drawn."""
 
 
-def photographed(browser: Browser, show: Scene, options: ViewOptions, name: str, second: float,
+def photographed(browser: Browser, scene: Scene, options: ViewOptions, name: str, second: float,
                  then: Callable[[Panel], None] = lambda panel: None, size: tuple[int, int] = SIZE) -> None:
-    """A picture of the page at a second of the show."""
-    with serving(show, options, width=480) as (address, panel):
+    """A picture of the page at a second of the scene."""
+    with serving(scene, options, width=480) as (address, panel):
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.goto(address)
         page.wait_for_selector("canvas")
@@ -43,7 +43,7 @@ def photographed(browser: Browser, show: Scene, options: ViewOptions, name: str,
         notice = page.locator(".mantine-Notification-closeButton")  # that there is no graphics card
         if notice.count():
             notice.first.click()
-        panel.timeline.seek(int(abs(show.times - second).argmin()))
+        panel.timeline.seek(int(abs(scene.times - second).argmin()))
         panel.again()
         then(panel)
         page.wait_for_timeout(SETTLED)

@@ -111,8 +111,8 @@ def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_pr
     from shadowpuppet.viewer.web.scene_view import ViewOptions
     from shadowpuppet.viewer.web.serve import serving
 
-    show = replace(open_scene(run), charts=())  # which are canvases, too
-    with serving(show, ViewOptions(transparent=True, cameras=False)) as (address, panel), page_of(browser, address) as page:
+    scene = replace(open_scene(run), charts=())  # which are canvases, too
+    with serving(scene, ViewOptions(transparent=True, cameras=False)) as (address, panel), page_of(browser, address) as page:
         page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
         page.page.wait_for_timeout(1500)  # what fades in has done so
         first = page.seen()
@@ -145,8 +145,8 @@ def test_the_file_plays_alone(browser, run, tmp_path):
     from shadowpuppet.viewer.web.page import write_page
     from shadowpuppet.viewer.web.serve import default_view
 
-    show = cut_scene(open_scene(run), 0.0, 2.5)
-    path = write_page(tmp_path / "run.html", show, default_view(show, pictures=False))
+    scene = cut_scene(open_scene(run), 0.0, 2.5)
+    path = write_page(tmp_path / "run.html", scene, default_view(scene, pictures=False))
     assert path.stat().st_size < 3e6
     with page_of(browser, path.as_uri()) as page:
         page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
@@ -162,15 +162,15 @@ def test_a_file_has_pictures_only_where_they_are_asked_for(run, tmp_path):
     from shadowpuppet.viewer.web import page as pages
     from shadowpuppet.viewer.web.serve import default_view
 
-    show, seen = cut_scene(open_scene(run), 0.0, 0.5), []
-    eye = show.cameras[0].images
+    scene, seen = cut_scene(open_scene(run), 0.0, 0.5), []
+    eye = scene.cameras[0].images
     original = eye.picture
     for asked in (False, True):
         seen.clear()
         eye.picture = lambda time: seen.append(time) or original(time)
         eye.mask(99.0)
         eye._masked = (np.nan, None)
-        pages.write_page(tmp_path / f"{asked}.html", show, default_view(show, pictures=asked))
+        pages.write_page(tmp_path / f"{asked}.html", scene, default_view(scene, pictures=asked))
     sizes = [(tmp_path / f"{asked}.html").stat().st_size for asked in (False, True)]
     assert sizes[1] > sizes[0] + 10_000
 

@@ -254,27 +254,27 @@ def test_silhouettes_show_nothing_of_the_picture(rng):
 
 
 def test_a_recording_is_shown_with_its_cameras_hull_and_frames(rig):
-    show = open_scene(rig)
-    assert len(show.cameras) == made_rig.CAMERAS
-    assert show.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE)
-    assert show.hull is not None
+    scene = open_scene(rig)
+    assert len(scene.cameras) == made_rig.CAMERAS
+    assert scene.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE)
+    assert scene.hull is not None
     for n in (20, 3, 11):
-        surface = show.hull(float(show.times[n]))
+        surface = scene.hull(float(scene.times[n]))
         assert len(surface.points) > 300
         assert np.linalg.norm(surface.points.mean(0)[:2] - made_rig.place(n)[:2]) < 0.12
-        seen = show.cameras[0].images
-        exact = made_rig.masks([show.cameras[0].camera], 1, n)[0][0]
-        mask = seen.mask(float(show.times[n]))
+        seen = scene.cameras[0].images
+        exact = made_rig.masks([scene.cameras[0].camera], 1, n)[0][0]
+        mask = seen.mask(float(scene.times[n]))
         assert (mask & exact).sum() / (mask | exact).sum() > 0.9
-        assert seen.picture(float(show.times[n])).shape == (120, 160, 3)
-    assert show.cameras[0].images.mask(99.0) is None
+        assert seen.picture(float(scene.times[n])).shape == (120, 160, 3)
+    assert scene.cameras[0].images.mask(99.0) is None
 
 
 def test_silhouettes_are_made_where_none_are_ready(rig, tmp_path):
     folder = made.copied(rig, tmp_path / "rig", ["masks"])
-    show = open_scene(folder)
-    assert "made as" in show.facts["silhouettes"]
-    mask, exact = show.cameras[1].images.mask(0.5), made_rig.masks([show.cameras[1].camera], 1, 5)[0][0]
+    scene = open_scene(folder)
+    assert "made as" in scene.facts["silhouettes"]
+    mask, exact = scene.cameras[1].images.mask(0.5), made_rig.masks([scene.cameras[1].camera], 1, 5)[0][0]
     assert (mask & exact).sum() / (mask | exact).sum() > 0.85
 
 
@@ -297,8 +297,8 @@ def test_a_film_whose_silhouettes_cannot_be_made_is_shown_without(rig, tmp_path)
 
 
 def test_one_camera_has_no_hull(rig):
-    show = open_scene(rig, Options(camera="cam1"))
-    assert ([eye.camera.name for eye in show.cameras], show.hull) == (["cam1"], None)
+    scene = open_scene(rig, Options(camera="cam1"))
+    assert ([eye.camera.name for eye in scene.cameras], scene.hull) == (["cam1"], None)
     assert hull_function([SceneCamera(Camera.from_fov((64, 48), 1.0)), SceneCamera(Camera.from_fov((64, 48), 1.0))], Options()) is None
 
 
@@ -306,17 +306,17 @@ def test_one_camera_has_no_hull(rig):
 
 
 def test_a_run_is_shown_beside_its_truth_with_errors_angles_and_particles(tracked):
-    show = open_scene(tracked)
-    estimate, truth = show.figures
-    assert (estimate.kind, truth.kind, show.problems) == ("estimate", "truth", ())
-    names = [chart.name for chart in show.charts]
+    scene = open_scene(tracked)
+    estimate, truth = scene.figures
+    assert (estimate.kind, truth.kind, scene.problems) == ("estimate", "truth", ())
+    names = [chart.name for chart in scene.charts]
     assert names[:2] == ["error", "overlap"]
     assert {"angles: left arm", "angles: right arm", "angles: trunk and head"} <= set(names)
     measured = read_run(tracked).metrics["errors"]
-    mean = next(chart for chart in show.charts if chart.name == "error").curves["mean"]
+    mean = next(chart for chart in scene.charts if chart.name == "error").curves["mean"]
     assert np.nanmean(mean) == pytest.approx(measured["mean_mm"], rel=0.02)
     n = 14
-    cloud = show.cloud(float(show.times[n]))
+    cloud = scene.cloud(float(scene.times[n]))
     assert cloud is not None
     joints = read_run(tracked).motion.joints[n]
     hand = read_run(tracked).motion.joint_names.index("left_elbow")
@@ -324,31 +324,31 @@ def test_a_run_is_shown_beside_its_truth_with_errors_angles_and_particles(tracke
     assert np.linalg.norm(ends - joints[hand], axis=1).min() < 0.08  # some particle is where the run's own estimate was
     assert (cloud.weights.max(), cloud.weights.min() >= 0) == (1.0, True)
     assert (cloud.ellipsoids.axes > 0).all()
-    again = show.cloud(float(show.times[n]))
+    again = scene.cloud(float(scene.times[n]))
     assert np.array_equal(again.lines, cloud.lines)
 
 
 @pytest.mark.parametrize(("name", "lost"), [("anatomical", (3, 4)), ("cardbox", ())])
 def test_a_runs_puppet_stands_where_its_joints_are(tmp_path, name, lost):
     folder = make_run(tmp_path / "run", name, frames=12, lost=lost, spread=True)
-    show = open_scene(folder)
-    figure, motion = show.figures[0], read_run(folder).motion
+    scene = open_scene(folder)
+    figure, motion = scene.figures[0], read_run(folder).motion
     for n in (0, 7):
         points = skinned(figure, n)
         assert np.linalg.norm(points[:, None] - motion.joints[n][None], axis=2).min(0).max() < 0.19
     assert [figure.at(float(time)) for time in motion.times] == [None if n in lost else n for n in range(12)]
     spread = figure.uncertainty(7)
     assert np.array_equal(np.sort(spread.axes.ravel()), np.sort(motion.joint_sd[7].ravel()))
-    assert show.notes == ()
-    assert (show.cloud, show.hull, show.cameras) == (None, None, ())
+    assert scene.notes == ()
+    assert (scene.cloud, scene.hull, scene.cameras) == (None, None, ())
 
 
 def test_a_run_without_sizes_is_shown_by_its_joints_and_says_so(tmp_path):
-    show = open_scene(make_run(tmp_path / "run", frames=5, person=False))
-    assert show.figures[0].known.all()
-    assert len(show.problems) == 2
-    assert "person.toml" in show.problems[0]
-    assert "the recording made is not there" in show.problems[1]
+    scene = open_scene(make_run(tmp_path / "run", frames=5, person=False))
+    assert scene.figures[0].known.all()
+    assert len(scene.problems) == 2
+    assert "person.toml" in scene.problems[0]
+    assert "the recording made is not there" in scene.problems[1]
 
 
 def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_path):
@@ -359,9 +359,9 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
     made.replace_text(run / "run.toml", recording, str(tmp_path / "gone"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        show = open_scene(run)
-        assert any("gone" in problem for problem in show.problems)
-        assert [eye.images for eye in show.cameras] == [None]  # where it stood is known
+        scene = open_scene(run)
+        assert any("gone" in problem for problem in scene.problems)
+        assert [eye.images for eye in scene.cameras] == [None]  # where it stood is known
         assert open_scene(run, recording=Path(recording)).cameras[0].images is not None
 
 
@@ -414,17 +414,17 @@ def test_a_prior_is_shown_by_its_regions_and_a_motion_drawn_from_it(tmp_path, rn
     names = tuple(body.skeleton.dof_names[n] for n in kept)
     prior = fit_prior(rng, [poses], PriorSettings(regions=4), names=names, rate=50.0).prior
     write_prior(tmp_path / "prior.npz", prior)
-    show = open_scene(tmp_path / "prior.npz")
-    assert [figure.kind for figure in show.figures] == ["estimate"] + ["mean"] * 4
-    assert len(show.times) == 500
-    assert show.figures[0].known.all()
+    scene = open_scene(tmp_path / "prior.npz")
+    assert [figure.kind for figure in scene.figures] == ["estimate"] + ["mean"] * 4
+    assert len(scene.times) == 500
+    assert scene.figures[0].known.all()
     assert body_of_prior(tmp_path, prior).name == "anatomical"
     share = stationary_shares(prior)
     assert share @ prior.transitions == pytest.approx(share, abs=1e-6)
     drawn = sampled_motion(np.random.default_rng(3), prior, 50)
     assert drawn.shape == (50, len(names))
     assert np.abs(drawn - drawn.mean(0)).max() > 0.05  # it moves
-    lowest = min(skinned(figure, 0)[:, 2].min() for figure in show.figures)
+    lowest = min(skinned(figure, 0)[:, 2].min() for figure in scene.figures)
     assert -0.15 < lowest < 0.15
     other = replace(prior, names=("a", *names[1:]))
     write_prior(tmp_path / "other.npz", other)
@@ -446,25 +446,25 @@ def test_files_of_motion_and_calibrations(tmp_path, rng):
     reference = animation_figure("a", animation)
     assert skinned(bvh.figures[0], 5).mean(0) == pytest.approx(skinned(reference, 5).mean(0), abs=0.02)
     write_calibration(tmp_path / "calibration.toml", made_rig.cameras())
-    show = open_scene(tmp_path / "calibration.toml")
-    assert (len(show.cameras), show.figures, len(show.times)) == (4, (), 1)
-    assert np.linalg.norm(show.middle[:2]) < 0.3
-    assert np.linalg.norm(show.viewpoint - show.middle) > 3
+    scene = open_scene(tmp_path / "calibration.toml")
+    assert (len(scene.cameras), scene.figures, len(scene.times)) == (4, (), 1)
+    assert np.linalg.norm(scene.middle[:2]) < 0.3
+    assert np.linalg.norm(scene.viewpoint - scene.middle) > 3
     assert open_scene(tmp_path).title == "calibration.toml"
 
 
 def test_markers_of_unknown_names_are_shown_all(tmp_path, rng):
     write_joints(tmp_path / "a.csv", JointTable(np.arange(3) / 10, ("m1", "m2"), rng.normal(size=(3, 2, 3))))
-    show = open_scene(tmp_path / "a.csv")
-    assert show.facts["joints"] == "2"
+    scene = open_scene(tmp_path / "a.csv")
+    assert scene.facts["joints"] == "2"
 
 
 def test_a_part_of_a_show():
-    show = Scene(title="a", times=np.arange(50) / 10)
-    assert cut_scene(show, 1.0, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
-    assert len(cut_scene(show, None, None).times) == 50
+    scene = Scene(title="a", times=np.arange(50) / 10)
+    assert cut_scene(scene, 1.0, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
+    assert len(cut_scene(scene, None, None).times) == 50
     with pytest.raises(ShadowPuppetError, match="a part of"):
-        cut_scene(show, 7.0, None)
+        cut_scene(scene, 7.0, None)
 
 
 def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
@@ -508,18 +508,18 @@ def test_what_is_wished_for_is_drawn(tracked, rig):
     assert (np.einsum("fx,fx->f", outward, corners.mean(1)) > 0).all()
     server = open_server(port=0)
     try:
-        show = open_scene(rig)
-        stage = SceneView(server, show, ViewOptions(hull=True, pictures=PictureMode.PICTURE))
+        scene = open_scene(rig)
+        stage = SceneView(server, scene, ViewOptions(hull=True, pictures=PictureMode.PICTURE))
         for n in (3, 9):
-            stage.to(float(show.times[n]))
-            drawn = stage._hull.points.astype(float) + show.middle
-            surface = show.hull(float(show.times[n])).points
+            stage.to(float(scene.times[n]))
+            drawn = stage._hull.points.astype(float) + scene.middle
+            surface = scene.hull(float(scene.times[n])).points
             assert len(drawn) == POINTS
             assert np.linalg.norm(drawn[:100, None] - surface[None], axis=2).min(1).max() < 0.003
             assert stage.frustums[0].handle.image.shape == (120, 160, 3)
         near = stage.frustums[1].handle.scale
         stage.look_through(1)
-        beyond = np.linalg.norm(show.cameras[1].camera.centre - show.middle)
+        beyond = np.linalg.norm(scene.cameras[1].camera.centre - scene.middle)
         assert stage.frustums[1].handle.scale / stage.frustums[1].volume > beyond
         stage.look_through(None)
         assert stage.frustums[1].handle.scale == pytest.approx(near)
@@ -528,15 +528,15 @@ def test_what_is_wished_for_is_drawn(tracked, rig):
         assert (stage._hull.visible, stage.frustums[0].handle.visible) == (False, False)
         stage.close()
         server.scene.reset()
-        show = open_scene(tracked)
-        stage = SceneView(server, show, ViewOptions(particles=True, uncertainty=True))
-        stage.to(float(show.times[14]))
-        cloud = show.cloud(float(show.times[14]))
+        scene = open_scene(tracked)
+        stage = SceneView(server, scene, ViewOptions(particles=True, uncertainty=True))
+        stage.to(float(scene.times[14]))
+        cloud = scene.cloud(float(scene.times[14]))
         assert stage._ellipsoids.batched_positions == pytest.approx(cloud.ellipsoids.points, abs=1e-5)
         assert len(stage._cloud.points) <= 150 * cloud.lines.shape[1]
         assert stage.figures[1].frame.visible
         stage.options.figures["truth"] = stage.options.particles = stage.options.uncertainty = False
-        stage.to(float(show.times[14]))
+        stage.to(float(scene.times[14]))
         assert (stage.figures[1].frame.visible, stage._cloud.visible, stage._ellipsoids.visible) == (False, False, False)
         stage.to(1e6)  # nobody is there any more
         assert not stage.figures[0].frame.visible

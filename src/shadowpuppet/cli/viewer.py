@@ -56,16 +56,16 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
         if html is not None:
             check_page(html)
         listener.begin("reading")
-        show = open_scene(what, options, truth, recording)
+        scene = open_scene(what, options, truth, recording)
         if (second := other or beside) is not None:
-            show = side_by_side(show, open_scene(second, options), apart)
-        show = cut_scene(show, start, end)
-        for problem in show.problems:
+            scene = side_by_side(scene, open_scene(second, options), apart)
+        scene = cut_scene(scene, start, end)
+        for problem in scene.problems:
             listener.warn(problem)
         if html is None:
             listener.stop()
-            return _serve(show, listen, port, not no_open, quiet)
-        write_page(html, show, default_view(show, pictures), listener)
+            return _serve(scene, listen, port, not no_open, quiet)
+        write_page(html, scene, default_view(scene, pictures), listener)
     if not quiet:
         print(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
 
@@ -80,7 +80,7 @@ def _check(other: Path | None, beside: Path | None, html: Path | None, pictures:
         raise SettingsError(f"flags: beside: found {beside} and {other}, expected one of them")
 
 
-def _serve(show: Scene, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
+def _serve(scene: Scene, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
     """Serve the page until Ctrl-C."""
     import contextlib
     import webbrowser
@@ -90,10 +90,10 @@ def _serve(show: Scene, listen: str, port: int | None, opening: bool, quiet: boo
 
     def ready(address: str) -> None:
         if not quiet:
-            print(f"{show.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
+            print(f"{scene.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
         if opening and has_screen():
             with contextlib.suppress(webbrowser.Error):
                 webbrowser.open(address)
 
     with contextlib.suppress(KeyboardInterrupt):
-        serve_scene(show, listen, port, ready=ready)
+        serve_scene(scene, listen, port, ready=ready)

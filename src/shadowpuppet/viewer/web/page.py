@@ -35,7 +35,7 @@ def check_page(path: Path) -> None:
         raise ShadowPuppetError(f"{path}: cannot be written (there is no folder {path.parent})")
 
 
-def write_page(path: str | Path, show: Scene, options: ViewOptions | None = None, listener: Listener | None = None) -> Path:
+def write_page(path: str | Path, scene: Scene, options: ViewOptions | None = None, listener: Listener | None = None) -> Path:
     """Write a scene as one file, with pictures of people only if `options.pictures` says so, else silhouettes.
 
     It has no curves, and no controls but the timeline's. Raises `ShadowPuppetError` if it cannot be written, or without viser.
@@ -44,10 +44,10 @@ def write_page(path: str | Path, show: Scene, options: ViewOptions | None = None
     check_page(path)
     server = open_server(port=0)
     try:
-        text = _recorded(server, show, options or ViewOptions(pictures=PictureMode.SILHOUETTE), listener or Listener())
+        text = _recorded(server, scene, options or ViewOptions(pictures=PictureMode.SILHOUETTE), listener or Listener())
     finally:
         close_server(server)
-    write_whole(path, sealed_page(text, show.title))
+    write_whole(path, sealed_page(text, scene.title))
     return path
 
 
@@ -66,8 +66,8 @@ def kept_frames(times: Array) -> Array:
     return times[::every]
 
 
-def _recorded(server: viser.ViserServer, show: Scene, options: ViewOptions, listener: Listener) -> str:
-    view, times = SceneView(server, show, options, width=WIDTH, points=POINTS), kept_frames(show.times)
+def _recorded(server: viser.ViserServer, scene: Scene, options: ViewOptions, listener: Listener) -> str:
+    view, times = SceneView(server, scene, options, width=WIDTH, points=POINTS), kept_frames(scene.times)
     view.to(float(times[0]))
     serializer = server.get_scene_serializer()
     listener.begin("writing", len(times))

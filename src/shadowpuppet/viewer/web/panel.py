@@ -35,15 +35,15 @@ class Panel:
 
     def __init__(self, server: viser.ViserServer, view: SceneView, clock: Callable[[], float] = time.monotonic) -> None:
         """Adds the controls that the scene needs."""
-        self.server, self.view, self.show = server, view, view.show
-        self.timeline = Timeline(self.show.times, clock)
+        self.server, self.view, self.scene = server, view, view.scene
+        self.timeline = Timeline(self.scene.times, clock)
         self._changed, self._done, self._drawing = threading.Event(), False, threading.Lock()
         self._shown: int | None = None
         self._setting = False
         server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium", brand_color=(0, 92, 148))
         server.gui.set_panel_label("shadowpuppet")
         self.status = server.gui.add_markdown("")
-        if len(self.show.times) > 1:
+        if len(self.scene.times) > 1:
             self._add_timeline()
         self._add_layers()
         self.plots = self._add_plots()
@@ -70,7 +70,7 @@ class Panel:
             if self.view.reads_first:
                 self.status.content += " · reading the films"
             slow = self.view.reads_first
-            self.view.to(float(self.show.times[frame]))
+            self.view.to(float(self.scene.times[frame]))
             if slow:
                 self._show_facts_of(frame)
 
@@ -82,7 +82,7 @@ class Panel:
     # The timeline
 
     def _add_timeline(self) -> None:
-        gui, last = self.server.gui, len(self.show.times) - 1
+        gui, last = self.server.gui, len(self.scene.times) - 1
         self.slider = gui.add_slider("frame", min=0, max=last, step=1, initial_value=0)
         self.play = gui.add_button(PLAY)
         self.steps = gui.add_button_group("step", ("|<", "<", ">", ">|"))
@@ -113,13 +113,13 @@ class Panel:
     def _step(self, how: str) -> None:
         if how in ("|<", ">|"):
             self.timeline.pause()
-            self.timeline.seek(0 if how == "|<" else len(self.show.times) - 1)
+            self.timeline.seek(0 if how == "|<" else len(self.scene.times) - 1)
         else:
             self.timeline.step(-1 if how == "<" else 1)
         self._changed.set()
 
     def _commands(self) -> None:
-        if len(self.show.times) < 2:
+        if len(self.scene.times) < 2:
             return
         gui = self.server.gui
         gui.add_command("Play or pause", hotkey="space").on_trigger(lambda _: self.toggle())
@@ -131,22 +131,22 @@ class Panel:
     def _add_layers(self) -> None:
         gui, options = self.server.gui, self.view.options
         with gui.add_folder("Show"):
-            for kind in dict.fromkeys(figure.kind for figure in self.show.figures):
+            for kind in dict.fromkeys(figure.kind for figure in self.scene.figures):
                 self._box(NAMES[kind], options.figures[kind], lambda on, kind=kind: options.figures.__setitem__(kind, on))
-            if any(figure.kind != "truth" for figure in self.show.figures):
+            if any(figure.kind != "truth" for figure in self.scene.figures):
                 self._box("see through", options.transparent, self.view.set_transparent)
-            if self.show.hull is not None:
+            if self.scene.hull is not None:
                 self._box("hull points", options.hull, lambda on: setattr(options, "hull", on))
-            if self.show.cameras:
+            if self.scene.cameras:
                 self._box("cameras", options.cameras, lambda on: setattr(options, "cameras", on))
-                if any(each.images is not None for each in self.show.cameras):
+                if any(each.images is not None for each in self.scene.cameras):
                     modes = tuple(mode.value for mode in PictureMode)
                     self._choice("in them", modes, options.pictures.value, lambda value: setattr(options, "pictures", PictureMode(value)))
-                names = dict.fromkeys(each.camera.name for each in self.show.cameras)
+                names = dict.fromkeys(each.camera.name for each in self.scene.cameras)
                 self.through = self._choice("look through", (FREE, *names), FREE, self._through)
-            if self.show.has_uncertainty or self.show.cloud is not None:
+            if self.scene.has_uncertainty or self.scene.cloud is not None:
                 self._box("uncertainty", options.uncertainty, lambda on: setattr(options, "uncertainty", on))
-            if self.show.cloud is not None:
+            if self.scene.cloud is not None:
                 self._box("particles", options.particles, lambda on: setattr(options, "particles", on))
 
     def _box(self, name: str, value: bool, act: Callable[[bool], None]) -> None:
@@ -177,14 +177,14 @@ class Panel:
 
     def _through(self, name: str) -> None:
         """Move all viewers to a camera, or back to the first viewpoint."""
-        names = [each.camera.name for each in self.show.cameras]
+        names = [each.camera.name for each in self.scene.cameras]
         n = names.index(name) if name in names else None
         self.view.look_through(n)
         for client in self.server.get_clients().values():
             with client.atomic():
                 if n is None:
                     client.camera.up_direction = (0.0, 0.0, 1.0)
-                    client.camera.position, client.camera.look_at = self.show.viewpoint, self.show.middle
+                    client.camera.position, client.camera.look_at = self.scene.viewpoint, self.scene.middle
                     client.camera.fov = np.radians(60)
                 else:
                     frustum = self.view.frustums[n]
@@ -194,7 +194,7 @@ class Panel:
     # Curves
 
     def _add_plots(self) -> list[CurvePlot]:
-        charts = self.show.charts
+        charts = self.scene.charts
         if not charts:
             return []
         first = charts[0]
@@ -207,18 +207,18 @@ class Panel:
 
     def _show_facts_of(self, frame: int) -> None:
         """Update status line, plots and controls for a frame."""
-        now = float(self.show.times[frame])
-        words = [f"**{now:.2f} s**", f"frame {frame}"] if len(self.show.times) > 1 else []
-        for figure in self.show.figures:
+        now = float(self.scene.times[frame])
+        words = [f"**{now:.2f} s**", f"frame {frame}"] if len(self.scene.times) > 1 else []
+        for figure in self.scene.figures:
             n = figure.at(now) if figure.status is None else int(np.abs(figure.times - now).argmin())
             if n is not None and figure.status is not None:
                 words.append(str(figure.status[n]) + (f", overlap {figure.overlap[n]:.2f}" if figure.overlap is not None
                                                       and np.isfinite(figure.overlap[n]) else ""))  # fmt: skip
-        words += [f"{chart.name} {_value(chart, now)}" for chart in self.show.charts if chart.name == "error" and _value(chart, now)]
+        words += [f"{chart.name} {_value(chart, now)}" for chart in self.scene.charts if chart.name == "error" and _value(chart, now)]
         self.status.content = " · ".join(words)
         for plot in self.plots:
             plot.to(now)
-        if len(self.show.times) > 1:
+        if len(self.scene.times) > 1:
             self._setting = True
             self.slider.value = frame
             self.play.label = PAUSE if self.timeline.playing else PLAY
@@ -228,8 +228,8 @@ class Panel:
         gui = self.server.gui
         with gui.add_folder("About", expand_by_default=False):
             rows = "".join(f"<tr><td style='opacity:.6;padding-right:.8em;vertical-align:top'>{_plain(key)}</td>"
-                           f"<td style='word-break:break-word'>{_plain(value)}</td></tr>" for key, value in self.show.facts.items())
-            notes = "".join(f"<p>{_plain(note)}</p>" for note in (*self.show.notes, *self.show.problems))
+                           f"<td style='word-break:break-word'>{_plain(value)}</td></tr>" for key, value in self.scene.facts.items())
+            notes = "".join(f"<p>{_plain(note)}</p>" for note in (*self.scene.notes, *self.scene.problems))
             gui.add_html(f"<div style='font-size:.8em;margin:.5em 1em'><table>{rows}</table>{notes}</div>")
 
 

@@ -51,25 +51,25 @@ class ViewOptions:
 class SceneView:
     """The nodes of a scene in a viser server; `to(time)` sets them."""
 
-    def __init__(self, server: viser.ViserServer, show: Scene, options: ViewOptions | None = None, *, width: int = 320,
+    def __init__(self, server: viser.ViserServer, scene: Scene, options: ViewOptions | None = None, *, width: int = 320,
                  points: int = POINTS) -> None:
         """`width`: of images in frustums, pixels; `points`: on the hull."""
-        self.server, self.show, self.options, self.points = server, show, options or ViewOptions(), points
-        self.time = float(show.times[0])
+        self.server, self.scene, self.options, self.points = server, scene, options or ViewOptions(), points
+        self.time = float(scene.times[0])
         server.scene.set_up_direction("+z")
         self._floor()
         self.figures = [FigureNodes(server, figure, f"/people/{n} {node_name(figure.name)}", self.options.transparent)
-                        for n, figure in enumerate(show.figures)]
+                        for n, figure in enumerate(scene.figures)]
         self.frustums = [Frustum(server, n, each, Undistorter(each.camera, width), self._frustum_length())
-                         for n, each in enumerate(show.cameras)]
-        for n, (text, place) in enumerate(show.labels):
+                         for n, each in enumerate(scene.cameras)]
+        for n, (text, place) in enumerate(scene.labels):
             server.scene.add_label(f"/labels/{n}", text, position=place, font_screen_scale=0.9)
         self._hull: Any = None
         self._ellipsoids: Any = None
         self._cloud: Any = None
         self._warm, self._pool = False, ThreadPoolExecutor(usable_cores(), "images")
-        server.initial_camera.position = triple(show.viewpoint)
-        server.initial_camera.look_at = triple(show.middle)
+        server.initial_camera.position = triple(scene.viewpoint)
+        server.initial_camera.look_at = triple(scene.middle)
         server.initial_camera.up = (0.0, 0.0, 1.0)
 
     def to(self, time: float) -> None:
@@ -79,7 +79,7 @@ class SceneView:
             self.people(time)
         mode = self.options.pictures
         images = list(self._pool.map(lambda frustum: frustum.image(time, mode), self.frustums)) if self.options.cameras else []
-        hull = self.show.hull(time) if self.show.hull is not None and self.options.hull else None
+        hull = self.scene.hull(time) if self.scene.hull is not None and self.options.hull else None
         stated = self._stated(time)
         cloud = self._particles(time, stated is None)
         self._warm = True
@@ -95,7 +95,7 @@ class SceneView:
     @property
     def reads_first(self) -> bool:
         """Whether the next call of `to` learns backgrounds first."""
-        return not self._warm and self.options.cameras and any(each.images is not None for each in self.show.cameras)
+        return not self._warm and self.options.cameras and any(each.images is not None for each in self.scene.cameras)
 
     def people(self, time: float) -> None:
         """Set the figures alone."""
@@ -119,30 +119,30 @@ class SceneView:
         """Move the image of camera `n` behind the figures, to be looked through; None: of no camera."""
         self.options.through = n
         for k, frustum in enumerate(self.frustums):
-            distance = float(np.linalg.norm(self.show.cameras[k].camera.centre - self.show.middle))
-            frustum.set_distance(distance + 0.6 * self.show.size if k == n else self._frustum_length())
+            distance = float(np.linalg.norm(self.scene.cameras[k].camera.centre - self.scene.middle))
+            frustum.set_distance(distance + 0.6 * self.scene.size if k == n else self._frustum_length())
 
     # Parts
 
     def _floor(self) -> None:
-        low, high = self.show.box
+        low, high = self.scene.box
         side = float(np.ceil(max(high[0] - low[0], high[1] - low[1]) + 2.5))
-        place = (float(np.round(self.show.middle[0])), float(np.round(self.show.middle[1])), self.show.floor)
+        place = (float(np.round(self.scene.middle[0])), float(np.round(self.scene.middle[1])), self.scene.floor)
         self.server.scene.add_grid("/floor", width=side, height=side, position=place, cell_size=0.5, section_size=1.0,
                                    cell_color=(214, 218, 224), section_color=(176, 182, 192), shadow_opacity=0.0)
 
     def _frustum_length(self) -> float:
-        share = FRUSTUM_SHARE if self.show.figures or len(self.show.cameras) > 1 else LONE_FRUSTUM_SHARE
-        return float(np.clip(share * self.show.size, *FRUSTUM_LENGTHS))
+        share = FRUSTUM_SHARE if self.scene.figures or len(self.scene.cameras) > 1 else LONE_FRUSTUM_SHARE
+        return float(np.clip(share * self.scene.size, *FRUSTUM_LENGTHS))
 
     def _particles(self, time: float, unstated: bool) -> ParticleCloud | None:
         """Particles, if they or, without a stated uncertainty, their spread are shown."""
         wanted = self.options.particles or (self.options.uncertainty and unstated)
-        return self.show.cloud(time) if wanted and self.show.cloud is not None else None
+        return self.scene.cloud(time) if wanted and self.scene.cloud is not None else None
 
     def _stated(self, time: float) -> Ellipsoids | None:
         """The uncertainty that the run states, if it is shown."""
-        for figure in self.show.figures if self.options.uncertainty else ():
+        for figure in self.scene.figures if self.options.uncertainty else ():
             n = figure.at(time) if figure.kind == "estimate" else None
             if n is not None and (stated := figure.uncertainty(n)) is not None:
                 return stated
@@ -154,11 +154,11 @@ class SceneView:
                 self._hull.visible = False
             return
         order = np.linspace(0, len(hull.points) - 1, self.points).round().astype(int)  # a constant number, so that the page keeps the node
-        places = (hull.points[order] - self.show.middle).astype(np.float16)
+        places = (hull.points[order] - self.scene.middle).astype(np.float16)
         colours = BY_CAMERA[hull.cameras[order] % len(BY_CAMERA)]
         if self._hull is None:
             self._hull = self.server.scene.add_point_cloud("/hull points", places, colours, point_size=0.009, point_shape="circle",
-                                                           position=triple(self.show.middle))
+                                                           position=triple(self.scene.middle))
         else:
             self._hull.points, self._hull.colors, self._hull.visible = places, colours, True
 

@@ -14,7 +14,7 @@ from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
 from shadowpuppet.viewer.web.server import address_of, close_server, open_server
 
 
-def serve_scene(show: Scene, listen: str = "127.0.0.1", port: int | None = None, options: ViewOptions | None = None,
+def serve_scene(scene: Scene, listen: str = "127.0.0.1", port: int | None = None, options: ViewOptions | None = None,
          ready: Callable[[str], None] = lambda address: None, done: Callable[[], bool] = lambda: False) -> None:
     """Serve a scene's page until `done` returns True, or Ctrl-C. `ready` is called with its address.
 
@@ -22,7 +22,7 @@ def serve_scene(show: Scene, listen: str = "127.0.0.1", port: int | None = None,
     """
     server = open_server(listen, port)
     try:
-        view = SceneView(server, show, options or default_view(show))
+        view = SceneView(server, scene, options or default_view(scene))
         view.people(view.time)
         panel = Panel(server, view, time.monotonic)
         ready(address_of(server))
@@ -32,10 +32,10 @@ def serve_scene(show: Scene, listen: str = "127.0.0.1", port: int | None = None,
 
 
 @contextmanager
-def serving(show: Scene, options: ViewOptions, **more: int) -> Iterator[tuple[str, Panel]]:
+def serving(scene: Scene, options: ViewOptions, **more: int) -> Iterator[tuple[str, Panel]]:
     """Serve a scene in a thread of its own: the page's address and its controls. `more`: of `SceneView`. Raises as `serve_scene`."""
     server = open_server(port=0)
-    panel = Panel(server, SceneView(server, show, options, **more))
+    panel = Panel(server, SceneView(server, scene, options, **more))
     thread = threading.Thread(target=panel.follow)
     thread.start()
     try:
@@ -47,11 +47,11 @@ def serving(show: Scene, options: ViewOptions, **more: int) -> Iterator[tuple[st
         close_server(server)
 
 
-def default_view(show: Scene, pictures: bool = True) -> ViewOptions:
+def default_view(scene: Scene, pictures: bool = True) -> ViewOptions:
     """The first view of a scene: bodies transparent if a truth or an uncertainty is inside them, hull points if there is no puppet, the
     pictures of films (or their silhouettes alone)."""
-    kinds = {figure.kind for figure in show.figures}
+    kinds = {figure.kind for figure in scene.figures}
     mode = PictureMode.PICTURE if pictures else PictureMode.SILHOUETTE
-    transparent = "estimate" in kinds and ("truth" in kinds or show.has_uncertainty)
-    return ViewOptions(transparent=transparent, hull=show.hull is not None and "estimate" not in kinds, pictures=mode,
-                       uncertainty=show.has_uncertainty)
+    transparent = "estimate" in kinds and ("truth" in kinds or scene.has_uncertainty)
+    return ViewOptions(transparent=transparent, hull=scene.hull is not None and "estimate" not in kinds, pictures=mode,
+                       uncertainty=scene.has_uncertainty)
