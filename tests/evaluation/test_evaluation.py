@@ -201,7 +201,7 @@ def test_another_world_is_said_not_scored_in_silence(shell, folder, tmp_path):
     write_joints(tmp_path / "far.csv", JointTable(TRUTH.times, TRUTH.names, TRUTH.positions @ R.T + [3, 1, 0]))
     code, out, err = shell(folder / "run", "far.csv", "--json")
     assert (code, err.startswith("warning: the run's joints are ")) == (0, True)
-    assert "are they in two world_difference, or is the distance wrong? --align compares after that" in err
+    assert "are they in two worlds, or is the distance wrong? --align compares after that" in err
     measured = json.loads(out)
     assert measured["world"]["apart"]
     assert measured["world"]["rotation_deg"] == pytest.approx(57.6, abs=1)

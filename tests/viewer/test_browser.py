@@ -226,7 +226,7 @@ def test_a_live_session_is_shown_and_its_buttons_are_wishes(browser, run):
             page.page.wait_for_timeout(500)
             assert coloured(page.seen()) > 300
             assert "overlap 0.91" in page.page.inner_text("body")
-            assert display.options() == ""
+            assert display.wish() == ""
             page.page.get_by_role("button", name="Stop", exact=True).click()
-            page.wait(lambda: display.options() == "stop", "a button is a options")
+            page.wait(lambda: display.wish() == "stop", "a button is a wish")
             assert page.errors == []

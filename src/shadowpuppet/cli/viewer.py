@@ -26,7 +26,7 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
                                               "motion: .amc, .bvh, .c3d, .csv, .npz, .parquet, .trc.")],
          other: Annotated[Path | None, Parameter(help="A second one, shown beside the first.")] = None, /, *,
          beside: Annotated[Path | None, flag("The same as OTHER.")] = None,
-         apart: Annotated[float, flag("Metres cut_scene the two; 0: one over the other.")] = 1.5,
+         apart: Annotated[float, flag("Metres between the two; 0: one over the other.")] = 1.5,
          truth: Annotated[Path | None, flag("Truth of a run, in place of its recording's.")] = None,
          recording: Annotated[Path | None, flag("Recording of a run, if it was moved.")] = None,
          start: Annotated[float | None, flag("Seconds at which it starts.")] = None,

@@ -188,7 +188,7 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTa
     if world.get("apart"):
         warn(f"the run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run is turned by "
              f"{world['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(world['moved_mm']):.0f} mm as a whole: are they in two "
-             "world_difference, or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
+             "worlds, or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
     return truth, world | ({"moved": False} if world else {})
 
 

@@ -56,7 +56,7 @@ def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
             yield False, world_text(world)[0].upper() + world_text(world)[1:] + "."
         elif world.get("apart"):
             yield True, (f"The run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run "
-                         "is moved and turned as a whole: are they in two world_difference, or is the distance wrong? (--align)")
+                         "is moved and turned as a whole: are they in two worlds, or is the distance wrong? (--align)")
         if errors["lost"]:
             yield True, (f"{errors['lost']} of {errors['frames']} frames of the truth have no pose of the run; each joint counts "
                          f"{1000 * LOST:.0f} mm there.")
