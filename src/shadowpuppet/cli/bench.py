@@ -32,31 +32,25 @@ MULTI_ROWS = (
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
 
 
-def bench(*, json: Path | None = None, picture: Path | None = None, quick: Switch = False, quiet: Quiet = False) -> None:
+def bench(*, json: Path | None = None, quick: Switch = False, quiet: Quiet = False) -> None:
     """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
     Parameters
     ----------
     json
         File that gets all figures, by flat keys such as "mono.particle_us".
-    picture
-        File that gets plots of cost against particles, picture size, points and cameras (.png, .pdf or .svg; needs matplotlib).
     quick
         Fewer rounds, a shorter film, nothing compiled anew.
     """
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.evaluation.bench.files import check_plans, write_figures
-    from shadowpuppet.evaluation.bench.run import run_bench
+    from shadowpuppet.evaluation.bench.run import check_writable, run_bench, write_figures
 
-    check_plans(json, picture)
+    if json is not None:
+        check_writable(json)
     with terminal(quiet) as listener:
         found = run_bench(quick, listener)
     if json is not None:
         write_figures(json, found)
-    if picture is not None:
-        from shadowpuppet.cli.plots import plot_curves
-
-        plot_curves(found["curves"], picture)
     if not quiet:
         show(*_tables(found))
 
