@@ -24,7 +24,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import tomli_w
 
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.settings import default_of, settings_of
+from shadowpuppet.settings import settings_of
 from shadowpuppet.synthetic.spec import TABLES, Spec
 from shadowpuppet.tracking.monocular.settings import PRESETS
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS
@@ -46,13 +46,13 @@ def settings_table(table: str = "") -> str:
     for name in table.split(".") if table else ():
         of = getattr(of, name)
     rows = ["| setting | default | possible | what it does |", "|---|---|---|---|"]
-    for field, kind, told in settings_of(type(of)):
-        default = getattr(of, field.name)
+    for name, kind, _, told in settings_of(type(of)):
+        default = getattr(of, name)
         if is_dataclass(default):
-            place = f"{table}.{field.name}".lstrip(".")
+            place = f"{table}.{name}".lstrip(".")
             rows.append(f"| [`[{place}]`](#{place.replace('.', '')}) | | | {told} |")
         else:
-            cells = (f"`{field.name}`", "" if default is None else f"`{_plain(default)}`", _possible(kind), told)
+            cells = (f"`{name}`", "" if default is None else f"`{_plain(default)}`", _possible(kind), told)
             rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows)
 
@@ -60,13 +60,12 @@ def settings_table(table: str = "") -> str:
 def spec_table(table: str = "") -> str:
     """Markdown table of the settings of a spec, or of one of its tables."""
     rows = ["| setting | default | possible | what it is |", "|---|---|---|---|"]
-    for field, kind, told in settings_of(TABLES[table] if table else Spec):
-        default = default_of(field)
-        if field.name in TABLES and field.name != table:
-            rows.append(f"| [`{field.name}`](#{field.name}) | | | {told} |")
+    for name, kind, default, told in settings_of(TABLES[table] if table else Spec):
+        if name in TABLES and name != table:
+            rows.append(f"| [`{name}`](#{name}) | | | {told} |")
         else:
             shown = "" if default is None or default is MISSING else f"`{_plain(default)}`"
-            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{field.name}`", shown, _possible(kind), told)) + " |")
+            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{name}`", shown, _possible(kind), told)) + " |")
     return "\n".join(rows)
 
 

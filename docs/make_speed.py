@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.cli.tables import BENCHED, BENCHED_SEVERAL
+from shadowpuppet.cli.bench import MONO_ROWS, MULTI_ROWS
 from shadowpuppet.evaluation.bench.run import run_bench
 
 PAGE = Path(__file__).parent / "speed.md"
@@ -48,7 +48,7 @@ def tables(found: dict[str, Any]) -> str:
     lines = [f"{here['cpu']} ({here['llvm_cpu']}), {here['cores']} cores, {here['vectors']}; Python {here['python']}, "
              f"NumPy {here['numpy']}, Numba {here['numba']}, OpenCV {here['opencv-python-headless']}.",
              "", "| | median | least | |", "|---|---:|---:|---|"]
-    for key, name, scale, unit, _ in (*BENCHED, *BENCHED_SEVERAL):
+    for key, name, scale, unit, _ in (*MONO_ROWS, *MULTI_ROWS):
         lines.append(f"| {name.strip()} | {scale * raw[key]['median']:.3g} | {scale * raw[key]['least']:.3g} | {unit} |")
     lines += ["", "| key | what | |", "|---|---|---:|"]
     for key, (what, form) in KEYS.items():

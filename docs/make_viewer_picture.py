@@ -17,12 +17,12 @@ from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.scene.open_any import show_of
-from shadowpuppet.viewer.scene.show import Show
+from shadowpuppet.viewer.scene.open_any import open_scene
+from shadowpuppet.viewer.scene.scene import Scene
+from shadowpuppet.viewer.web.frustum_images import PictureMode
 from shadowpuppet.viewer.web.panel import Panel
-from shadowpuppet.viewer.web.pictures import Look
-from shadowpuppet.viewer.web.serve import first_wish, served
-from shadowpuppet.viewer.web.stage import Wish
+from shadowpuppet.viewer.web.scene_view import ViewOptions
+from shadowpuppet.viewer.web.serve import default_view, serving
 
 ASSETS = Path(__file__).parent / "assets"
 SIZE, COLOURS, LARGEST = (1280, 760), (255, 160, 96, 64), 150_000
@@ -32,10 +32,10 @@ SETTLED = 6000
 """Milliseconds until everything is drawn."""
 
 
-def photographed(browser: Browser, show: Show, wish: Wish, name: str, second: float, then: Callable[[Panel], None] = lambda panel: None,
-                 size: tuple[int, int] = SIZE) -> None:
-    """Screenshot of the page at a given time (s) of the show."""
-    with served(show, wish, width=480) as (address, panel):
+def photographed(browser: Browser, scene: Scene, options: ViewOptions, name: str, second: float,
+                 then: Callable[[Panel], None] = lambda panel: None, size: tuple[int, int] = SIZE) -> None:
+    """A picture of the page at a second of the scene."""
+    with serving(scene, options, width=480) as (address, panel):
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.goto(address)
         page.wait_for_selector("canvas")
@@ -43,7 +43,7 @@ def photographed(browser: Browser, show: Show, wish: Wish, name: str, second: fl
         notice = page.locator(".mantine-Notification-closeButton")  # that there is no graphics card
         if notice.count():
             notice.first.click()
-        panel.timeline.seek(int(abs(show.times - second).argmin()))
+        panel.timeline.seek(int(abs(scene.times - second).argmin()))
         panel.again()
         then(panel)
         page.wait_for_timeout(SETTLED)
@@ -74,14 +74,16 @@ def main() -> None:
         if not demo.exists():
             subprocess.run([sys.executable, "-m", "shadowpuppet", "demo", "-o", str(demo), "--quiet"], check=True)
         opened = tool.chromium.launch(executable_path=browser, args=[*FLAGS])
-        several, one = show_of(demo / "run-ring"), show_of(demo / "run")
+        several, one = open_scene(demo / "run-ring"), open_scene(demo / "run")
         ring = Path(several.facts["recording"])
+        hull = ViewOptions(hull=True, pictures=PictureMode.PICTURE)
+        particles = ViewOptions(transparent=True, particles=True, pictures=PictureMode.SILHOUETTE)
         pictures: dict[str, Callable[[str], None]] = {
-            "viewer": lambda name: photographed(opened, several, first_wish(several), name, 2.0),
-            "viewer_hull": lambda name: photographed(opened, show_of(ring, Options()), Wish(hull=True, pictures=Look.PICTURE), name, 2.0),
-            "viewer_through": lambda name: photographed(opened, several, first_wish(several), name, 2.0,
-                                                        through(several.eyes[0].camera.name)),
-            "viewer_particles": lambda name: photographed(opened, one, Wish(glass=True, cloud=True, pictures=Look.SILHOUETTE), name, 4.0),
+            "viewer": lambda name: photographed(opened, several, default_view(several), name, 2.0),
+            "viewer_hull": lambda name: photographed(opened, open_scene(ring, Options()), hull, name, 2.0),
+            "viewer_through": lambda name: photographed(opened, several, default_view(several), name, 2.0,
+                                                        through(several.cameras[0].camera.name)),
+            "viewer_particles": lambda name: photographed(opened, one, particles, name, 4.0),
         }
         for name in wanted or pictures:
             pictures[name](name)

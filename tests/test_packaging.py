@@ -130,12 +130,12 @@ def test_the_method_names_what_is_in_the_code():
 
 def test_every_setting_is_explained():
     def unexplained(kind, place):
-        for field, _, told in settings_of(kind):
-            default = getattr(kind(), field.name)
+        for name, _, _, told in settings_of(kind):
+            default = getattr(kind(), name)
             if hasattr(default, "__dataclass_fields__"):
-                yield from unexplained(type(default), f"{place}{field.name}.")
+                yield from unexplained(type(default), f"{place}{name}.")
             elif not told.endswith((".", ").")):
-                yield place + field.name
+                yield place + name
 
     assert list(unexplained(Options, "")) == []
 

@@ -1,4 +1,4 @@
-"""The one error family of the package."""
+"""Errors and warnings of the package, and exit codes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ failed (`batch`); Ctrl-C."""
 
 
 class ShadowPuppetError(Exception):
-    """A user's mistake or bad input, told in one sentence: where, what was found, what is possible.
+    """A mistake of the user or bad input, in one sentence: where, what was found, what is possible.
 
     The command line prints it without a traceback and exits with code 2.
     """
@@ -37,7 +37,7 @@ class TrackingError(ShadowPuppetError):
 
 
 class FormatError(ShadowPuppetError):
-    """A data file that is not what its name says."""
+    """A data file of another format than its name says, or damaged."""
 
 
 class SettingsError(ShadowPuppetError, ValueError):
@@ -45,15 +45,15 @@ class SettingsError(ShadowPuppetError, ValueError):
 
 
 def choices(names: Iterable[str]) -> str:
-    """Valid names as they are listed in messages: `a, b, c`."""
+    """Valid names for a message: `a, b, c`."""
     return ", ".join(sorted(names)) or "none"
 
 
 def shown(value: object) -> str:
-    """A value as messages show it: NumPy's numbers and arrays as Python's."""
+    """A value for a message, with NumPy numbers and arrays as those of Python."""
     plain = getattr(value, "tolist", None)
     return repr(plain() if callable(plain) else value)
 
 
 class ShadowPuppetWarning(UserWarning):
-    """Something that does not stop the work but that the user should know."""
+    """A problem that does not stop the work."""

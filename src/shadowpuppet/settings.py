@@ -1,18 +1,14 @@
-"""Settings of the trackers, each documented here and nowhere else; the presets are data.
-
-Every field is a flag of the command line and a line of TOML; unknown names are errors.
-"""
+"""Checked settings: frozen dataclasses whose fields are flags of the command line and lines of TOML, each documented by its docstring."""
 
 from __future__ import annotations
 
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from dataclasses import Field as DataclassField
-from functools import wraps
-from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
+from functools import cache, wraps
+from typing import Annotated, Any, NamedTuple, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
@@ -21,11 +17,14 @@ from shadowpuppet.errors import SettingsError, choices, shown
 
 Settings = TypeVar("Settings")
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 def checked(kind: type[Settings]) -> type[Settings]:
-    """Make a frozen dataclass of a class of settings: every value is checked whichever way it comes.
+    """Class decorator: a frozen dataclass that checks its values.
 
     `Kind(name=value)` raises `SettingsError` for an unknown name or an impossible value, as `validate` does.
     """
@@ -37,69 +36,73 @@ def checked(kind: type[Settings]) -> type[Settings]:
         try:
             check(self, *args, **values)
         except ValidationError as error:
-            raise _told(error, made, made.__name__) from None
+            raise _settings_error(error, made, made.__name__) from None
 
     made.__init__ = __init__
     return made
 
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
-
-
 def validate(kind: type[Settings], values: Mapping[str, Any], source: str = "settings") -> Settings:
-    """Settings of a kind from plain values; a `SettingsError` names the first bad one, what was found and what is possible."""
+    """Settings of a class from plain values. Raises `SettingsError` with the first bad value and what is possible."""
     try:
         return TypeAdapter(kind).validate_python(dict(values))
     except ValidationError as error:
-        raise _told(error, kind, source) from None
+        raise _settings_error(error, kind, source) from None
 
 
-def _told(error: ValidationError, kind: Any, source: str) -> SettingsError:
-    """The first of the mistakes in settings of a kind, in a sentence."""
+def _settings_error(error: ValidationError, kind: Any, source: str) -> SettingsError:
+    """The first mistake in one sentence."""
     first = error.errors()[0]
     place = ".".join(str(key) for key in first["loc"])
     if first["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
         for key in first["loc"][:-1]:
             kind = type(getattr(kind(), str(key)))
         return SettingsError(f"{source}: unknown setting {place!r}; there are: {choices(f.name for f in fields(kind))}")
-    said = first["msg"].removeprefix("Value error, ")
-    return SettingsError(f"{source}: {place}: found {shown(first['input'])}; {said[:1].lower()}{said[1:]}")
+    message = first["msg"].removeprefix("Value error, ")
+    return SettingsError(f"{source}: {place}: found {shown(first['input'])}; {message[:1].lower()}{message[1:]}")
 
 
-def _plain(settings: Any) -> dict[str, Any]:
-    return {f.name: _plain(value) if is_dataclass(value := getattr(settings, f.name)) else value for f in fields(settings)}
+class Setting(NamedTuple):
+    """One field of a settings class."""
+
+    name: str
+    kind: Any
+    """Its type, with limits."""
+    default: Any
+    """`dataclasses.MISSING` if it must be given."""
+    help: str
+    """Its docstring on one line."""
 
 
-def _merge(*tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables laid over one another, the last on top, inner tables too."""
+@cache
+def settings_of(kind: type) -> tuple[Setting, ...]:
+    """The settings of a class, in order."""
+    hints, docs = get_type_hints(kind, include_extras=True), _field_docstrings(kind)
+    return tuple(Setting(field.name, hints[field.name], _default(field), docs.get(field.name, "")) for field in fields(kind))
+
+
+def plain_values(settings: Any) -> dict[str, Any]:
+    """Settings as plain values; tables of settings become dictionaries."""
+    return {f.name: plain_values(value) if is_dataclass(value := getattr(settings, f.name)) else value for f in fields(settings)}
+
+
+def merged(*tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables over one another, the last on top; inner tables are merged too."""
     out: dict[str, Any] = {}
     for table in tables:
         for key, value in table.items():
-            out[key] = _merge(out[key], value) if isinstance(value, Mapping) and isinstance(out.get(key), Mapping) else value
+            out[key] = merged(out[key], value) if isinstance(value, Mapping) and isinstance(out.get(key), Mapping) else value
     return out
 
 
-def settings_of(kind: type) -> Iterator[tuple[DataclassField, Any, str]]:
-    """Every setting of a settings class: its field, its type, and what its docstring says."""
-    hints, told = get_type_hints(kind, include_extras=True), _docstrings(kind)
-    for field in fields(kind):
-        yield field, hints[field.name], told.get(field.name, "")
-
-
-def default_of(field: DataclassField) -> Any:
-    """What a setting is when it is left out; pydantic wraps some defaults."""
-    default = getattr(field.default, "default", field.default)
+def _default(field: Any) -> Any:
+    default = getattr(field.default, "default", field.default)  # pydantic wraps some defaults
     return field.default_factory() if default is MISSING and field.default_factory is not MISSING else default
 
 
-def _docstrings(kind: type) -> dict[str, str]:
-    """What is written under each field of a class."""
+def _field_docstrings(kind: type) -> dict[str, str]:
+    """The string below each field of a class, by the field's name."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     assert isinstance(tree, ast.ClassDef)
-    told = {}
-    for field, below in zip(tree.body, tree.body[1:]):
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
-            told[field.target.id] = " ".join(str(ast.literal_eval(below.value)).split())
-    return told
+    return {field.target.id: " ".join(str(ast.literal_eval(below.value)).split()) for field, below in zip(tree.body, tree.body[1:])
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr)}

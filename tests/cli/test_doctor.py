@@ -123,6 +123,6 @@ def test_a_window_that_cannot_be_opened_is_told(monkeypatch):
 
 
 def test_an_old_python_breaks_the_core(monkeypatch):
-    monkeypatch.setattr(doctor, "LEAST", (9, 0))
+    monkeypatch.setattr(doctor, "OLDEST_PYTHON", (9, 0))
     (found,) = doctor._python()
     assert (found.state, found.remedy) == ("broken", "install Python 9.0 or later")

@@ -45,6 +45,14 @@ def test_a_library_that_cannot_be_loaded_is_said_in_a_line():
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_doctor_runs_where_a_library_cannot_be_loaded():
+    code = ("import sys; sys.modules['numpy'] = None; sys.argv = ['shadowpuppet', 'doctor']\n"
+            "from shadowpuppet.cli.entry import main; main()")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "tracking does not work here: libraries, kernels" in done.stdout
+
+
 def test_the_entry_point_and_the_module_begin_there():
     from importlib.metadata import entry_points
 

@@ -13,15 +13,15 @@ from numpy.testing import assert_allclose
 
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.evaluation.error_metrics import (
+    acceleration_errors,
     aligned_distances,
     aligned_errors,
     axis_errors,
-    bend_errors,
     bone_errors,
+    hinge_errors,
     humaneva_error,
-    losses,
-    motion_errors,
-    worlds,
+    pose_losses,
+    world_difference,
 )
 from shadowpuppet.evaluation.joint_angles import dof_errors, wrapped
 from shadowpuppet.geometry import rotation_from_vector
@@ -95,6 +95,31 @@ def test_what_is_lost_counts_in_every_way():
     assert aligned_errors(measured(lost), lost, TRUTH)["rigid"] == pytest.approx(250, abs=5)
 
 
+def test_a_lost_root_joint_loses_its_frames_from_the_root_alone():
+    run = noisy(0.001)
+    gone = run.positions.copy()
+    gone[:30, NAMES.index("pelvis")] = np.nan
+    rootless = JointTable(run.times, run.names, gone)
+    distances = aligned_distances(measured(rootless), rootless, TRUTH)
+    assert (distances.pop("root")[:30] == 0.5).all()
+    assert all((d < 0.05).all() for d in distances.values())
+
+
+@pytest.mark.parametrize("way", ["none", "whole", "frame_offset", "root", "rigid", "similar"])
+def test_a_truth_with_gaps_is_compared_where_it_is_known(way):
+    run, gaps = noisy(), TRUTH.positions.copy()
+    gaps[:20, NAMES.index("left_knee")] = np.nan
+    gaps[40:45] = np.nan
+    truth = JointTable(TRUTH.times, TRUTH.names, gaps)
+    errors = measured(run, truth)
+    distance, whole = aligned_distances(errors, run, truth)[way], aligned_distances(measured(run), run, TRUTH)[way]
+    knee = LIMB_JOINTS.index("left_knee")
+    assert np.isfinite(aligned_errors(errors, run, truth)[way])
+    assert not errors.known[:20, knee].any()
+    assert not errors.lost.any()
+    assert distance[errors.known] == pytest.approx(whole[errors.known], abs=0.02)
+
+
 # Axes, worlds
 
 
@@ -113,7 +138,7 @@ def test_axes_have_signs_and_leave_out_what_is_lost():
 @given(st.floats(0.2, 3.0))
 def test_another_world_is_told_by_what_one_rigid_motion_makes_good(angle):
     run = turned(noisy(0.01), [0, 0, angle], [2, -1, 0])
-    found = worlds(measured(run), run, TRUTH)
+    found = world_difference(measured(run), run, TRUTH)
     assert found["apart"]
     assert found["rotation_deg"] == pytest.approx(np.degrees(angle), abs=1)
     assert np.abs(found["axis"][2]) == pytest.approx(1, abs=0.02)
@@ -122,10 +147,10 @@ def test_another_world_is_told_by_what_one_rigid_motion_makes_good(angle):
 
 def test_a_bad_run_is_not_taken_for_another_world():
     bad = noisy(0.3)
-    assert not worlds(measured(bad), bad, TRUTH)["apart"]
-    assert not worlds(measured(noisy()), noisy(), TRUTH)["apart"]
+    assert not world_difference(measured(bad), bad, TRUTH)["apart"]
+    assert not world_difference(measured(noisy()), noisy(), TRUTH)["apart"]
     nothing = JointTable(TRUTH.times, TRUTH.names, np.full_like(TRUTH.positions, np.nan))
-    assert worlds(measured(nothing), nothing, TRUTH) == {}
+    assert world_difference(measured(nothing), nothing, TRUTH) == {}
 
 
 # Posture, motion, bones
@@ -138,6 +163,12 @@ def test_humaneva_s_error_is_the_mean_over_its_fifteen():
               for t in range(len(run.times))]
     found = humaneva_error(run, TRUTH)
     assert (found["mean_mm"], found["sd_mm"]) == pytest.approx((1000 * np.mean(frames), 1000 * np.std(frames)))
+    gaps = TRUTH.positions.copy()
+    gaps[:7, NAMES.index("left_knee")] = np.nan
+    partly = humaneva_error(run, JointTable(TRUTH.times, TRUTH.names, gaps))
+    assert (partly["mean_mm"], partly["frames"]) == (pytest.approx(1000 * np.mean(frames[7:])), len(frames) - 7)
+    gaps[:, NAMES.index("left_knee")] = np.nan
+    assert humaneva_error(run, JointTable(TRUTH.times, TRUTH.names, gaps)) == {"missing": {"run": [], "truth": ["left_knee"]}}
     fewer = TRUTH.select([name for name in NAMES if name != "head"])
     assert humaneva_error(run, fewer) == {"missing": {"run": [], "truth": ["head"]}}
 
@@ -147,18 +178,18 @@ def test_an_elbow_is_as_far_bent_as_it_is():
         wrist = [0.3 + 0.25 * np.cos(bend), 0.25 * np.sin(bend), 0]
         return JointTable(np.zeros(1), ("left_shoulder", "left_elbow", "left_wrist"), np.array([[[0, 0, 0], [0.3, 0, 0], wrist]]))
 
-    found = bend_errors(arm(np.radians(100)), arm(np.radians(70)))
+    found = hinge_errors(arm(np.radians(100)), arm(np.radians(70)))
     assert found == {"left_elbow": pytest.approx({"bias": 30, "mean": 30, "rmse": 30})}
-    assert bend_errors(arm(np.pi), arm(0.0))["left_elbow"]["mean"] == pytest.approx(180)
+    assert hinge_errors(arm(np.pi), arm(0.0))["left_elbow"]["mean"] == pytest.approx(180)
 
 
 def test_accelerations_are_compared_where_both_are_known():
     run = moved(TRUTH, 0.5 * 2.0 * (TRUTH.times**2)[:, None, None] * np.array([1.0, 0, 0]))
-    found = motion_errors(run, TRUTH)
+    found = acceleration_errors(run, TRUTH)
     assert found["difference_m_s2"] == pytest.approx(2)
     assert found["run_m_s2"] > found["truth_m_s2"]
     short = JointTable(TRUTH.times[:2], TRUTH.names, TRUTH.positions[:2])
-    assert motion_errors(short, short) == {}
+    assert acceleration_errors(short, short) == {}
 
 
 def test_bones_that_are_longer_or_change_are_told():
@@ -186,7 +217,7 @@ def test_gaps_are_counted(status, expected):
     motion = Motion(body_name="cardbox", dof_names=("a",), joint_names=("neck",), times=np.arange(T, dtype=float), poses=nothing,
                     pose_sd=nothing, joints=np.full((T, 1, 3), np.nan), joint_sd=np.full((T, 1, 3), np.nan), cost=nothing[:, 0],
                     overlap=nothing[:, 0], status=np.array([words[sign] for sign in status]))
-    assert losses(motion) == pytest.approx(expected)
+    assert pose_losses(motion) == pytest.approx(expected)
 
 
 # Angles

@@ -9,11 +9,11 @@ from dataclasses import replace
 import biovision
 import numpy as np
 import pytest
-from measured import NAMES, moved, person, write_run
+from measured import NAMES, evaluate_run, moved, person, write_run
 from vicon import c3d
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.evaluation.evaluation import Comparison, evaluate_run, measure_run
+from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.table import write_joints

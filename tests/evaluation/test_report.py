@@ -19,7 +19,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.evaluation.report.charts import by_joint_and_time
 from shadowpuppet.evaluation.report.page import page, write_report
-from shadowpuppet.evaluation.report.pictures import chosen_frames, draw_bones, pictures
+from shadowpuppet.evaluation.report.pictures import draw_bones, pictures, report_frames
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import write_joints
@@ -83,7 +83,7 @@ def images(text: str) -> list[np.ndarray]:
 @pytest.fixture
 def quick(monkeypatch):
     """Pages without their plots, where those are not what is tested."""
-    for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "honesty"):
+    for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "coverage_chart"):
         monkeypatch.setattr(f"shadowpuppet.evaluation.report.charts.{name}", lambda *_: "<svg></svg>")
 
 
@@ -112,7 +112,7 @@ def test_what_a_plot_refers_to_is_there_and_its_own(plain_page):
     assert wanted <= {*read.ids}
     of_other_plots = [name for name in read.ids if read.ids.count(name) > 1 and not re.search(r"-(figure|axes|patch|line2d)", name)]
     owners = {name.split("-")[0] for name in read.ids}
-    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "honesty"} <= owners
+    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "coverage"} <= owners
     assert len({name for name in of_other_plots if name.split("-")[0] not in owners}) == 0
 
 
@@ -185,11 +185,11 @@ def test_odd_runs_make_pages(tmp_path, kind):
 
 
 def test_the_worst_frames_are_chosen_and_usual_ones(tmp_path):
-    chosen = chosen_frames(measure_run(run_that_errs(tmp_path)))
-    worst = [each for each in chosen if not each.usual]
+    chosen = report_frames(measure_run(run_that_errs(tmp_path)))
+    worst = [each for each in chosen if not each.typical]
     assert {12, 40} <= {each.frame for each in worst}
     assert [each.letter for each in chosen] == list("ABCDEFGH")
-    assert sum(each.usual for each in chosen) == 2
+    assert sum(each.typical for each in chosen) == 2
     assert np.diff([each.time for each in worst]).min() >= 4 / 12 - 1e-9
     at_12 = next(each for each in chosen if each.frame == 12)
     assert at_12.worst[0][0] == "left_wrist"
@@ -201,7 +201,7 @@ def test_frames_without_a_pose_do_not_push_the_others_out(tmp_path):
     table.positions[10:50] = np.nan
     write_joints(tmp_path / "truth.csv", TRUTH)
     of = measure_run(write_run(tmp_path / "run", table, truth=tmp_path / "truth.csv"))
-    worst = [each for each in chosen_frames(of) if not each.usual]
+    worst = [each for each in report_frames(of) if not each.typical]
     assert sum(10 <= each.frame < 50 for each in worst) == 2
     assert len(worst) > 3
     assert grey_share(by_joint_and_time(of)) == pytest.approx(40 / 60, abs=0.03)
@@ -226,7 +226,7 @@ def test_frames_of_a_camera_s_overlay_are_shown_side_by_side_with_the_truth(tmp_
     found = images(text)
     assert len(found) == 8
     assert "From overlay.mp4, with the truth" in text
-    for each, image in zip(chosen_frames(of), found):
+    for each, image in zip(report_frames(of), found):
         tiles = np.array_split(image, 3, axis=1)
         assert image.shape[1] == pytest.approx(4 * image.shape[0], rel=0.02)
         assert np.median(tiles[0]) == pytest.approx(40 + 2 * each.frame, abs=4)  # the right frame
@@ -243,7 +243,7 @@ def test_of_several_cameras_overlay_the_person_is_cut_out(tmp_path):
     grids = [np.full((rows * height, columns * width, 3), 40 + 2 * n, np.uint8) for n in range(len(TRUTH.times))]
     write_film(run / "overlay.mp4", grids, 15)
     of = measure_run(run)
-    shots, source = pictures(of, chosen_frames(of))
+    shots, source = pictures(of, report_frames(of))
     assert (len(shots), source) == (8, "overlay.mp4")
     image = cv2.imdecode(np.frombuffer(shots["B"], np.uint8), cv2.IMREAD_COLOR)
     assert image.shape[1] == pytest.approx(5 * 0.75 * image.shape[0], rel=0.05)
@@ -263,9 +263,9 @@ def test_frames_of_several_cameras_are_drawn_from_the_recording(tmp_path):
     run = run_that_errs(tmp_path, recording=str(tmp_path / "lab"), settings={"seed": 4, "max_size": 640})
     write_calibration(run / "calibration.toml", cameras)
     of = measure_run(run)
-    shots, source = pictures(of, chosen_frames(of))
+    shots, source = pictures(of, report_frames(of))
     assert (len(shots), source) == (8, "the recording")
-    for each in chosen_frames(of):
+    for each in report_frames(of):
         image = cv2.imdecode(np.frombuffer(shots[each.letter], np.uint8), cv2.IMREAD_COLOR)
         assert np.median(image) == pytest.approx(40 + 2 * each.frame, abs=5)
         assert image.max() > 220
@@ -313,6 +313,6 @@ def test_measuring_needs_no_plots(tmp_path):
     import sys
 
     run_that_errs(tmp_path)
-    code = f"import sys\nfrom shadowpuppet import cli\ncli.run(['evaluate', {str(tmp_path / 'run')!r}, '--json'])\n" \
+    code = f"import sys\nfrom shadowpuppet.cli.app import run\nrun(['evaluate', {str(tmp_path / 'run')!r}, '--json'])\n" \
            "print('matplotlib' in sys.modules, 'cv2' in sys.modules, file=sys.stderr)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr == "False False\n"

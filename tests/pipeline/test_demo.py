@@ -10,10 +10,10 @@ from pathlib import Path
 import made
 import numpy as np
 import pytest
+from measured import angle_errors
 
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.cli import app as cli
-from shadowpuppet.evaluation.evaluation import angle_errors
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run

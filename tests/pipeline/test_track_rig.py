@@ -9,10 +9,10 @@ import made
 import made_rig
 import numpy as np
 import pytest
+from measured import evaluate_run
 
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
-from shadowpuppet.evaluation.evaluation import evaluate_run
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.options import Options, make_options

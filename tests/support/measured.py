@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from shadowpuppet.evaluation.evaluation import Comparison, measure_run
+from shadowpuppet.evaluation.joint_angles import compared_poses, turn_errors
 from shadowpuppet.io.run import RunWriter
 from shadowpuppet.motion.metrics import GROUPS
 from shadowpuppet.motion.motion import JointTable, MotionFrame
@@ -45,3 +47,13 @@ def write_run(folder: Path, table: JointTable, *, sd=None, status=None, truth: P
                                   None if blank else places, joint_sd=None if sd is None else np.broadcast_to(sd, places.shape),
                                   cost=100.0 + n, overlap=0.9 - 0.001 * n))  # fmt: skip
     return folder
+
+
+def evaluate_run(folder, truth=None, joints=None, **more) -> dict:
+    """The figures of `measure_run`; `more`: fields of `Comparison`."""
+    return measure_run(folder, truth, Comparison(joints, **more)).measured
+
+
+def angle_errors(motion, truth, start: int = 0) -> dict[str, float]:
+    """Root mean square errors of joint rotations, degrees."""
+    return turn_errors(*compared_poses(motion, truth, start))

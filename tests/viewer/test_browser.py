@@ -20,7 +20,7 @@ import pytest
 from shadowpuppet.live.display.view import Angle, View
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
-from shadowpuppet.viewer.scene.open_any import between, show_of
+from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
 
 pytest.importorskip("viser")
 playwright = pytest.importorskip("playwright.sync_api")
@@ -108,11 +108,11 @@ def greenish(image):
 
 
 def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_program(browser, run):
-    from shadowpuppet.viewer.web.serve import served
-    from shadowpuppet.viewer.web.stage import Wish
+    from shadowpuppet.viewer.web.scene_view import ViewOptions
+    from shadowpuppet.viewer.web.serve import serving
 
-    show = replace(show_of(run), charts=())  # which are canvases, too
-    with served(show, Wish(glass=True, cameras=False)) as (address, panel), page_of(browser, address) as page:
+    scene = replace(open_scene(run), charts=())  # which are canvases, too
+    with serving(scene, ViewOptions(transparent=True, cameras=False)) as (address, panel), page_of(browser, address) as page:
         page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
         page.page.wait_for_timeout(1500)  # what fades in has done so
         first = page.seen()
@@ -129,7 +129,7 @@ def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_pr
             page.page.keyboard.press(key)
             page.wait(lambda frame=frame: panel.timeline.frame == frame, f"the key {key}")
         page.page.get_by_label("truth", exact=True).click()
-        page.wait(lambda: not panel.stage.wish.figures["truth"], "a click reaches the program")
+        page.wait(lambda: not panel.view.options.figures["truth"], "a click reaches the program")
         page.wait(lambda: greenish(page.seen()) < 10, "the truth is gone")
         page.page.get_by_role("button", name="Play", exact=True).click()
         page.wait(lambda: panel.timeline.frame > 3, "it plays")
@@ -143,10 +143,10 @@ def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_pr
 
 def test_the_file_plays_alone(browser, run, tmp_path):
     from shadowpuppet.viewer.web.page import write_page
-    from shadowpuppet.viewer.web.serve import first_wish
+    from shadowpuppet.viewer.web.serve import default_view
 
-    show = between(show_of(run), 0.0, 2.5)
-    path = write_page(tmp_path / "run.html", show, first_wish(show, pictures=False))
+    scene = cut_scene(open_scene(run), 0.0, 2.5)
+    path = write_page(tmp_path / "run.html", scene, default_view(scene, pictures=False))
     assert path.stat().st_size < 3e6
     with page_of(browser, path.as_uri()) as page:
         page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
@@ -160,17 +160,17 @@ def test_the_file_plays_alone(browser, run, tmp_path):
 def test_a_file_has_pictures_only_where_they_are_asked_for(run, tmp_path):
     """What is in the file: silhouettes are as good as transparent pictures of one colour."""
     from shadowpuppet.viewer.web import page as pages
-    from shadowpuppet.viewer.web.serve import first_wish
+    from shadowpuppet.viewer.web.serve import default_view
 
-    show, seen = between(show_of(run), 0.0, 0.5), []
-    eye = show.eyes[0].seen
+    scene, seen = cut_scene(open_scene(run), 0.0, 0.5), []
+    eye = scene.cameras[0].images
     original = eye.picture
     for asked in (False, True):
         seen.clear()
         eye.picture = lambda time: seen.append(time) or original(time)
         eye.mask(99.0)
         eye._masked = (np.nan, None)
-        pages.write_page(tmp_path / f"{asked}.html", show, first_wish(show, pictures=asked))
+        pages.write_page(tmp_path / f"{asked}.html", scene, default_view(scene, pictures=asked))
     sizes = [(tmp_path / f"{asked}.html").stat().st_size for asked in (False, True)]
     assert sizes[1] > sizes[0] + 10_000
 

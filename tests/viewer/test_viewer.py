@@ -32,16 +32,16 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.scene.figures import of_animation, of_poses, of_table
-from shadowpuppet.viewer.scene.footage import hull_of
+from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure, pose_figure
+from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_prior import body_of as body_of_prior
-from shadowpuppet.viewer.scene.of_prior import drawn_motion, resting, show_prior
-from shadowpuppet.viewer.scene.of_run import beside
-from shadowpuppet.viewer.scene.open_any import between, show_of
-from shadowpuppet.viewer.scene.show import Chart, Eye, Figure, Show
+from shadowpuppet.viewer.scene.of_prior import prior_scene, sampled_motion, stationary_shares
+from shadowpuppet.viewer.scene.of_run import side_by_side
+from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
+from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
 from shadowpuppet.viewer.web.curves import AROUND, data_around, limits
-from shadowpuppet.viewer.web.page import closed, kept_frames
-from shadowpuppet.viewer.web.pictures import Look, Plain, shown
+from shadowpuppet.viewer.web.frustum_images import PictureMode, Undistorter, frustum_image
+from shadowpuppet.viewer.web.page import kept_frames, sealed_page
 from shadowpuppet.viewer.web.timeline import Timeline
 
 
@@ -78,7 +78,7 @@ def skinned(figure: Figure, n: int) -> np.ndarray:
 def test_a_bodys_mesh_goes_where_its_shapes_are(name, rng):
     body = body_of(name)
     poses, root = smooth_poses(body, 3, rng), rigid(rotation_about([0, 0, 1], 0.7), [1.0, -2.0, 0.5])
-    figure = of_poses("a", body, np.arange(3) / 10, poses, root)
+    figure = pose_figure("a", body, np.arange(3) / 10, poses, root)
     for n in range(3):
         points = skinned(figure, n)
         joints = body.points(poses[n : n + 1], root)[0]
@@ -96,7 +96,7 @@ def test_sticks_lie_between_their_joints(rng):
     turns = rotation_about([0.6, 0.0, 0.8], np.linspace(0, 3, 7))
     places = np.einsum("txy,jy->tjx", turns, start) + rng.normal(size=(7, 1, 3))
     places[3, 3] = np.nan
-    figure = of_table("a", JointTable(np.arange(7) / 10, names, places))
+    figure = joint_figure("a", JointTable(np.arange(7) / 10, names, places))
     for n in (0, 2, 6):
         points = skinned(figure, n)
         for joint in places[n, :4]:
@@ -112,7 +112,7 @@ def test_the_frame_that_is_shown_is_the_nearest_and_only_where_near():
     times = np.array([0.0, 0.1, 0.2, 0.3])
     places = np.zeros((4, 1, 3))
     places[2] = np.nan
-    table = of_table("a", JointTable(times, ("pelvis", "neck"), np.stack([np.zeros((4, 3)), np.tile([0, 0, 0.5], (4, 1))], 1)))
+    table = joint_figure("a", JointTable(times, ("pelvis", "neck"), np.stack([np.zeros((4, 3)), np.tile([0, 0, 0.5], (4, 1))], 1)))
     figure = replace(table, places=np.where(np.arange(4)[:, None, None] == 2, np.nan, table.places))
     assert [figure.at(time) for time in (0.0, 0.04, 0.06, 0.14, 0.21, 0.3, 0.37, 0.4, -0.2)] == [0, 0, 1, 1, None, 3, 3, None, None]
     still = replace(table, times=times[:1], places=table.places[:1], turns=table.turns[:1])
@@ -209,7 +209,7 @@ def test_pictures_in_frustums_have_no_distortion_and_their_axis_in_the_middle(fi
     """A world point is in the plain picture where a camera of the frustum's angle, without distortion, sees it."""
     matrix = np.array([[160.0, 0, 150.0], [0, 155.0, 130.0], [0, 0, 1]])
     camera = Camera("a", (320, 240), matrix, np.array([-0.2, 0.05, 0.001, -0.002]), fisheye=fisheye)
-    plain = Plain(camera, 160)
+    plain = Undistorter(camera, 160)
     assert plain.size == (160, 120)
     image = np.zeros((240, 320), np.uint8)
     for point in np.array([[0.0, 0, 2], [0.5, 0.3, 2], [-0.8, 0.5, 2], [0.6, -0.6, 2]]):
@@ -238,43 +238,43 @@ def test_silhouettes_show_nothing_of_the_picture(rng):
     mask = np.zeros((48, 64), bool)
     mask[10:30, 20:40] = True
     noise = rng.integers(0, 255, (48, 64, 3)).astype(np.uint8)
-    plain = Plain(camera, 64)
-    a, b = (shown(OneFrame(image, mask), plain, 0.0, Look.SILHOUETTE) for image in (noise, 255 - noise))
+    plain = Undistorter(camera, 64)
+    a, b = (frustum_image(OneFrame(image, mask), plain, 0.0, PictureMode.SILHOUETTE) for image in (noise, 255 - noise))
     assert np.array_equal(a, b)
     assert a.shape == (48, 64, 4)
     assert (a[20, 30, 3], a[2, 2, 3] < 60) == (255, True)
-    picture = shown(OneFrame(noise, mask), plain, 0.0, Look.PICTURE)
+    picture = frustum_image(OneFrame(noise, mask), plain, 0.0, PictureMode.PICTURE)
     assert picture.shape == (48, 64, 3)
     assert np.abs(picture[40:, :10].astype(int) - noise[40:, :10, ::-1]).max() <= 1
-    assert shown(OneFrame(noise, mask), plain, 2.0, Look.PICTURE) is None
-    assert shown(OneFrame(noise, mask), plain, 0.0, Look.NOTHING) is None
+    assert frustum_image(OneFrame(noise, mask), plain, 2.0, PictureMode.PICTURE) is None
+    assert frustum_image(OneFrame(noise, mask), plain, 0.0, PictureMode.NOTHING) is None
 
 
 # Recordings
 
 
 def test_a_recording_is_shown_with_its_cameras_hull_and_frames(rig):
-    show = show_of(rig)
-    assert len(show.eyes) == made_rig.CAMERAS
-    assert show.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE)
-    assert show.hull is not None
+    scene = open_scene(rig)
+    assert len(scene.cameras) == made_rig.CAMERAS
+    assert scene.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE)
+    assert scene.hull is not None
     for n in (20, 3, 11):
-        surface = show.hull(float(show.times[n]))
+        surface = scene.hull(float(scene.times[n]))
         assert len(surface.points) > 300
         assert np.linalg.norm(surface.points.mean(0)[:2] - made_rig.place(n)[:2]) < 0.12
-        seen = show.eyes[0].seen
-        exact = made_rig.masks([show.eyes[0].camera], 1, n)[0][0]
-        mask = seen.mask(float(show.times[n]))
+        seen = scene.cameras[0].images
+        exact = made_rig.masks([scene.cameras[0].camera], 1, n)[0][0]
+        mask = seen.mask(float(scene.times[n]))
         assert (mask & exact).sum() / (mask | exact).sum() > 0.9
-        assert seen.picture(float(show.times[n])).shape == (120, 160, 3)
-    assert show.eyes[0].seen.mask(99.0) is None
+        assert seen.picture(float(scene.times[n])).shape == (120, 160, 3)
+    assert scene.cameras[0].images.mask(99.0) is None
 
 
 def test_silhouettes_are_made_where_none_are_ready(rig, tmp_path):
     folder = made.copied(rig, tmp_path / "rig", ["masks"])
-    show = show_of(folder)
-    assert "made as" in show.facts["silhouettes"]
-    mask, exact = show.eyes[1].seen.mask(0.5), made_rig.masks([show.eyes[1].camera], 1, 5)[0][0]
+    scene = open_scene(folder)
+    assert "made as" in scene.facts["silhouettes"]
+    mask, exact = scene.cameras[1].images.mask(0.5), made_rig.masks([scene.cameras[1].camera], 1, 5)[0][0]
     assert (mask & exact).sum() / (mask | exact).sum() > 0.85
 
 
@@ -284,71 +284,71 @@ def test_a_film_whose_silhouettes_cannot_be_made_is_shown_without(rig, tmp_path)
     (folder / "background").mkdir()
     (folder / "background" / "cam2.png").write_bytes((rig / "calibration.toml").read_bytes())
     with pytest.raises(ShadowPuppetError, match="cam2"):  # said before anything is shown
-        show_of(folder)
+        open_scene(folder)
     (folder / "background" / "cam2.png").unlink()
-    seen = show_of(folder).eyes[1].seen
+    seen = open_scene(folder).cameras[1].images
     seen.options = replace(seen.options, silhouette=replace(seen.options.silhouette, method="averaging"))
     with pytest.warns(ShadowPuppetWarning, match="'cam2': no silhouettes"):
         assert seen.mask(0.0) is None
     assert seen.mask(0.1) is None  # said once
-    plain = Plain(seen.footage.camera, 160)
-    assert shown(seen, plain, 0.0, Look.PICTURE).shape == (120, 160, 3)
-    assert shown(seen, plain, 0.0, Look.SILHOUETTE) is None
+    plain = Undistorter(seen.footage.camera, 160)
+    assert frustum_image(seen, plain, 0.0, PictureMode.PICTURE).shape == (120, 160, 3)
+    assert frustum_image(seen, plain, 0.0, PictureMode.SILHOUETTE) is None
 
 
 def test_one_camera_has_no_hull(rig):
-    show = show_of(rig, Options(camera="cam1"))
-    assert ([eye.camera.name for eye in show.eyes], show.hull) == (["cam1"], None)
-    assert hull_of([Eye(Camera.from_fov((64, 48), 1.0)), Eye(Camera.from_fov((64, 48), 1.0))], Options()) is None
+    scene = open_scene(rig, Options(camera="cam1"))
+    assert ([eye.camera.name for eye in scene.cameras], scene.hull) == (["cam1"], None)
+    assert hull_function([SceneCamera(Camera.from_fov((64, 48), 1.0)), SceneCamera(Camera.from_fov((64, 48), 1.0))], Options()) is None
 
 
 # Runs
 
 
 def test_a_run_is_shown_beside_its_truth_with_errors_angles_and_particles(tracked):
-    show = show_of(tracked)
-    estimate, truth = show.figures
-    assert (estimate.kind, truth.kind, show.lacks) == ("estimate", "truth", ())
-    names = [chart.name for chart in show.charts]
+    scene = open_scene(tracked)
+    estimate, truth = scene.figures
+    assert (estimate.kind, truth.kind, scene.problems) == ("estimate", "truth", ())
+    names = [chart.name for chart in scene.charts]
     assert names[:2] == ["error", "overlap"]
     assert {"angles: left arm", "angles: right arm", "angles: trunk and head"} <= set(names)
     measured = read_run(tracked).metrics["errors"]
-    mean = next(chart for chart in show.charts if chart.name == "error").curves["mean"]
+    mean = next(chart for chart in scene.charts if chart.name == "error").curves["mean"]
     assert np.nanmean(mean) == pytest.approx(measured["mean_mm"], rel=0.02)
     n = 14
-    cloud = show.cloud(float(show.times[n]))
+    cloud = scene.cloud(float(scene.times[n]))
     assert cloud is not None
     joints = read_run(tracked).motion.joints[n]
     hand = read_run(tracked).motion.joint_names.index("left_elbow")
     ends = cloud.lines.reshape(-1, 3)
     assert np.linalg.norm(ends - joints[hand], axis=1).min() < 0.08  # some particle is where the run's own estimate was
     assert (cloud.weights.max(), cloud.weights.min() >= 0) == (1.0, True)
-    assert (cloud.spread.axes > 0).all()
-    again = show.cloud(float(show.times[n]))
+    assert (cloud.ellipsoids.axes > 0).all()
+    again = scene.cloud(float(scene.times[n]))
     assert np.array_equal(again.lines, cloud.lines)
 
 
 @pytest.mark.parametrize(("name", "lost"), [("anatomical", (3, 4)), ("cardbox", ())])
 def test_a_runs_puppet_stands_where_its_joints_are(tmp_path, name, lost):
     folder = make_run(tmp_path / "run", name, frames=12, lost=lost, spread=True)
-    show = show_of(folder)
-    figure, motion = show.figures[0], read_run(folder).motion
+    scene = open_scene(folder)
+    figure, motion = scene.figures[0], read_run(folder).motion
     for n in (0, 7):
         points = skinned(figure, n)
         assert np.linalg.norm(points[:, None] - motion.joints[n][None], axis=2).min(0).max() < 0.19
     assert [figure.at(float(time)) for time in motion.times] == [None if n in lost else n for n in range(12)]
-    spread = figure.spread(7)
+    spread = figure.uncertainty(7)
     assert np.array_equal(np.sort(spread.axes.ravel()), np.sort(motion.joint_sd[7].ravel()))
-    assert show.notes == ()
-    assert (show.cloud, show.hull, show.eyes) == (None, None, ())
+    assert scene.notes == ()
+    assert (scene.cloud, scene.hull, scene.cameras) == (None, None, ())
 
 
 def test_a_run_without_sizes_is_shown_by_its_joints_and_says_so(tmp_path):
-    show = show_of(make_run(tmp_path / "run", frames=5, person=False))
-    assert show.figures[0].known.all()
-    assert len(show.lacks) == 2
-    assert "person.toml" in show.lacks[0]
-    assert "the recording made is not there" in show.lacks[1]
+    scene = open_scene(make_run(tmp_path / "run", frames=5, person=False))
+    assert scene.figures[0].known.all()
+    assert len(scene.problems) == 2
+    assert "person.toml" in scene.problems[0]
+    assert "the recording made is not there" in scene.problems[1]
 
 
 def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_path):
@@ -359,10 +359,10 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
     made.replace_text(run / "run.toml", recording, str(tmp_path / "gone"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        show = show_of(run)
-        assert any("gone" in lack for lack in show.lacks)
-        assert [eye.seen for eye in show.eyes] == [None]  # where it stood is known
-        assert show_of(run, recording=Path(recording)).eyes[0].seen is not None
+        scene = open_scene(run)
+        assert any("gone" in problem for problem in scene.problems)
+        assert [eye.images for eye in scene.cameras] == [None]  # where it stood is known
+        assert open_scene(run, recording=Path(recording)).cameras[0].images is not None
 
 
 def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
@@ -371,18 +371,18 @@ def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
     from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
     from shadowpuppet.pipeline.footage import opened
     from shadowpuppet.synthetic import synthesize
-    from shadowpuppet.viewer.scene.of_recording import eyes_of
-    from shadowpuppet.viewer.scene.particles import Rerun
+    from shadowpuppet.viewer.scene.of_recording import cameras_of
+    from shadowpuppet.viewer.scene.particles import ParticleRerun
 
     options = Options()
-    eyes = eyes_of(opened(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
+    cameras = cameras_of(opened(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
     found = fit_poses(read_truth(tmp_path / "ring" / "truth.csv"))
     names = [name for name in found.body.landmark_names if not name.endswith("_fist")]
     builder = MotionBuilder(found.body.name, found.body.skeleton.dof_names, names)
     for time, pose, places in zip(found.times, found.poses, found.body.points(found.poses, names=names)):
         builder.append(MotionFrame(time, "tracked" if time > 0.3 else "lost", pose, places))
     motion = builder.build()
-    rerun = Rerun(found.body, motion, options, eyes)
+    rerun = ParticleRerun(found.body, motion, options, cameras)
     n = 12
     cloud = rerun(float(motion.times[n]))
     assert cloud is not None
@@ -393,12 +393,12 @@ def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
 
 
 def test_two_runs_side_by_side_or_over_each_other(tmp_path):
-    runs = [show_of(make_run(tmp_path / name, frames=frames, seed=seed)) for name, frames, seed in (("a", 10, 1), ("b", 14, 2))]
-    both = beside(*runs, 1.5)
+    runs = [open_scene(make_run(tmp_path / name, frames=frames, seed=seed)) for name, frames, seed in (("a", 10, 1), ("b", 14, 2))]
+    both = side_by_side(*runs, 1.5)
     assert [figure.kind for figure in both.figures] == ["estimate", "other"]
     assert np.linalg.norm(both.figures[1].shift) == pytest.approx(1.5)
     assert abs(both.figures[1].shift[2]) < 1e-12
-    assert beside(*runs, 0.0).figures[1].shift == pytest.approx((0, 0, 0))
+    assert side_by_side(*runs, 0.0).figures[1].shift == pytest.approx((0, 0, 0))
     assert len(both.times) == 14
     curves = next(chart for chart in both.charts if chart.name == "angles: left arm").curves
     assert sum(name.endswith(", beside") for name in curves) == len(curves) / 2
@@ -414,22 +414,22 @@ def test_a_prior_is_shown_by_its_regions_and_a_motion_drawn_from_it(tmp_path, rn
     names = tuple(body.skeleton.dof_names[n] for n in kept)
     prior = fit_prior(rng, [poses], PriorSettings(regions=4), names=names, rate=50.0).prior
     write_prior(tmp_path / "prior.npz", prior)
-    show = show_of(tmp_path / "prior.npz")
-    assert [figure.kind for figure in show.figures] == ["estimate"] + ["mean"] * 4
-    assert len(show.times) == 500
-    assert show.figures[0].known.all()
+    scene = open_scene(tmp_path / "prior.npz")
+    assert [figure.kind for figure in scene.figures] == ["estimate"] + ["mean"] * 4
+    assert len(scene.times) == 500
+    assert scene.figures[0].known.all()
     assert body_of_prior(tmp_path, prior).name == "anatomical"
-    share = resting(prior)
+    share = stationary_shares(prior)
     assert share @ prior.transitions == pytest.approx(share, abs=1e-6)
-    drawn = drawn_motion(np.random.default_rng(3), prior, 50)
+    drawn = sampled_motion(np.random.default_rng(3), prior, 50)
     assert drawn.shape == (50, len(names))
     assert np.abs(drawn - drawn.mean(0)).max() > 0.05  # it moves
-    lowest = min(skinned(figure, 0)[:, 2].min() for figure in show.figures)
+    lowest = min(skinned(figure, 0)[:, 2].min() for figure in scene.figures)
     assert -0.15 < lowest < 0.15
     other = replace(prior, names=("a", *names[1:]))
     write_prior(tmp_path / "other.npz", other)
     with pytest.raises(FormatError, match="names"):
-        show_prior(tmp_path / "other.npz")
+        prior_scene(tmp_path / "other.npz")
 
 
 def test_files_of_motion_and_calibrations(tmp_path, rng):
@@ -441,30 +441,30 @@ def test_files_of_motion_and_calibrations(tmp_path, rng):
     write_joints(tmp_path / "a.csv", JointTable(times, body.landmark_names, body.points(poses)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        bvh, table = show_of(tmp_path / "a.bvh"), show_of(tmp_path / "a.csv")
+        bvh, table = open_scene(tmp_path / "a.bvh"), open_scene(tmp_path / "a.csv")
     assert (len(bvh.times), len(table.times)) == (20, 20)
-    reference = of_animation("a", animation)
+    reference = animation_figure("a", animation)
     assert skinned(bvh.figures[0], 5).mean(0) == pytest.approx(skinned(reference, 5).mean(0), abs=0.02)
     write_calibration(tmp_path / "calibration.toml", made_rig.cameras())
-    show = show_of(tmp_path / "calibration.toml")
-    assert (len(show.eyes), show.figures, len(show.times)) == (4, (), 1)
-    assert np.linalg.norm(show.middle[:2]) < 0.3
-    assert np.linalg.norm(show.viewpoint - show.middle) > 3
-    assert show_of(tmp_path).title == "calibration.toml"
+    scene = open_scene(tmp_path / "calibration.toml")
+    assert (len(scene.cameras), scene.figures, len(scene.times)) == (4, (), 1)
+    assert np.linalg.norm(scene.middle[:2]) < 0.3
+    assert np.linalg.norm(scene.viewpoint - scene.middle) > 3
+    assert open_scene(tmp_path).title == "calibration.toml"
 
 
 def test_markers_of_unknown_names_are_shown_all(tmp_path, rng):
     write_joints(tmp_path / "a.csv", JointTable(np.arange(3) / 10, ("m1", "m2"), rng.normal(size=(3, 2, 3))))
-    show = show_of(tmp_path / "a.csv")
-    assert show.facts["joints"] == "2"
+    scene = open_scene(tmp_path / "a.csv")
+    assert scene.facts["joints"] == "2"
 
 
 def test_a_part_of_a_show():
-    show = Show(title="a", times=np.arange(50) / 10)
-    assert between(show, 1.0, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
-    assert len(between(show, None, None).times) == 50
+    scene = Scene(title="a", times=np.arange(50) / 10)
+    assert cut_scene(scene, 1.0, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
+    assert len(cut_scene(scene, None, None).times) == 50
     with pytest.raises(ShadowPuppetError, match="a part of"):
-        between(show, 7.0, None)
+        cut_scene(scene, 7.0, None)
 
 
 def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
@@ -497,46 +497,46 @@ def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
 
 def test_what_is_wished_for_is_drawn(tracked, rig):
     pytest.importorskip("viser")
-    from shadowpuppet.viewer.web.nodes import ball
+    from shadowpuppet.viewer.web.nodes import unit_sphere
+    from shadowpuppet.viewer.web.scene_view import POINTS, SceneView, ViewOptions
     from shadowpuppet.viewer.web.server import close_server, open_server
-    from shadowpuppet.viewer.web.stage import POINTS, Stage, Wish
 
-    points, faces = ball()
+    points, faces = unit_sphere()
     corners = points[faces]
     assert np.linalg.norm(points, axis=1) == pytest.approx(1, abs=1e-6)
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (np.einsum("fx,fx->f", outward, corners.mean(1)) > 0).all()
     server = open_server(port=0)
     try:
-        show = show_of(rig)
-        stage = Stage(server, show, Wish(hull=True, pictures=Look.PICTURE))
+        scene = open_scene(rig)
+        stage = SceneView(server, scene, ViewOptions(hull=True, pictures=PictureMode.PICTURE))
         for n in (3, 9):
-            stage.to(float(show.times[n]))
-            drawn = stage._hull.points.astype(float) + show.middle
-            surface = show.hull(float(show.times[n])).points
+            stage.to(float(scene.times[n]))
+            drawn = stage._hull.points.astype(float) + scene.middle
+            surface = scene.hull(float(scene.times[n])).points
             assert len(drawn) == POINTS
             assert np.linalg.norm(drawn[:100, None] - surface[None], axis=2).min(1).max() < 0.003
-            assert stage.eyes[0].handle.image.shape == (120, 160, 3)
-        near = stage.eyes[1].handle.scale
+            assert stage.frustums[0].handle.image.shape == (120, 160, 3)
+        near = stage.frustums[1].handle.scale
         stage.look_through(1)
-        beyond = np.linalg.norm(stage.eyes[1].eye.camera.centre - show.middle)
-        assert stage.eyes[1].handle.scale / stage.eyes[1].volume > beyond
+        beyond = np.linalg.norm(scene.cameras[1].camera.centre - scene.middle)
+        assert stage.frustums[1].handle.scale / stage.frustums[1].volume > beyond
         stage.look_through(None)
-        assert stage.eyes[1].handle.scale == pytest.approx(near)
-        stage.wish.hull = stage.wish.cameras = False
+        assert stage.frustums[1].handle.scale == pytest.approx(near)
+        stage.options.hull = stage.options.cameras = False
         stage.to(0.5)
-        assert (stage._hull.visible, stage.eyes[0].handle.visible) == (False, False)
+        assert (stage._hull.visible, stage.frustums[0].handle.visible) == (False, False)
         stage.close()
         server.scene.reset()
-        show = show_of(tracked)
-        stage = Stage(server, show, Wish(cloud=True, spread=True))
-        stage.to(float(show.times[14]))
-        cloud = show.cloud(float(show.times[14]))
-        assert stage._ellipsoids.batched_positions == pytest.approx(cloud.spread.points, abs=1e-5)
+        scene = open_scene(tracked)
+        stage = SceneView(server, scene, ViewOptions(particles=True, uncertainty=True))
+        stage.to(float(scene.times[14]))
+        cloud = scene.cloud(float(scene.times[14]))
+        assert stage._ellipsoids.batched_positions == pytest.approx(cloud.ellipsoids.points, abs=1e-5)
         assert len(stage._cloud.points) <= 150 * cloud.lines.shape[1]
         assert stage.figures[1].frame.visible
-        stage.wish.figures["truth"] = stage.wish.cloud = stage.wish.spread = False
-        stage.to(float(show.times[14]))
+        stage.options.figures["truth"] = stage.options.particles = stage.options.uncertainty = False
+        stage.to(float(scene.times[14]))
         assert (stage.figures[1].frame.visible, stage._cloud.visible, stage._ellipsoids.visible) == (False, False, False)
         stage.to(1e6)  # nobody is there any more
         assert not stage.figures[0].frame.visible
@@ -546,7 +546,7 @@ def test_what_is_wished_for_is_drawn(tracked, rig):
 
 
 def test_a_file_says_what_may_be_fetched_and_its_title():
-    page = closed("<!doctype html><html><head><title>Viser</title></head><body></body></html>", "<b>run</b>")
+    page = sealed_page("<!doctype html><html><head><title>Viser</title></head><body></body></html>", "<b>run</b>")
     assert "default-src 'none'" in page
     assert "<title>&lt;b&gt;run&lt;/b&gt;</title>" in page
     assert "https:" not in page
@@ -609,6 +609,51 @@ def test_a_library_that_cannot_be_guarded_is_not_used(monkeypatch):
     with server.guarded(True) as installed:
         assert library.serve is not plain
         assert not installed()
+    assert library.serve is plain
+
+
+def test_servers_that_begin_at_once_are_guarded_one_after_another(monkeypatch):
+    pytest.importorskip("viser")
+    import threading
+    import time
+
+    import viser
+    import websockets.asyncio.server as library
+
+    from shadowpuppet.viewer.web.server import close_server, open_server
+
+    starting, together, guards = [], [], []
+
+    class Server:
+        def __init__(self, host: str, port: int, **_: object) -> None:
+            starting.append(self)
+            together.append(len(starting))
+            self.port = port
+            guards.append(library.serve)
+            library.serve(None)
+            time.sleep(0.05)
+            starting.remove(self)
+
+        def get_port(self) -> int:
+            return self.port
+
+        def stop(self) -> None: ...
+
+    def plain(*_: object, **__: object) -> None: ...
+
+    monkeypatch.setattr(library, "serve", plain)
+    monkeypatch.setattr(viser, "ViserServer", Server)
+    opened: list = []
+    threads = [threading.Thread(target=lambda: opened.append(open_server(port=0))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for server in opened:
+        close_server(server)
+    assert together == [1, 1, 1, 1]
+    assert len(opened) == len(set(map(id, guards))) == 4
+    assert plain not in guards
     assert library.serve is plain
 
 

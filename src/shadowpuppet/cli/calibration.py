@@ -1,33 +1,42 @@
-"""The commands about calibrations: one explained, or written as another kind; and one tested against silhouettes."""
+"""Calibrations: the command `check` tests one against silhouettes; and one explained or converted, for `info`."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+from rich.console import Group, RenderableType
+from rich.text import Text
 
-from shadowpuppet.cli.flags import OTHER, AsJson, LookFlags, options_from
+from shadowpuppet.cli.flags import AsJson, Config, LookFlags, options_from
+from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import RecordingError, SettingsError
 
-ForCheck = Annotated[LookFlags | None, Parameter(name="*")]
-Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it.")]
+if TYPE_CHECKING:
+    from shadowpuppet.calibration.overview import CalibrationLook, Standpoint
+    from shadowpuppet.pipeline.check_calibration import RigCheck
+
+ARROWS = "→↗↑↖←↙↓↘"
+"""By eighths of a turn, counter-clockwise from +x."""
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+"""Names of cameras in the top view; + for any further."""
 
 
 def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a calibration, of two cameras or more.")], /, *,
-          config: Config = None, as_json: AsJson = False, flags: ForCheck = None) -> None:
+          config: Config = None, as_json: AsJson = False, flags: LookFlags = None) -> None:
     """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
     turned; and by how many frames each film is late."""
-    from shadowpuppet.cli.calibration_tables import check_table
-    from shadowpuppet.cli.terminal import show, show_json, terminal
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.check_calibration import check_rig
     from shadowpuppet.pipeline.footage_rig import open_rig
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
     options = options_from(flags, config)
-    with terminal(quiet=as_json) as shown:
-        found = check_rig(open_rig(recording, options), options, shown)
+    with terminal(quiet=as_json) as listener:
+        found = check_rig(open_rig(recording, options), options, listener)
     if as_json:
         show_json(found)
     else:
@@ -35,7 +44,7 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
 
 
 def is_explained(path: Path) -> bool:
-    """Whether `info` is asked about a calibration, not a recording."""
+    """Whether `path` is a calibration, not a recording."""
     from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
 
     if path.is_dir():
@@ -45,13 +54,12 @@ def is_explained(path: Path) -> bool:
 
 
 def explain(path: Path, to: Path | None, unit: str | None, up: str | None, as_json: bool) -> None:
-    """Tell what a calibration says, and write it as another file where that is asked for."""
+    """Explain a calibration, and write it to `to`."""
     from shadowpuppet.calibration.overview import look_at_calibration
-    from shadowpuppet.cli.calibration_tables import calibration_table
-    from shadowpuppet.cli.terminal import show, show_json, terminal
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration, write_calibration
 
-    with terminal(quiet=as_json) as shown:
+    with terminal(quiet=as_json) as listener:
         path = path if is_calibration(path) else find_calibration(path) or path
         look, found = look_at_calibration(path, unit, up)
         if to is not None:
@@ -61,12 +69,109 @@ def explain(path: Path, to: Path | None, unit: str | None, up: str | None, as_js
         else:
             show(calibration_table(look), *([f"written: {to}, in metres"] if to is not None else []))
         for doubt in look.doubts:
-            shown.warn(doubt)
+            listener.warn(doubt)
 
 
 def refuse_for_recordings(path: Path, to: Path | None, unit: str | None, up: str | None) -> None:
-    """Raise `SettingsError` for flags that serve calibrations only."""
+    """Raise `SettingsError` for flags that only calibrations take."""
     for name, value in (("to", to), ("unit", unit), ("up", up)):
         if value is not None:
             raise SettingsError(f"flags: {name}: found {str(value)!r} for {path}, which is no calibration file; a recording has unit and "
                                 "up in its recording.toml")
+
+
+def calibration_table(look: CalibrationLook) -> RenderableType:
+    """A calibration explained: facts, a row a camera, a top view."""
+    parts: list[RenderableType] = [pairs(_facts(look)), "", table("", ("", "camera", "pixels", "wide", "at, m", "looks", "roll", "away",
+                                                                      "bend"), _camera_rows(look), right=(3, 4, 6, 7))]  # fmt: skip
+    if any(camera.placed for camera in look.cameras):
+        parts += ["", top_view(look), pairs(_legend(look))]
+    if look.notes:
+        parts += ["", pairs([("read", "\n".join(look.notes))])]
+    return Group(*parts)
+
+
+def _facts(look: CalibrationLook) -> Iterator[tuple[str, str]]:
+    yield "calibration", look.path
+    yield "format", f"{look.format}; lengths in {look.unit}{'' if look.unit_told else ', as the file does not say otherwise'}"
+    count = len(look.cameras)
+    apart = f", {look.apart[0]:.2f} to {look.apart[1]:.2f} m apart" if look.apart else ""
+    yield "cameras", f"{count} camera{'s' if count > 1 else ''}{apart}"
+    if look.middle is not None:
+        x, y, z = look.middle
+        away = [camera.away for camera in look.cameras if camera.away is not None]
+        yield "they look at", f"{x:.2f} {y:.2f} {z:.2f} m, from {min(away):.2f} to {max(away):.2f} m away"
+
+
+def _camera_rows(look: CalibrationLook) -> Iterator[tuple[str, ...]]:
+    for n, camera in enumerate(look.cameras):
+        place = " ".join(f"{value:.2f}" for value in camera.place) if camera.placed else "not told"
+        bend = "not at all" if not camera.bend else f"{camera.bend:.0f} px" if abs(camera.bend) < float("inf") else "beyond telling"
+        yield (_letter(n), camera.name, f"{camera.size[0]}x{camera.size[1]}", f"{camera.fov[0]:.0f}°", place, _looks(camera),
+               f"{round(camera.roll)}°", "" if camera.away is None else f"{camera.away:.2f} m",
+               f"{bend}{', fisheye' if camera.lens == 'fisheye' else ''}")  # fmt: skip
+
+
+def _looks(camera: Standpoint) -> str:
+    return "level" if abs(camera.down) < 0.5 else f"{abs(camera.down):.0f}° {'down' if camera.down > 0 else 'up'}"
+
+
+def _letter(n: int) -> str:
+    return LETTERS[n] if n < len(LETTERS) else "+"
+
+
+def top_view(look: CalibrationLook) -> Text:
+    """The scene from above in characters: cameras with arrows the way they look, and how many cameras see all of a standing person."""
+    from shadowpuppet.calibration.overview import SIDE
+
+    x0, y0, x1, y1 = look.corners
+    rows = [["·" if not count else str(count) if count < 10 else "#" for count in row] for row in look.seen]
+
+    def put(x: float, y: float, mark: str) -> None:
+        column, row = int((x - x0) / (x1 - x0) * SIDE), int((y1 - y) / (y1 - y0) * SIDE / 2)
+        for n, character in enumerate(mark):
+            if 0 <= row < len(rows) and 0 <= column + n < SIDE:
+                rows[row][column + n] = character
+
+    if look.middle is not None:
+        put(look.middle[0], look.middle[1], "×")
+    for n, camera in enumerate(look.cameras):
+        if camera.placed:
+            put(camera.place[0], camera.place[1], _letter(n) + ARROWS[round(camera.facing / 45) % 8])
+    return Text("\n".join("  " + "".join(row) for row in rows), no_wrap=True)
+
+
+def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
+    x0, y0, x1, y1 = look.corners
+    most = max((count for row in look.seen for count in row), default=0)
+    cell = (x1 - x0) * (y1 - y0) / sum(map(len, look.seen))
+    whole = sum(count == most for row in look.seen for count in row) * cell
+    yield "from above", (f"{x1 - x0:.1f} m to a side, x to the right from {x0:.1f} to {x1:.1f}, y up from {y0:.1f} to {y1:.1f}; "
+                         "letters are cameras with arrows the way they look, × the place they look at")
+    yield "figures", (f"how many cameras see somebody of 1.80 m whole who stands there: {most} over {whole:.1f} m²" if most
+                      else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
+
+
+def check_table(check: RigCheck) -> RenderableType:
+    """How far each camera disagrees with the others, and the verdict."""
+    found = check.agreement
+    columns = ("camera", "disagrees by", "with", "late by", "sure to", "")
+    rows: list[tuple[str, str | None]] = [
+        ("recording", check.recording),
+        ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
+        ("limit", f"{found.limit:.1f} px; cameras that fit are apart by about one"),
+        ("height", None if found.height is None else f"{found.height:.2f} m from end to end, as the cameras see it"),
+    ]
+    verdict = "all cameras agree" if check.good else "\n".join(check.doubts)
+    return Group(pairs(rows), "", table("", columns, _agreement_rows(check), right=(1, 3, 4)), "", pairs([("verdict", verdict)]))
+
+
+def _agreement_rows(check: RigCheck) -> Iterator[tuple[Any, ...]]:
+    found, late = check.agreement, check.lateness
+    for n, name in enumerate(found.names):
+        apart, others = found.apart[n], sum(pair is not None for pair in found.pairs[n])
+        frames, spread = (None, None) if late is None else (late.frames[n], late.spread[n])
+        wrong = [word for word, bad in (("place", name in found.wrong or name in check.turns), ("time", name in check.late)) if bad]
+        yield (name, "unknown" if apart is None else f"{apart:.1f} px", f"{others} others",
+               "unknown" if frames is None else f"{round(frames, 1) + 0.0:.1f} frames", "" if spread is None else f"{spread:.1f}",
+               f"wrong: {' and '.join(wrong)}" if wrong else "")

@@ -1,4 +1,4 @@
-"""What works on this machine, tried rather than guessed: libraries, compiled kernels, films, extras, screens, cameras."""
+"""The command `doctor`: tries what works on this machine, and says how to mend the rest. Loads nothing that may be broken."""
 
 from __future__ import annotations
 
@@ -8,61 +8,103 @@ import re
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
 from importlib import import_module, metadata
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
-LEAST = (3, 11)
-"""The oldest Python."""
+from shadowpuppet.cli.tables import show
+from shadowpuppet.errors import BROKEN
+
+OLDEST_PYTHON = (3, 11)
 MODULES = {"av": "av", "opencv-python-headless": "cv2", "tomli-w": "tomli_w"}
-"""What a distribution is imported as, where that is another name."""
+"""Import names of distributions, where they differ."""
 EXTRAS = {
     "view": (("viser",), "the viewer"), "report": (("matplotlib",), "pages and plots about runs"),
     "formats": (("pyarrow",), "Parquet"), "batch": (("distributed",), "many runs on a cluster"),
     "live": (("websockets",), "live motion over a WebSocket"), "lsl": (("pylsl",), "live motion for the lab streaming layer"),
 }  # fmt: skip
-"""What each extra installs, and is for."""
+"""Modules of each extra, and its purpose."""
 CODECS = {"H.264": "h264", "HEVC": "hevc", "VP9": "vp9", "AV1": "av1", "MPEG-4": "mpeg4", "ProRes": "prores", "Motion JPEG": "mjpeg",
           "FFV1": "ffv1"}  # fmt: skip
-"""Of films that people have, and FFmpeg's names of what reads them."""
+"""Common codecs, and FFmpeg's names of their decoders."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "microsoft-edge", "xdg-open", "open")
+MARKS = {"works": ("yes", "green"), "missing": ("no", "yellow"), "broken": ("broken", "red")}
 REPAIR = "python -m pip install --force-reinstall shadowpuppet"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was tried."""
+    """Result of one check."""
 
     name: str
     state: Literal["works", "missing", "broken"]
-    """`missing`: not there, and not needed for tracking films."""
+    """`missing`: absent, but not needed to track films."""
     told: str
     remedy: str = ""
-    """What would mend it; empty where nothing need be."""
+    """What would mend it; may be empty."""
     needed: bool = False
-    """Whether the core is broken without it."""
+    """Whether tracking is impossible without it."""
+
+
+def doctor(*, as_json: Annotated[bool, Parameter(name="--json", group="Other", negative=(), show_default=False, help="Print JSON.")] = False
+           ) -> int:  # fmt: skip
+    """Check what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, window, cameras.
+
+    Exit code 1: something that tracking needs does not work.
+    """
+    import json
+
+    console = Console(stderr=True, quiet=as_json)
+    with console.status("trying what works") if console.is_terminal else nullcontext():
+        found = examine()
+    if as_json:
+        print(json.dumps({"works": works(found), "findings": [asdict(finding) for finding in found]}, indent=1))
+    else:
+        show(*_tables(found))
+    return 0 if works(found) else BROKEN
+
+
+def _tables(found: Sequence[Finding]) -> Iterator[Any]:
+    """A row a check, with its remedy below, and the outcome in a sentence."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for finding in found:
+        text = Text(finding.told)
+        if finding.remedy:
+            text.append(f"\n→ {finding.remedy}", "dim")
+        table.add_row(Text(finding.name), Text(*MARKS[finding.state]), text)
+    yield table
+    broken = [finding.name for finding in found if finding.needed and finding.state != "works"]
+    outcome = f"tracking does not work here: {', '.join(broken)}" if broken else "tracking works here"
+    yield Text(outcome, "bold red" if broken else "bold green")
 
 
 def examine() -> list[Finding]:
-    """Try everything; what raises an error is broken, and says so."""
+    """Run all checks; one that raises an error is reported as broken."""
     found = list[Finding]()
     for name, check, needed in CHECKS:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 found += check()
-        except Exception as error:  # whatever it is: that is what is asked for
-            told = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            found.append(Finding(name, "broken", told[:300], REPAIR if needed else "", needed))
+        except Exception as error:
+            info = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            found.append(Finding(name, "broken", info[:300], REPAIR if needed else "", needed))
     return found
 
 
 def works(found: list[Finding]) -> bool:
-    """Whether the core does."""
+    """Whether tracking is possible."""
     return not any(finding.needed and finding.state != "works" for finding in found)
 
 
@@ -70,29 +112,31 @@ def works(found: list[Finding]) -> bool:
 
 
 def _python() -> Iterator[Finding]:
-    old = sys.version_info[:2] < LEAST
+    old = sys.version_info[:2] < OLDEST_PYTHON
     yield Finding("Python", "broken" if old else "works", f"{platform.python_version()}, {platform.platform()}",
-                  f"install Python {LEAST[0]}.{LEAST[1]} or later" if old else "", True)  # fmt: skip
+                  f"install Python {OLDEST_PYTHON[0]}.{OLDEST_PYTHON[1]} or later" if old else "", True)  # fmt: skip
 
 
 def _libraries() -> Iterator[Finding]:
     wanted = [text for text in metadata.requires("shadowpuppet") or [] if "extra ==" not in text]
-    told, bad = [], []
+    info, bad = [], []
     for text in wanted:
         name = re.split(r"[^\w.-]", text, maxsplit=1)[0]
         try:
             import_module(MODULES.get(name, name.replace("-", "_")))
-            told.append(f"{name} {metadata.version(name)}")
+            info.append(f"{name} {metadata.version(name)}")
         except Exception as error:
             bad.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
     if bad:
         yield Finding("libraries", "broken", "; ".join(bad), REPAIR, True)
     else:
-        yield Finding("libraries", "works", ", ".join(told), needed=True)
+        yield Finding("libraries", "works", ", ".join(info), needed=True)
 
 
 def _kernels() -> Iterator[Finding]:
-    """A body's joints, by a kernel that is compiled for this processor."""
+    """Joints of a body, by a compiled kernel."""
+    import numpy as np
+
     from shadowpuppet.body.models import average_sizes, make_body
 
     body = make_body("rounded", average_sizes("rounded", 1.75))
@@ -106,19 +150,21 @@ def _kernels() -> Iterator[Finding]:
 def _cache() -> Iterator[Finding]:
     from shadowpuppet.body.forward_kinematics import place_all
 
-    told = getattr(getattr(place_all, "_cache", None), "cache_path", "")
+    info = getattr(getattr(place_all, "_cache", None), "cache_path", "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         yield Finding("compiled code", "missing", "NUMBA_DISABLE_JIT is set: nothing is compiled, which is very slow",
                       "unset NUMBA_DISABLE_JIT")  # fmt: skip
-    elif not told or not _writable(Path(told)):
-        yield Finding("compiled code", "missing", f"cannot be kept{f' in {told}' if told else ''}: it is compiled anew at every start, "
+    elif not info or not _writable(Path(info)):
+        yield Finding("compiled code", "missing", f"cannot be kept{f' in {info}' if info else ''}: it is compiled anew at every start, "
                       "which takes up to half a minute", "set NUMBA_CACHE_DIR to a folder of your own that can be written")  # fmt: skip
     else:
-        yield Finding("compiled code", "works", f"kept in {told}")
+        yield Finding("compiled code", "works", f"kept in {info}")
 
 
 def _films() -> Iterator[Finding]:
-    """A film is written and read again, and one without loss."""
+    """Write and read a film, and a lossless one."""
+    import numpy as np
+
     from shadowpuppet.video import open_frames, write_frames
 
     images = [np.full((48, 64, 3), 20 * n, np.uint8) for n in range(8)]
@@ -140,8 +186,8 @@ def _codecs() -> Iterator[Finding]:
 
     there = [name for name, codec in CODECS.items() if _has_codec(av, codec)]
     lacking = [name for name in CODECS if name not in there]
-    told = f"{', '.join(there)} can be read" + (f"; not {', '.join(lacking)}" if lacking else "")
-    yield Finding("codecs", "missing" if lacking else "works", told, "turn such films into H.264 first" if lacking else "")
+    info = f"{', '.join(there)} can be read" + (f"; not {', '.join(lacking)}" if lacking else "")
+    yield Finding("codecs", "missing" if lacking else "works", info, "turn such films into H.264 first" if lacking else "")
 
 
 def _has_codec(av: object, name: str) -> bool:
@@ -157,13 +203,13 @@ def _processor() -> Iterator[Finding]:
     from shadowpuppet.threads import THREADS_VARIABLE, thread_limit, usable_cores
 
     known = environment()
-    told = f"{known['cpu']}; {usable_cores()} of {known['cores']} cores may be used; Numba sees {known['vectors']}"
-    told += f"; {THREADS_VARIABLE} is {thread_limit()}" if thread_limit() is not None else ""
+    info = f"{known['cpu']}; {usable_cores()} of {known['cores']} cores may be used; Numba sees {known['vectors']}"
+    info += f"; {THREADS_VARIABLE} is {thread_limit()}" if thread_limit() is not None else ""
     slow = known["vectors"] in ("AVX", "none known") and platform.machine().lower() in ("x86_64", "amd64")
-    yield Finding("processor", "missing" if slow else "works", told, "all works, at half the speed or less" if slow else "")
+    yield Finding("processor", "missing" if slow else "works", info, "all works, at half the speed or less" if slow else "")
 
 
-# What is beside
+# Extras and devices
 
 
 def _extras() -> Iterator[Finding]:
@@ -173,7 +219,7 @@ def _extras() -> Iterator[Finding]:
                 import_module(name)
         except ImportError:
             yield Finding(f"extra {extra}", "missing", f"{purpose}: not installed", f"pip install 'shadowpuppet[{extra}]'")
-        except Exception as error:  # as where a library of the system lacks
+        except Exception as error:  # such as a missing system library
             yield Finding(f"extra {extra}", "broken", f"{purpose}: {' '.join(str(error).split())[:200]}")
         else:
             yield Finding(f"extra {extra}", "works", f"{purpose}: {', '.join(f'{name} {metadata.version(name)}' for name in names)}")
@@ -202,7 +248,7 @@ def _browser() -> Iterator[Finding]:
 
 
 def _cameras() -> Iterator[Finding]:
-    """Those that Linux lists; they are not opened, for their lamps would go on."""
+    """Cameras that Linux lists; not opened, as their lights would go on."""
     if platform.system() != "Linux":
         yield Finding("cameras", "works", "not looked for here; `live --camera 0` tries the first")
         return
@@ -238,4 +284,4 @@ CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
     ("window", _window, False), ("browser", _browser, False), ("cameras", _cameras, False),
 )  # fmt: skip
-"""Name, what tries it, whether the core needs it."""
+"""Name, function, whether tracking needs it."""

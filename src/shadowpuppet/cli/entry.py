@@ -1,4 +1,4 @@
-"""Where the program begins: Ctrl-C is heeded from here on, while the command line is still being loaded."""
+"""The entry point of the program: Ctrl-C ends it without a traceback even while the command line is being loaded."""
 
 from __future__ import annotations
 
@@ -21,9 +21,13 @@ def main() -> NoReturn:
 def _run() -> int:
     try:
         from shadowpuppet.cli.app import run
+
+        return run()  # which loads the module of the command
     except ImportError as error:
-        told = " ".join(str(error).split())
-        print(f"error: a library cannot be loaded ({told}); `python -m pip install --force-reinstall shadowpuppet` gets them all anew",
+        cause = error.__cause__ if isinstance(error.__cause__, ImportError) else error
+        if (cause.name or "").startswith("shadowpuppet"):
+            raise  # a mistake of ours
+        text = " ".join(str(cause).split())
+        print(f"error: a library cannot be loaded ({text}); `python -m pip install --force-reinstall shadowpuppet` gets them all anew",
               file=sys.stderr)  # fmt: skip
         return BROKEN
-    return run()

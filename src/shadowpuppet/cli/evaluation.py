@@ -1,26 +1,24 @@
-"""The command `evaluate`: how good a run is, as a table, as figures in a file, as a page."""
+"""The command `evaluate`: how good a run is, as tables, as figures in a file, as a page."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from cyclopts import Parameter
+from shadowpuppet.cli.flags import AsJson, Quiet, Switch, flag, output, switch
+from shadowpuppet.cli.tables import error_table, metrics_table, pairs, show, show_json, table
 
-from shadowpuppet.cli.flags import RUN, AsJson, Quiet
-
-Switch = Annotated[bool, Parameter(negative=(), show_default=False)]
+DOFS_IN_ROW = 2
 
 
 def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0, end: int | None = None,
              offset: float = 0.0, sync: Switch = False, align: Switch = False, angles: Switch = False,
-             file: Annotated[Path | None, Parameter(name=["--output", "-o"], group=RUN, help="File that gets all figures (.json).")] = None,
-             report: Annotated[Path | None, Parameter(group=RUN, help="File that gets a page with plots and pictures (.html); needs "
-                                                                      "matplotlib.")] = None,
-             update: Annotated[bool, Parameter(group=RUN, negative=(), show_default=False, help="Put the figures into the run's own "
-                                                                                                "metrics.json, too.")] = False,
+             file: Annotated[Path | None, output("File that gets all figures (.json).")] = None,
+             report: Annotated[Path | None, flag("File that gets a page with plots and pictures (.html); needs matplotlib.")] = None,
+             update: Annotated[bool, switch("Also put the figures into the run's own metrics.json.")] = False,
              quiet: Quiet = False, as_json: AsJson = False) -> None:  # fmt: skip
-    """Measure a run: errors of joints and motion against a truth, overlap, cost, jitter, what was lost.
+    """Evaluate a run: errors of joints and motion against a truth, overlap, cost, jitter, frames without a pose.
 
     Parameters
     ----------
@@ -29,22 +27,21 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     truth
         Joints to compare with: .csv, .trc, .c3d, .bvh or .amc. [default: the recording's truth]
     joints
-        Those compared, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
+        Joints to compare, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
-        First frame of the truth that counts.
+        First frame of the truth to compare.
     end
-        Last frame of the truth that counts. [default: its last]
+        Last frame of the truth to compare. [default: its last]
     offset
-        Seconds to be added to the truth's times.
+        Seconds to add to the truth's times.
     sync
         Find that offset, by the joints' speeds.
     align
         Move and turn the whole truth into the run's world first.
     angles
-        Compare the angles of a whole body's joints, too, with those of the poses that fit the truth's joints best.
+        Also compare joint angles of a whole body, with those of the poses that fit the truth's joints best.
     """
-    from shadowpuppet.cli.evaluation_tables import evaluation_tables
-    from shadowpuppet.cli.terminal import show, show_json, terminal
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.evaluation.evaluation import Comparison, check_output, measure_run, update_metrics, write_evaluation
     from shadowpuppet.evaluation.report.page import check_report, write_report
 
@@ -54,8 +51,8 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     if report is not None:
         check_report(report, run)
     written = {}
-    with terminal(quiet or as_json) as shown:
-        shown.begin("measuring")
+    with terminal(quiet or as_json) as listener:
+        listener.begin("measuring")
         found = measure_run(run, truth, Comparison(names, start, end, offset, sync, align, angles))
         if file is not None:
             write_evaluation(file, found.measured, run)
@@ -63,10 +60,50 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         if update:
             written["updated"] = update_metrics(found)
         if report is not None:
-            shown.begin("drawing")
+            listener.begin("drawing")
             write_report(report, found)
             written["report"] = report
     if as_json:
         show_json(found.measured)
     elif not quiet:
-        show(*evaluation_tables(found.measured, written))
+        show(*_tables(found.measured), pairs([*_rows(found.measured), *((name, str(path)) for name, path in written.items())]))
+
+
+def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
+    from shadowpuppet.evaluation.summary_text import WAYS, root_text
+
+    yield metrics_table(measured)
+    if "errors" in measured:
+        aligned = measured["aligned_mm"]
+        yield error_table(measured["errors"])
+        yield table("mean error, mm, run and truth laid over each other", ("", "mm"),
+                    ((text.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
+    if "angles_deg" in measured:
+        yield table("", ("turned at", "by degrees, rmse"), ((name, f"{value:.1f}") for name, value in measured["angles_deg"].items()))
+
+
+def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, losses_text, world_text
+
+    yield "no pose", losses_text(measured["losses"])
+    if "errors" not in measured:
+        return
+    yield "clock", clock_text(measured["clock"])
+    if measured["world"]:
+        yield "world", world_text(measured["world"])
+    if axes := measured["axes_mm"]:
+        yield "axes", ", ".join(f"{x} {axes[x]['mean']:+.1f} (rmse {axes[x]['rmse']:.1f})" for x in "xyz") + " mm, run less truth"
+    if "mean_mm" in (human := measured["humaneva"]):
+        yield "HumanEva", f"{human['mean_mm']:.1f} mm (sd {human['sd_mm']:.1f}) over its 15 joints"
+    if measured["bends_deg"]:
+        yield "bends", ", ".join(f"{joint} {value['rmse']:.1f}" for joint, value in measured["bends_deg"].items()) + " degrees (rmse)"
+    if moves := measured["acceleration"]:
+        yield "moves", (f"accelerations of {moves['run_m_s2']:.1f} m/s2, the truth's {moves['truth_m_s2']:.1f}; they differ by "
+                        f"{moves['difference_m_s2']:.1f} in the mean")
+    if measured["bone_errors"]:
+        yield "bones", bones_text(measured["bone_errors"])
+    yield "intervals", coverage_text(measured["coverage"])
+    if "dofs_deg" in measured:
+        dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]
+        lines = [", ".join(dofs[n : n + DOFS_IN_ROW]) for n in range(0, len(dofs), DOFS_IN_ROW)]
+        yield "angles", "\n".join(lines) + "\n(rmse, degrees)"

@@ -1,4 +1,4 @@
-"""Every option as a flag of the command line, made from the one place where it is documented."""
+"""Settings as flags of the command line, made from the classes that document them; and flags that several commands share."""
 
 from __future__ import annotations
 
@@ -11,16 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 from cyclopts import Group, Parameter
 from pydantic import BeforeValidator
 
-from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
-from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.pipeline.options import PATHS, Options, make_options, over, read_options
-from shadowpuppet.settings import default_of, settings_of, validate
-from shadowpuppet.synthetic.collection import named_specs
-from shadowpuppet.synthetic.shorthand import Shorthand, expanded
-from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
-from shadowpuppet.synthetic.spec_file import read_spec
+from shadowpuppet.pipeline.options import Options, make_options, read_options
+from shadowpuppet.settings import Setting, merged, settings_of
 
 HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other programs", "Learning", "Other")
 RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
@@ -32,30 +25,16 @@ GROUPS = {
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size", "every"), PICTURES),
 }
-SPEC_GROUPS = {
-    **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
-    **dict.fromkeys(("cameras", "ring_radius", "distance", "camera_height", "fov", "fisheye"), CAMERAS),
-    **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
-    **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
-}
-Quiet = Annotated[bool, Parameter(group=OTHER, negative=(), show_default=False, help="Show nothing but warnings and errors.")]
-AsJson = Annotated[bool, Parameter(name="--json", group=OTHER, negative=(), show_default=False, help="Print JSON.")]
-HIDDEN = Parameter(show=False)
-"""Flags of the tables: many, and shown by `shadowpuppet settings`."""
 
 
-def flags_of(kind: type, without: tuple[str, ...] = (), shown: bool = True, groups: Mapping[str, Group] = GROUPS) -> type:
-    """A dataclass with the settings of `kind`, all None as long as no flag is given; tables become dotted flags."""
-    made = []
-    for field, hint, told in settings_of(kind):
-        if field.name in without:
-            continue
-        if isinstance(hint, type) and is_dataclass(hint):
-            made.append((field.name, Annotated[flags_of(hint, shown=False) | None, HIDDEN], None))
-        else:
-            made.append((field.name, Annotated[_bare(hint) | None, _parameter(field, told, shown, groups)], None))
-    # cyclopts takes classes of the standard library, as which it would see this one, for single values.
-    return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
+def flag(help: str, group: Group = RUN, name: str | None = None, **more: Any) -> Parameter:
+    """A flag with a value."""
+    return Parameter(name=name, group=group, help=help, **more)
+
+
+def switch(help: str, group: Group = RUN, name: str | None = None) -> Parameter:
+    """A flag without a value."""
+    return Parameter(name=name, group=group, help=help, negative=(), show_default=False)
 
 
 def output(help: str) -> Parameter:
@@ -63,8 +42,40 @@ def output(help: str) -> Parameter:
     return Parameter(name=["--output", "-o"], group=RUN, help=help)
 
 
+Switch = Annotated[bool, Parameter(negative=(), show_default=False)]
+"""A flag without a value that the command's docstring explains."""
+Config = Annotated[Path | None, flag("Settings file, TOML, as `shadowpuppet settings` prints it, or an earlier run's run.toml. Flags "
+                                     "override it.", OTHER)]
+Quiet = Annotated[bool, switch("Show only warnings and errors.", OTHER)]
+AsJson = Annotated[bool, switch("Print JSON.", OTHER, "--json")]
+Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
+
+
+def flags_of(kind: type, without: tuple[str, ...] = (), visible: bool = True, groups: Mapping[str, Group] = GROUPS) -> Any:
+    """A dataclass with the settings of `kind` as optional flags, None if not given; tables of settings become dotted flags.
+
+    The flags of tables are hidden in `--help`: they are many, and `shadowpuppet settings` prints them.
+    """
+    made = []
+    for setting in settings_of(kind):
+        if setting.name in without:
+            continue
+        if isinstance(setting.kind, type) and is_dataclass(setting.kind):
+            hint = Annotated[flags_of(setting.kind, visible=False) | None, Parameter(show=False)]
+        else:
+            hint = Annotated[_bare(setting.kind) | None, _parameter(setting, visible, groups)]
+        made.append((setting.name, hint, None))
+    # cyclopts treats classes of the standard library, such as this one without its `__module__`, as single values.
+    return make_dataclass(f"{kind.__name__}Flags", made, kw_only=True, namespace={"__module__": __name__})
+
+
+def unpacked(flags: Any) -> Any:
+    """The annotation of a command's parameter that takes all `flags`."""
+    return Annotated[flags | None, Parameter(name="*")]
+
+
 def given(flags: Any) -> dict[str, Any]:
-    """What flags said, as plain values."""
+    """Flags that were given, as plain values."""
     values = {f.name: getattr(flags, f.name) for f in fields(flags)} if flags is not None else {}
     tables = {key: given(value) if is_dataclass(value) else value for key, value in values.items()}
     return {key: str(value) if isinstance(value, Path) else value for key, value in tables.items() if value is not None}
@@ -73,12 +84,12 @@ def given(flags: Any) -> dict[str, Any]:
 def options_from(flags: Any, config: Path | None) -> Options:
     """Options from flags over a file over the defaults. Raises `SettingsError`."""
     read = read_options(config) if config is not None else {}
-    make_options(read, str(config))  # so that what is wrong in the file is said with its name
-    return make_options(over(read, given(flags)), "flags")
+    make_options(read, str(config))  # so that an error in the file names the file
+    return make_options(merged(read, given(flags)), "flags")
 
 
 def _bare(hint: Any) -> Any:
-    """A type without its limits, which `make_options` checks; text where it is read from text."""
+    """A type without its limits, which `make_options` checks; str if it is parsed from text."""
     if get_origin(hint) is Annotated:
         read = any(isinstance(item, BeforeValidator) for item in get_args(hint)[1:])
         return str if read else _bare(get_args(hint)[0])
@@ -87,45 +98,19 @@ def _bare(hint: Any) -> Any:
     return hint
 
 
-def _parameter(field: Any, told: str, shown: bool, groups: Mapping[str, Group]) -> Parameter:
-    default = default_of(field)
+def _parameter(setting: Setting, visible: bool, groups: Mapping[str, Group]) -> Parameter:
+    default = setting.default
     end = "" if default is None or isinstance(default, bool) else f" [default: {default}]"
-    return Parameter(help=told + end, show=shown, group=groups.get(field.name), show_choices=False)
-
-
-def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -> Spec:
-    """A spec of a recording to be made: flags over a file or a named spec. Raises `SettingsError`."""
-    if path is not None and like is not None:
-        raise SettingsError(f"flags: found a file ({path}) and --like {like}, expected one of them")
-    named = named_specs()
-    if like is not None and like not in named:
-        raise SettingsError(f"flags: like: found {like!r}, which names no spec; there are: {choices(named)}")
-    spec = read_spec(path) if path is not None else named[like] if like is not None else Spec()
-    if seed is not None:
-        spec = spec_from(spec_values(spec) | {"seed": seed}, "flags")
-    return expanded(validate(Shorthand, given(flags), "flags"), spec)
+    return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name), show_choices=False)
 
 
 if TYPE_CHECKING:
-    Flags = LookFlags = ViewFlags = DemoFlags = SessionFlags = BatchFlags = LiveFlags = OutletFlags = PriorFlags = SpecFlags = Any
+    Flags = RunFlags = LookFlags = OutletFlags = Any
 else:
     Flags = flags_of(Options)
-    """All of `Options`."""
-    LookFlags = flags_of(Options, without=("every", "overlay"))
-    """Those that matter where nothing is tracked."""
-    ViewFlags = flags_of(Options, without=("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay"))
-    """Those that matter where a recording is looked at."""
-    BatchFlags = flags_of(Options, without=("seed",))
-    """Those that many runs with seeds of their own may share."""
-    DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay"))
-    """Those that matter where the recording is known."""
-    SessionFlags = flags_of(Options, without=("camera", "masks", "every", "overlay", "prior", "training", "multiview"))
-    """Those that matter where a camera is tracked as it happens."""
-    LiveFlags = flags_of(LiveSettings)
-    """What can be set about that beside."""
-    OutletFlags = flags_of(OutletSettings)
-    """To whom motion is given."""
-    PriorFlags = flags_of(PriorSettings, without=("regions",), groups={field.name: LEARNING for field, _, _ in settings_of(PriorSettings)})
-    """How a motion prior is learnt."""
-    SpecFlags = flags_of(Shorthand, groups=SPEC_GROUPS)
-    """What is often wanted of a made recording."""
+    RunFlags = unpacked(Flags)
+    """All options."""
+    LookFlags = unpacked(flags_of(Options, without=("every", "overlay")))
+    """Options of commands that do not track."""
+    OutletFlags = unpacked(flags_of(OutletSettings))
+    """Programs that receive the motion."""

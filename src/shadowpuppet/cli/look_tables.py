@@ -1,55 +1,86 @@
-"""What the command line shows of several cameras before a run, in words and a table of 80 columns."""
+"""The look at a recording before tracking, as `track` and `info` show it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from rich.console import Group, RenderableType
 
-from shadowpuppet.cli.tables import pairs, plain_table
+from shadowpuppet.cli.tables import pairs, table
+from shadowpuppet.pipeline.look import Look
 from shadowpuppet.pipeline.look_rig import CameraLook, RigLook
 
 
-def rig_look_table(look: RigLook) -> RenderableType:
-    """What was found before the run."""
-    return Group(pairs([("recording", look.recording), ("cameras", _cameras(look))]), "", _each_camera(look), "", pairs(_below(look)))
+def look_table(look: Look) -> RenderableType:
+    """The look at a recording of one camera."""
+    exact_plain = f"; those of the plain rule by {look.exact_overlap_plain:.3f}" if look.exact_overlap_plain is not None else ""
+    exact = f"these silhouettes overlap the ready ones by {look.exact_overlap:.3f}{exact_plain}" if look.exact_overlap is not None else None
+    return pairs([
+        ("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
+        ("background", look.background), ("key", look.key if look.key != "none" else None), ("silhouettes", _areas(look)),
+        ("exact masks", exact), ("quality", _quality(look) if look.refusal is None else None),
+        ("person", _person(look.person) if look.person is not None else None),
+    ])  # fmt: skip
 
 
-def _cameras(look: RigLook) -> str:
-    count = f"{look.frames} sets" if look.frames else "sets not counted"
-    return f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second"
+def _camera(look: Look) -> str:
+    scaled = "" if look.worked_size == look.size else f", scaled to {look.worked_size[0]} x {look.worked_size[1]}"
+    how = "calibrated" if look.calibrated else "not calibrated"
+    return f"{look.camera}, {look.size[0]} x {look.size[1]} pixels{scaled}, {look.fov:.0f} degrees wide, {how}"
 
 
-def _each_camera(look: RigLook) -> RenderableType:
-    table = plain_table("", ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart"), right=(2, 4, 5, 6))
-    for camera, apart in zip(look.cameras, look.agreement.apart):
-        place = " ".join(f"{value:.2f}" for value in camera.place)
-        exact = "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}"
-        table.add_row(camera.name, _pixels(camera), f"{camera.fov:.0f}°", place, f"{100 * camera.quality.area:.1f} %", exact,
-                      "" if apart is None else f"{apart:.1f} px")
-    return table
+def _film(look: Look) -> str:
+    count = f"{look.frames} frames" if look.frames else "frames not counted"
+    rate = f"{look.rate:.4g} frames/s" if np.isfinite(look.rate) else "rate unknown"
+    uneven = f", times uneven by {1000 * look.jitter:.1f} ms" if look.jitter * look.rate > 0.01 else ""
+    return f"{count}, {rate}{uneven}"
 
 
-def _pixels(camera: CameraLook) -> str:
-    shown = f"{camera.size[0]} x {camera.size[1]}"
-    return shown if camera.worked_size == camera.size else f"{shown}, as {camera.worked_size[0]} x {camera.worked_size[1]}"
+def _areas(look: Look) -> str:
+    plain = f"; by the plain rule of eq. 1 {100 * look.plain_area:.1f} %" if look.plain_area is not None else ""
+    return f"{100 * look.area:.1f} % of the picture, in {look.quality.frames} frames{plain}"
 
 
-def _below(look: RigLook) -> Iterator[tuple[str, str]]:
-    backgrounds = sorted({camera.background.replace(camera.name, "<camera>") for camera in look.cameras})
-    yield "background", "; ".join(backgrounds)
-    keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
-    if keys:
-        yield "keys", ", ".join(keys)
-    if look.agreement.height is not None:
-        yield "height", f"{look.agreement.height:.2f} m from end to end, as the cameras see it"
-    if look.person is not None:
-        yield "person", _person(look.person)
+def _quality(look: Look) -> str:
+    quality = look.quality
+    sides = ", ".join(side for side, share in quality.border.items() if share > 0.02) or "no side"
+    return (f"area changes by {100 * quality.area_change:.1f} % a frame, {100 * quality.flicker:.1f} % flickers; {quality.specks:.1f} "
+            f"specks and {quality.holes:.1f} holes a frame; touches {sides} of the picture")
 
 
 def _person(person: Mapping[str, Any]) -> str:
-    said = [f"sizes from {person['source']}"] if "source" in person else []
-    said += [f"overlaps the first silhouettes by {person['overlap']:.2f}"] if "overlap" in person else []
-    said += [f"{1000 * person['residual']:.0f} mm from their hulls"] if person.get("residual") is not None else []
-    return "; ".join(said) or "measured"
+    fits = ", ".join(f"{name} {value:.2f}" for name, value in person["overlaps"].items()) if person["source"] == "references" else ""
+    clean = f"; all this in clean silhouettes by {person['silhouettes']}: plain ones show no posture" if person["silhouettes"] else ""
+    return (f"height {person['height']:.2f} m at {person['distance']:.2f} m; sizes from {person['source']}"
+            + (f" (overlap: {fits})" if fits else "") + f"; overlaps the film's first silhouette by {person['start_overlap']:.2f}{clean}")
+
+
+def rig_look_table(look: RigLook) -> RenderableType:
+    """The look at a recording of several cameras, a row a camera."""
+    count = f"{look.frames} sets" if look.frames else "sets not counted"
+    above = [("recording", look.recording), ("cameras", f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second")]
+    cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.2f}" for value in camera.place),
+                f"{100 * camera.quality.area:.1f} %", "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}",
+                "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
+    keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
+    height = look.agreement.height
+    below = [("background", "; ".join(sorted({camera.background.replace(camera.name, "<camera>") for camera in look.cameras}))),
+             ("keys", ", ".join(keys) or None),
+             ("height", None if height is None else f"{height:.2f} m from end to end, as the cameras see it"),
+             ("person", _rig_person(look.person) if look.person is not None else None)]  # fmt: skip
+    columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
+    return Group(pairs(above), "", table("", columns, cameras, right=(2, 4, 5, 6)), "", pairs(below))
+
+
+def _pixels(camera: CameraLook) -> str:
+    size = f"{camera.size[0]} x {camera.size[1]}"
+    return size if camera.worked_size == camera.size else f"{size}, as {camera.worked_size[0]} x {camera.worked_size[1]}"
+
+
+def _rig_person(person: Mapping[str, Any]) -> str:
+    parts = [f"sizes from {person['source']}"] if "source" in person else []
+    parts += [f"overlaps the first silhouettes by {person['overlap']:.2f}"] if "overlap" in person else []
+    parts += [f"{1000 * person['residual']:.0f} mm from their hulls"] if person.get("residual") is not None else []
+    return "; ".join(parts) or "measured"

@@ -1,85 +1,58 @@
-"""The commands about motion capture: what a motion is like, learnt from files of it, HumanEva as a recording, motion for other programs."""
+"""The commands about motion: `fit-prior` learns a motion prior, `export` and `convert` write motion for other programs."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from shadowpuppet.body.models import WholeBodyName
-from shadowpuppet.cli.flags import OutletFlags, PriorFlags, Quiet, given, output
+from shadowpuppet.cli.flags import LEARNING, Quiet, Switch, flags_of, given, output, unpacked
+from shadowpuppet.cli.tables import pairs, show, table
+from shadowpuppet.errors import SettingsError
+from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.settings import settings_of, validate
 
-ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
-ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
+if TYPE_CHECKING:
+    from shadowpuppet.motion.prior.training import Trained
+
+    PriorFlags = Any
+else:
+    PriorFlags = unpacked(flags_of(PriorSettings, without=("regions",), groups={s.name: LEARNING for s in settings_of(PriorSettings)}))
 
 
 def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, .npz, .parquet, or .amc "
-                                                                             "beside its .asf.")], /, *,
+                                                            "beside its .asf.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
               rate: float = 60.0, body: WholeBodyName = "anatomical", seed: int = 0,
-              quiet: Quiet = False, flags: ForPrior = None) -> None:  # fmt: skip
-    """Learn what a motion is like from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
+              quiet: Quiet = False, flags: PriorFlags = None) -> None:  # fmt: skip
+    """Learn a motion prior from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
 
     Parameters
     ----------
     regions
-        Regions of poses, M; or choose, which finds the least number that is good for motion left out.
+        Number of regions of poses, M; or choose, for the smallest number that is good for motion left out.
     rate
-        Frames/s of the films that it is for.
+        Frame rate of the films to be tracked, frames/s.
     body
-        The body whose poses are learnt.
+        Body model whose poses are learnt.
     seed
-        Seed of all chance.
+        Seed of the random numbers.
     """
-    from shadowpuppet.cli.tables import prior_tables
-    from shadowpuppet.cli.terminal import show, terminal
-    from shadowpuppet.errors import SettingsError
-    from shadowpuppet.motion.prior.settings import PriorSettings
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.learn_prior import prior_from_files
-    from shadowpuppet.settings import validate
 
     if not (regions == "choose" or (regions.isdecimal() and len(regions) < 10)):
         raise SettingsError(f"flags: regions: found {regions!r}, expected a number or choose")
     values = given(flags) | ({"regions": int(regions)} if regions.isdecimal() else {})
-    with terminal(quiet) as shown:
-        shown.begin("learning")
+    with terminal(quiet) as listener:
+        listener.begin("learning")
         trained = prior_from_files(motions, file, validate(PriorSettings, values, "flags"), seed=seed, body=body, rate=rate,
                                    choose=regions == "choose")
     if not quiet:
-        show(*prior_tables(trained, file))
-
-
-def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
-             folder: Annotated[Path | None, output("Folder of the recording. [default: the trial's name]")] = None,
-             subject: str = "S2", action: str = "Walking", trial: int = 1, part: Literal["validation", "training", "all"] = "validation",
-             training_frames: int = 100, quiet: Quiet = False) -> None:  # fmt: skip
-    """Make a recording of a trial of HumanEva, which needs a licence: calibration, timing, truth and training; films stay in their place.
-
-    Parameters
-    ----------
-    subject
-        S1 to S4.
-    action
-        Walking, Jog, Box, Gestures, ThrowCatch or Combo.
-    trial
-        Its number.
-    part
-        Frames of the owners' own partition, or all; validation of S2 is what Ni 2008 tracks.
-    training_frames
-        Frames in a row that training.csv gets, of the training part of the same action; 0 for all.
-    """
-    from shadowpuppet.cli.tables import trial_table
-    from shadowpuppet.cli.terminal import show, terminal
-    from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
-
-    with terminal(quiet) as shown:
-        shown.begin("reading")
-        found = read_humaneva(data, subject, action, trial, part, training_frames)
-        folder = folder or Path(found.recording.name)
-        write_humaneva(found, folder)
-    if not quiet:
-        show(trial_table(found, folder))
+        show(*_prior_tables(trained, file))
 
 
 def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, to: str = "bvh,c3d,trc,mot,csv,glb,npz",
@@ -92,15 +65,14 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     to
         Formats, separated by commas: bvh, c3d, csv, glb, mot, npz, parquet, trc; or all.
     unit
-        Of BVH files, which do not tell it; Blender takes m.
+        Unit of BVH files, which do not state it; Blender expects m.
     """
-    from shadowpuppet.cli.tables import pairs
-    from shadowpuppet.cli.terminal import show, terminal
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import EXPORTS, export_run
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
-    with terminal(quiet) as shown:
-        shown.begin("exporting")
+    with terminal(quiet) as listener:
+        listener.begin("exporting")
         written = export_run(run, names, folder, unit)
     if not quiet:
         show(pairs([("made", "\n".join(map(str, written)))]))
@@ -108,61 +80,52 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
 
 def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, .csv, .npz, .parquet, .trc, or .amc beside its .asf.")],
             target: Annotated[Path, Parameter(help="File to be written: .bvh, .c3d, .csv, .glb, .mot, .npz, .parquet or .trc.")], /, *,
-            all: Annotated[bool, Parameter(negative=(), show_default=False)] = False, rate: float | None = None,
-            source_unit: Literal["m", "cm", "mm", "in"] | None = None, unit: Literal["m", "cm", "mm"] = "m",
-            quiet: Quiet = False) -> None:  # fmt: skip
-    """Turn a file of motion into another: joints in metres, Z up, or as the other format wants them.
+            all: Switch = False, rate: float | None = None, source_unit: Literal["m", "cm", "mm", "in"] | None = None,
+            unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
+    """Convert a file of motion into another format: joints in metres, Z up, or as the other format requires.
 
-    A skeleton (.bvh, .amc) stays one in .bvh and .glb; to joints alone, a body is fitted where the target needs one.
+    A skeleton (.bvh, .amc) stays one in .bvh and .glb; a body is fitted to joints alone if the target needs one.
 
     Parameters
     ----------
     all
-        Keep every point under its own name, not the joints that are known by ours alone.
+        Keep every point under its own name, not only the joints that have one of our names.
     rate
-        Frames/s of an .amc file, which tells none. [default: 120]
+        Frame rate of an .amc file, frames/s, which it does not state. [default: 120]
     source_unit
-        Of a .bvh file that is read. [default: found from the length of the legs]
+        Unit of a .bvh file to be read. [default: found from the length of the legs]
     unit
-        Of a .bvh file that is written.
+        Unit of a .bvh file to be written.
     """
-    from shadowpuppet.cli.tables import pairs
-    from shadowpuppet.cli.terminal import show, terminal
-    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import UNITS, convert_motion
 
     if rate is not None and not 0 < rate < 1e6:
         raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
-    with terminal(quiet) as shown:
-        shown.begin("converting")
-        told = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
+    with terminal(quiet) as listener:
+        listener.begin("converting")
+        content = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
     if not quiet:
-        show(pairs([("made", str(target)), ("of", told)]))
+        show(pairs([("made", str(target)), ("of", content)]))
 
 
-def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, speed: float = 1.0,
-         loop: Annotated[bool, Parameter(negative=(), show_default=False)] = False,
-         quiet: Quiet = False, outlets: ForOutlets = None) -> None:  # fmt: skip
-    """Give a run's motion to other programs at its own pace, as `live` does while it tracks: to try what receives it. Ctrl-C ends it.
+def _prior_tables(trained: Trained, file: Path) -> Iterator[Any]:
+    """The clips that a motion prior was learnt from, how well it fits them, and where it is."""
+    import numpy as np
 
-    Parameters
-    ----------
-    speed
-        How many times as fast.
-    loop
-        Begin again at the end, until Ctrl-C.
-    """
-    from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.errors import SettingsError
-    from shadowpuppet.live.play import play_run
-    from shadowpuppet.live.stream.choice import open_outlets
-    from shadowpuppet.live.stream.settings import OutletSettings
-    from shadowpuppet.settings import validate
+    def clip_row(clip: Any) -> tuple[str, ...]:
+        worst = np.max(clip.fitted.by_frame[np.isfinite(clip.fitted.by_frame)])
+        return ("/".join(Path(clip.name).parts[-2:])[-48:], str(clip.frames), str(len(clip.parts)), f"{1000 * clip.fitted.residual:.1f}",
+                f"{1000 * worst:.1f}")
 
-    if not 0 < speed <= 100:
-        raise SettingsError(f"flags: speed: found {speed}, expected more than 0, up to 100")
-    chosen = validate(OutletSettings, given(outlets), "flags")
-    if chosen == OutletSettings():
-        raise SettingsError("flags: found nobody to give the motion to, expected one of --osc, --websocket and --lsl")
-    with terminal(quiet) as shown:
-        play_run(run, open_outlets(chosen), shown, speed=speed, loop=loop)
+    yield table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"),
+                map(clip_row, trained.clips))
+    if (choice := trained.choice) is not None:
+        tried = zip(choice.candidates, choice.training_errors, choice.held_out_errors)
+        yield table("error in degrees of motion", ("regions", "learnt from", "left out"),
+                    ((str(number), *(f"{np.degrees(error):.2f}" for error in errors)) for number, *errors in tried))
+    prior = trained.prior
+    yield pairs([("prior", f"{len(prior.subspaces)} regions of {prior.subspaces.dimensions} dimensions; {len(prior.names)} degrees of "
+                           f"freedom, {prior.rate:g} frames/s"),
+                 ("loses", f"{np.degrees(trained.error):.2f} degrees, {1000 * trained.joint_error:.1f} mm at the joints"),
+                 ("saved", str(file)), ("track", f"shadowpuppet track RECORDING --prior {file}")])  # fmt: skip

@@ -1,4 +1,4 @@
-"""What happens in a terminal while something runs: progress, warnings, and the look before the run."""
+"""A terminal while a command runs: progress, warnings, and the look before the run."""
 
 from __future__ import annotations
 
@@ -7,30 +7,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import Any, TextIO
+from typing import TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from shadowpuppet.cli.look_tables import rig_look_table
-from shadowpuppet.cli.printing import show
-from shadowpuppet.cli.tables import look_table
+from shadowpuppet.cli.look_tables import look_table, rig_look_table
+from shadowpuppet.cli.tables import show
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.pipeline.look import Look
 from shadowpuppet.pipeline.look_rig import RigLook
 
-__all__ = ["Terminal", "show", "show_json", "terminal"]
-
-REPEATED = 10.0
-"""Seconds after which what was said is said again."""
+REPEAT_AFTER = 10.0
+"""Seconds after which the same note is printed again."""
 
 
 class Terminal(LiveListener):
-    """Shows the look on standard output; progress and warnings on standard error, a line each."""
+    """Shows the look on standard output, progress and warnings on standard error."""
 
     def __init__(self, quiet: bool = False) -> None:
-        """`quiet`: nothing but warnings."""
+        """`quiet`: show only warnings."""
         self.quiet, self.frames = quiet, 0
         self.console = Console(stderr=True, highlight=False)
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
@@ -41,7 +38,7 @@ class Terminal(LiveListener):
         self._noted: dict[str, float] = {}
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """Show what begins."""
+        """Start the progress bar of a phase."""
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._task = self._progress.add_task(what, total=total, done="")
@@ -49,7 +46,7 @@ class Terminal(LiveListener):
             self._progress.start()
 
     def advance(self, frames: int) -> None:
-        """Show how many frames are done, and how fast."""
+        """Show the number of frames done and the speed."""
         self.frames = frames
         if self._task is not None and not self._progress.disable:
             task = self._progress.tasks[-1]
@@ -58,39 +55,39 @@ class Terminal(LiveListener):
             self._progress.update(self._task, completed=frames, done=f"{frames}{total}{speed}")
 
     def look(self, look: Look | RigLook) -> None:
-        """Show what was found, and what is in doubt."""
+        """Show the look and its doubts."""
         if not self.quiet:
             self.stop()
             show(rig_look_table(look) if isinstance(look, RigLook) else look_table(look))
         self.doubt(look)
 
     def doubt(self, look: Look | RigLook) -> None:
-        """Say what may harm a run."""
+        """Warn of everything that may harm a run."""
         for doubt in look.doubts:
             self.warn(doubt)
 
     def warn(self, message: str) -> None:
-        """Say a warning, once, in one line."""
+        """Print a warning on one line, once."""
         line = f"warning: {' '.join(message.split())}"
         if line not in self._said:
             self._said.add(line)
             self.console.print(line, markup=False, soft_wrap=True)
 
     def note(self, message: str) -> None:
-        """Show what is to be known now; as a line where it was not said just before."""
+        """Show a message as the current phase; and on a line of its own unless that was just printed."""
         now, text = monotonic(), message.rpartition(": ")[0] or message
         if not self.quiet:
             self.begin(message)
-            if text not in self._noted or now - self._noted[text] > REPEATED:
+            if text not in self._noted or now - self._noted[text] > REPEAT_AFTER:
                 self.console.print(message, markup=False, soft_wrap=True)
             self._noted[text] = now
 
     def trouble(self, message: str) -> None:
-        """Say that no pictures come."""
+        """Print that no pictures come."""
         self.console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
 
     def stop(self) -> None:
-        """Take the bar away."""
+        """Remove the progress bar."""
         if not self._progress.disable:  # rich 14.0 ends with an empty line even then
             self._progress.stop()
 
@@ -102,24 +99,20 @@ class Terminal(LiveListener):
 
 @contextmanager
 def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written") -> Iterator[Terminal]:
-    """A terminal to be told things; `folder` is where an interrupted run can be found, `nothing` what is said before its first frame."""
-    shown = Terminal(quiet)
+    """A listener that shows progress and warnings.
+
+    After Ctrl-C it names `folder`, which has the frames so far, or says `nothing` before the first frame.
+    """
+    listener = Terminal(quiet)
     with warnings.catch_warnings():
         warnings.simplefilter("always", ShadowPuppetWarning)
-        warnings.showwarning = shown._show_warning
+        warnings.showwarning = listener._show_warning
         try:
-            yield shown
+            yield listener
         except KeyboardInterrupt as interrupt:
             if interrupt.args:
-                raise  # it tells by itself what was kept
-            kept = f"the {shown.frames} frames so far are in {folder}" if shown.frames and folder else nothing
+                raise  # it says by itself what was kept
+            kept = f"the {listener.frames} frames so far are in {folder}" if listener.frames and folder else nothing
             raise KeyboardInterrupt(kept) from None
         finally:
-            shown.stop()
-
-
-def show_json(value: Any) -> None:
-    """Print a value as JSON."""
-    from shadowpuppet.pipeline.track import json_text
-
-    print(json_text(value))
+            listener.stop()

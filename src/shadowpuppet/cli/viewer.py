@@ -1,82 +1,77 @@
-"""The command `view`: runs, recordings, priors and files to be looked at in space and time."""
+"""The command `view`: runs, recordings, priors and files in space and time."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from shadowpuppet.cli.flags import OTHER, RUN, ViewFlags, options_from
+from shadowpuppet.cli.flags import Config, Quiet, flag, flags_of, options_from, switch, unpacked
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.pipeline.options import Options
 
 if TYPE_CHECKING:
-    from shadowpuppet.viewer.scene.show import Show
+    from shadowpuppet.viewer.scene.scene import Scene
+
+    ViewFlags = Any
+else:
+    ViewFlags = unpacked(flags_of(Options, without=("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay")))
+    """Options for looking at a recording."""
 
 PAGE = Group("Page", sort_key=5.5)
 
 
-def _switch(help: str, group: Group = RUN, name: str | None = None) -> Parameter:
-    return Parameter(name=name, group=group, negative=(), show_default=False, help=help)
-
-
-What = Annotated[Path, Parameter(help="Folder of a run or a recording, film (with --fov), prior (.npz), calibration, or file of motion: "
-                                      ".amc, .bvh, .c3d, .csv, .npz, .parquet, .trc.")]
-Other = Annotated[Path | None, Parameter(help="Another of these, to be shown beside it.")]
-Beside = Annotated[Path | None, Parameter(group=RUN, help="The same as OTHER.")]
-Apart = Annotated[float, Parameter(group=RUN, help="Metres between the two; 0: one over the other.")]
-Truth = Annotated[Path | None, Parameter(group=RUN, help="Truth of a run, in place of its recording's.")]
-RecordingOf = Annotated[Path | None, Parameter(group=RUN, help="Recording of a run, where it is not any more where it was.")]
-Start = Annotated[float | None, Parameter(group=RUN, help="Seconds from which on it is shown.")]
-End = Annotated[float | None, Parameter(group=RUN, help="Seconds up to which it is shown.")]
-Html = Annotated[Path | None, Parameter(group=PAGE, help="Write one file that plays in a browser without this program, and end.")]
-Pictures = Annotated[bool, _switch("Put the films' pictures into that file: faces and rooms. Silhouettes are in it without.", PAGE)]
-Listen = Annotated[str, Parameter(group=PAGE, help="Address at which the page is served; any but this machine's own lets others see what "
-                                                   "it shows.")]
-Port = Annotated[int | None, Parameter(group=PAGE, help="Port of the page; 0 for any that is free. [default: 8610, or any that is free]")]
-NoOpen = Annotated[bool, _switch("Open no browser.", PAGE, "--no-open")]
-Config = Annotated[Path | None, Parameter(group=OTHER, help="File of settings, TOML, as `shadowpuppet settings` prints it.")]
-Quiet = Annotated[bool, _switch("Show nothing but warnings and errors.", OTHER)]
-ForView = Annotated[ViewFlags | None, Parameter(name="*")]
-
-
-def view(what: What, other: Other = None, /, *, beside: Beside = None, apart: Apart = 1.5, truth: Truth = None,
-         recording: RecordingOf = None, start: Start = None, end: End = None, html: Html = None, pictures: Pictures = False,
-         listen: Listen = "127.0.0.1", port: Port = None, no_open: NoOpen = False, config: Config = None, quiet: Quiet = False,
-         flags: ForView = None) -> None:  # fmt: skip
-    """Look at a run, a recording, a prior or a file in space and time, on a page for a browser: the puppet, the truth, cameras and what
-    they saw, hull points, particles, angles and errors. Ctrl-C ends it."""
+def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, film (with --fov), prior (.npz), calibration, or file of "
+                                              "motion: .amc, .bvh, .c3d, .csv, .npz, .parquet, .trc.")],
+         other: Annotated[Path | None, Parameter(help="A second one, shown beside the first.")] = None, /, *,
+         beside: Annotated[Path | None, flag("The same as OTHER.")] = None,
+         apart: Annotated[float, flag("Metres between the two; 0: one over the other.")] = 1.5,
+         truth: Annotated[Path | None, flag("Truth of a run, in place of its recording's.")] = None,
+         recording: Annotated[Path | None, flag("Recording of a run, if it was moved.")] = None,
+         start: Annotated[float | None, flag("Seconds at which it starts.")] = None,
+         end: Annotated[float | None, flag("Seconds at which it ends.")] = None,
+         html: Annotated[Path | None, flag("Write one file that plays in a browser without this program, and stop.", PAGE)] = None,
+         pictures: Annotated[bool, switch("Include the films' pictures in that file: faces and rooms. Silhouettes are always in it.",
+                                          PAGE)] = False,
+         listen: Annotated[str, flag("Address at which the page is served; with any but this machine's own, others can see what it shows.",
+                                     PAGE)] = "127.0.0.1",
+         port: Annotated[int | None, flag("Port of the page; 0 for any free one. [default: 8610, or any free one]", PAGE)] = None,
+         no_open: Annotated[bool, switch("Open no browser.", PAGE, "--no-open")] = False,
+         config: Config = None, quiet: Quiet = False, flags: ViewFlags = None) -> None:  # fmt: skip
+    """Look at a run, a recording, a prior or a file in space and time, on a page for a browser: the puppet, the truth, cameras and their
+    films, hull points, particles, angles and errors. Ctrl-C ends it."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.viewer.web.server import check_viser
 
     check_viser()
     _check(other, beside, html, pictures, port)
     options = options_from(flags, config)
-    with terminal(quiet) as shown:
-        from shadowpuppet.viewer.scene.of_run import beside as side_by_side
-        from shadowpuppet.viewer.scene.open_any import between, show_of
+    with terminal(quiet) as listener:
+        from shadowpuppet.viewer.scene.of_run import side_by_side
+        from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
         from shadowpuppet.viewer.web.page import check_page, write_page
-        from shadowpuppet.viewer.web.serve import first_wish
+        from shadowpuppet.viewer.web.serve import default_view
 
         if html is not None:
             check_page(html)
-        shown.begin("reading")
-        show = show_of(what, options, truth, recording)
+        listener.begin("reading")
+        scene = open_scene(what, options, truth, recording)
         if (second := other or beside) is not None:
-            show = side_by_side(show, show_of(second, options), apart)
-        show = between(show, start, end)
-        for lack in show.lacks:
-            shown.warn(lack)
+            scene = side_by_side(scene, open_scene(second, options), apart)
+        scene = cut_scene(scene, start, end)
+        for problem in scene.problems:
+            listener.warn(problem)
         if html is None:
-            shown.stop()
-            return _serve(show, listen, port, not no_open, quiet)
-        write_page(html, show, first_wish(show, pictures), shown)
+            listener.stop()
+            return _serve(scene, listen, port, not no_open, quiet)
+        write_page(html, scene, default_view(scene, pictures), listener)
     if not quiet:
         print(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
 
 
 def _check(other: Path | None, beside: Path | None, html: Path | None, pictures: bool, port: int | None) -> None:
-    """Raise `SettingsError` for flags that cannot be."""
+    """Raise `SettingsError` for flags that do not go together."""
     if pictures and html is None:
         raise SettingsError("flags: pictures: found it without --html, whose file it is about")
     if port is not None and not 0 <= port <= 65535:
@@ -85,20 +80,20 @@ def _check(other: Path | None, beside: Path | None, html: Path | None, pictures:
         raise SettingsError(f"flags: beside: found {beside} and {other}, expected one of them")
 
 
-def _serve(show: Show, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
+def _serve(scene: Scene, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
     """Serve the page until Ctrl-C."""
     import contextlib
     import webbrowser
 
     from shadowpuppet.live.display.choice import has_screen
-    from shadowpuppet.viewer.web.serve import look
+    from shadowpuppet.viewer.web.serve import serve_scene
 
-    def told(address: str) -> None:
+    def ready(address: str) -> None:
         if not quiet:
-            print(f"{show.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
+            print(f"{scene.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
         if opening and has_screen():
             with contextlib.suppress(webbrowser.Error):
                 webbrowser.open(address)
 
     with contextlib.suppress(KeyboardInterrupt):
-        look(show, listen, port, told=told)
+        serve_scene(scene, listen, port, ready=ready)

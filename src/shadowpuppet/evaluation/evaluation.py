@@ -1,4 +1,4 @@
-"""A run measured after it was made."""
+"""Evaluation of a finished run, against a truth or alone."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.evaluation.error_metrics import (
+    acceleration_errors,
     aligned_errors,
     axis_errors,
-    bend_errors,
     bone_errors,
+    hinge_errors,
     humaneva_error,
-    losses,
-    motion_errors,
+    pose_losses,
     whole_alignment,
-    worlds,
+    world_difference,
 )
 from shadowpuppet.evaluation.interval_coverage import coverage
-from shadowpuppet.evaluation.joint_angles import angle_errors, compared_poses, dof_errors, turn_errors
+from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, turn_errors
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
@@ -35,55 +35,47 @@ from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_err
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
 
-__all__ = ["Comparison", "Evaluation", "angle_errors", "evaluate_run", "measure_run", "update_metrics", "write_evaluation"]
-
 
 @dataclass(frozen=True)
 class Comparison:
     """How a run is compared with its truth."""
 
     joints: Sequence[str] | None = None
-    """Those compared, or names of `metrics.GROUPS`; None: `metrics.default_joints`."""
+    """Joints to compare, or names of `metrics.GROUPS`; None: `metrics.default_joints`."""
     start: int = 0
-    """The truth's first frame that counts."""
+    """First frame of the truth to compare."""
     end: int | None = None
-    """The truth's last frame that counts; None: its last."""
+    """Last frame of the truth to compare; None: its last."""
     offset: float = 0.0
     """Seconds added to the truth's times."""
     sync: bool = False
-    """Find the offset by the joints' speeds."""
+    """Find that offset by the joints' speeds."""
     align: bool = False
     """Compare after one rigid motion of the whole truth into the run's world."""
     angles: bool = False
-    """Compare the angles of a whole body's joints, too."""
+    """Also compare joint angles of a whole body."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """A run and its truth, at the same times and in one world, and all that was measured."""
+    """A run and its truth at the same times and in one world, and all figures."""
 
     run: Run
     measured: dict[str, Any]
     """Plain values, as `write_evaluation` writes them."""
     cameras: Sequence[Camera]
-    """Of the run; none where they are not known."""
+    """Cameras of the run; empty if unknown."""
     table: JointTable | None = None
     """The run's joints at the times compared (T,); None without a truth."""
     truth: JointTable | None = None
-    """The truth's at the same times, in the run's world as far as that was asked for."""
+    """The truth at the same times, aligned with the run's world if that was asked for."""
     errors: JointErrors | None = None
 
 
-def evaluate_run(folder: str | Path, truth: str | Path | None = None, joints: Sequence[str] | None = None,
-                 start: int = 0, angles: bool = False) -> dict[str, Any]:
-    """The figures of `measure_run`."""
-    return measure_run(folder, truth, Comparison(joints, start, angles=angles)).measured
-
-
 def measure_run(folder: str | Path, truth: str | Path | None = None, how: Comparison | None = None) -> Evaluation:
-    """A run folder measured against `truth` or that of its recording, where there is one: `metrics.evaluate`, and what `measures` has.
+    """Evaluate a run folder against `truth`, by default that of its recording: `metrics.evaluate` and all of `error_metrics`.
 
-    Plane and depth are those of the run's camera. Warns where run and truth seem to be in two worlds. Raises `FormatError` or
+    Plane and depth are those of the run's camera. Warns if run and truth seem to be in two worlds. Raises `FormatError` or
     `ShadowPuppetError` for files that cannot be used.
     """
     how, run = how or Comparison(), read_run(folder)
@@ -92,27 +84,27 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
         asked = next(name for name in ("angles", "sync", "align") if getattr(how, name))
         raise ShadowPuppetError(f"{folder}: {asked}: found no truth to compare with, expected one as TRUTH")
     cameras = _cameras(run.folder)
-    said: dict[str, Any] = {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete}
-    lost = {"losses": losses(run.motion)}
+    info: dict[str, Any] = {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete}
+    lost = {"losses": pose_losses(run.motion)}
     if table is None:
-        measured = evaluate(run.motion, joints=_named(how.joints), camera=_only(cameras), cameras=max(len(cameras), 1))
-        return Evaluation(run, said | measured | lost, cameras)
+        measured = evaluate(run.motion, joints=_joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
+        return Evaluation(run, info | measured | lost, cameras)
     read = _cut(read_truth(table, run.motion.joint_names), how, table)
     reference, clock = _on_our_clock(run, read, how, table)
     try:
         reference, world = _in_our_world(run, reference, how)
-        measured = evaluate(run.motion, reference, _named(how.joints), camera=_only(cameras), cameras=max(len(cameras), 1))
+        measured = evaluate(run.motion, reference, _joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
     except ShadowPuppetError as error:
         names = names_in(table)
         raise ShadowPuppetError(f"{error}" + (f" ({table} calls them {names})" if "which the truth lacks" in str(error) and names else "")
                                 ) from None
     ours, theirs = at_common_times(run.motion.table, reference)
     errors = joint_errors(ours, theirs, list(measured["errors"]["joints"]))
-    measured |= lost | {"clock": clock | {"frames_compared": len(theirs.times)}, "world": world} | _wider(run, ours, theirs, errors)
+    measured |= lost | {"clock": clock | {"frames_compared": len(theirs.times)}, "world": world} | _error_metrics(run, ours, theirs, errors)
     if how.angles:
         poses = compared_poses(run.motion, theirs)
         measured |= {"angles_deg": turn_errors(*poses), "dofs_deg": dof_errors(*poses)}
-    return Evaluation(run, said | measured, cameras, ours, theirs, errors)
+    return Evaluation(run, info | measured, cameras, ours, theirs, errors)
 
 
 def write_evaluation(path: str | Path, measured: Mapping[str, Any], folder: str | Path) -> None:
@@ -135,17 +127,17 @@ def check_output(path: str | Path, folder: str | Path, ending: str) -> None:
 
 
 def update_metrics(evaluation: Evaluation) -> Path:
-    """Put figures into the run's own metrics.json, over those of the same names; timings and all else stay. Returns its path."""
+    """Merge the figures into the run's own metrics.json; returns its path."""
     write_metrics(evaluation.run.folder, evaluation.run.metrics | evaluation.measured)
     return evaluation.run.folder / "metrics.json"
 
 
-def _wider(run: Run, ours: JointTable, theirs: JointTable, errors: JointErrors) -> dict[str, Any]:
-    """What `measures` has, of tables at the same times."""
+def _error_metrics(run: Run, ours: JointTable, theirs: JointTable, errors: JointErrors) -> dict[str, Any]:
+    """All of `error_metrics`, of tables at the same times."""
     sd = at_times(replace(run.motion.table, positions=run.motion.joint_sd), ours.times).select(errors.names).positions
     return {"aligned_mm": aligned_errors(errors, ours, theirs), "axes_mm": axis_errors(errors),
-            "humaneva": humaneva_error(ours, theirs), "bends_deg": bend_errors(ours, theirs),
-            "acceleration": motion_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
+            "humaneva": humaneva_error(ours, theirs), "bends_deg": hinge_errors(ours, theirs),
+            "acceleration": acceleration_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
             "coverage": coverage(errors.delta, sd, errors.names)}
 
 
@@ -160,7 +152,7 @@ def _cut(truth: JointTable, how: Comparison, path: str | Path) -> JointTable:
 
 
 def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path) -> tuple[JointTable, dict[str, Any]]:
-    """The truth at the run's clock, and what is known of that."""
+    """The truth in the run's time, and facts about the clocks."""
     if how.sync and how.offset:
         raise ShadowPuppetError(f"offset: found {how.offset:g} s and --sync, which finds it; expected one of them")
     if not np.isfinite(how.offset):
@@ -182,31 +174,30 @@ def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path
 
 
 def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTable, dict[str, Any]]:
-    """The truth, moved as a whole into the run's world where that was asked for, and how far it was apart; warns where it seems to be in
-    another and was not moved."""
+    """The truth, moved into the run's world if `how.align`, and `world_difference`; warns if it seems to be in another world."""
     if not len(run.motion):
         return truth, {}
     ours, theirs = at_common_times(run.motion.table, truth)
-    errors = joint_errors(ours, theirs, _named(how.joints))
-    told = worlds(errors, ours, theirs)
-    if how.align and not told:
+    errors = joint_errors(ours, theirs, _joint_names(how.joints))
+    world = world_difference(errors, ours, theirs)
+    if how.align and not world:
         raise ShadowPuppetError("align: found fewer than three joints known in both run and truth, expected more")
     if how.align:
         back = whole_alignment(theirs, ours, errors)
-        return replace(truth, positions=back.apply(truth.positions)), told | {"moved": True}
-    if told.get("apart"):
-        warn(f"the run's joints are {told['mean_mm']:.0f} mm from the truth's, but {told['aligned_mm']:.0f} mm once the run is turned by "
-             f"{told['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(told['moved_mm']):.0f} mm as a whole: are they in two "
+        return replace(truth, positions=back.apply(truth.positions)), world | {"moved": True}
+    if world.get("apart"):
+        warn(f"the run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run is turned by "
+             f"{world['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(world['moved_mm']):.0f} mm as a whole: are they in two "
              "worlds, or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
-    return truth, told | ({"moved": False} if told else {})
+    return truth, world | ({"moved": False} if world else {})
 
 
-def _named(joints: Sequence[str] | None) -> list[str] | None:
-    """Joints, groups taken apart, each once."""
+def _joint_names(joints: Sequence[str] | None) -> list[str] | None:
+    """Names of joints, with groups replaced by theirs, each once."""
     return None if joints is None else list(dict.fromkeys(name for joint in joints for name in GROUPS.get(joint, (joint,))))
 
 
-def _only(cameras: Sequence[Camera]) -> Camera | None:
+def _single_camera(cameras: Sequence[Camera]) -> Camera | None:
     return cameras[0] if len(cameras) == 1 else None
 
 
@@ -218,6 +209,6 @@ def _known_truth(path: object) -> str | None:
 
 
 def _cameras(folder: Path) -> Sequence[Camera]:
-    """The run's cameras; none where they are not known, and one is taken for level."""
+    """The run's cameras; none if unknown."""
     path = folder / "calibration.toml"
     return read_calibration(path) if path.exists() else []

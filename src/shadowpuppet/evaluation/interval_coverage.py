@@ -1,4 +1,4 @@
-"""Whether stated standard deviations are honest: how often the truth lies within the intervals that they promise."""
+"""Coverage of the intervals implied by the stated standard deviations."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 LEVELS = {"50": 0.6744897501960817, "90": 1.6448536269514722, "95": 1.959963984540054}
-"""Half the width of a normal distribution's central intervals that hold so many percent, in standard deviations."""
+"""Half widths of a normal distribution's central intervals of that many percent, in standard deviations."""
 
 
 def coverage(delta: Array, sd: Array, names: Sequence[str]) -> dict[str, Any] | None:
-    """Shares of errors `delta` (T, J, 3), metres, that lie within the intervals of their standard deviations `sd` (T, J, 3), for all joints
-    and each.
+    """Shares of errors `delta` (T, J, 3) within the intervals of their standard deviations `sd` (T, J, 3), metres, of all joints and each.
 
-    An axis of a joint in a frame counts as one, where both are known. `rms_z` is the root mean square of error by standard deviation: 1
-    where these are right, more where they promise too much. Neighbouring frames err alike, so that short runs tell little. None where no
-    standard deviation is stated.
+    Each axis of a joint in a frame counts, if both are known. `rms_z`: root mean square of error over standard deviation; 1 if these are
+    right, greater if they are too small. Errors of neighbouring frames correlate, so short runs tell little. None if no standard deviation
+    is stated.
     """
     stated = np.isfinite(delta) & np.isfinite(sd) & (sd > 0)
     if not stated.any():

@@ -1,4 +1,4 @@
-"""What an evaluation found, in words, as tables and pages say it."""
+"""Sentences about an evaluation, for tables and pages."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from shadowpuppet.evaluation.interval_coverage import LEVELS
 
 WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved",
         "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled"}
-"""The ways in which runs are laid over truths (`measures.aligned_errors`), in words."""
+"""The alignments of `error_metrics.aligned_errors`, in words."""
 
 
-def said_root(aligned: Mapping[str, Any]) -> str:
+def root_text(aligned: Mapping[str, Any]) -> str:
     """The root in words."""
     return "middle of both " + aligned["root_joint"].split("_")[-1] + "s" if " and " in aligned["root_joint"] else aligned["root_joint"]
 
 
-def coverage_words(coverage: Mapping[str, Any] | None) -> str:
-    """Whether stated intervals are honest."""
+def coverage_text(coverage: Mapping[str, Any] | None) -> str:
+    """Coverage of the stated intervals, and a verdict."""
     if coverage is None:
         return "none stated: the run has no standard deviations, so no intervals can be checked"
     shares = ", ".join(f"{100 * coverage[f'within_{level}']:.0f} % within those of {level} %" for level in LEVELS)
@@ -28,22 +28,22 @@ def coverage_words(coverage: Mapping[str, Any] | None) -> str:
     return f"{shares}; errors are {coverage['rms_z']:.2f} of the stated deviations (rms): {verdict}"
 
 
-def losses_words(losses: Mapping[str, Any]) -> str:
-    """How many frames have no pose, and how long that lasted."""
+def losses_text(losses: Mapping[str, Any]) -> str:
+    """Number of frames without a pose, and the longest gap."""
     if not losses["frames"]:
         return "no frame"
     return (f"{losses['frames']} frames ({100 * losses['share']:.1f} %) in {losses['gaps']} gaps; the longest {losses['longest_frames']} "
             f"frames, {losses['longest_s']:.2f} s, from {losses['longest_from_s']:.2f} s")
 
 
-def world_words(world: Mapping[str, Any]) -> str:
-    """What one rigid motion of the whole makes good."""
+def world_text(world: Mapping[str, Any]) -> str:
+    """The rigid motion between run and truth."""
     return (f"as a whole the run is turned by {world['rotation_deg']:.1f} degrees and {np.linalg.norm(world['moved_mm']):.0f} mm off"
             + ("; all errors are told after that" if world["moved"] else ""))
 
 
-def clock_words(clock: Mapping[str, Any]) -> str:
-    """How the clocks stand and at how many times run and truth were compared."""
+def clock_text(clock: Mapping[str, Any]) -> str:
+    """Frame rates, offset, and the number of times compared."""
     rates = f"run {clock['run_hz']:.4g}, truth {clock['truth_hz']:.4g} frames/s, compared at {clock['frames_compared']} times"
     if "speed_error_m_s" not in clock:
         return rates + (f"; {clock['offset_s']:+.3f} s added to the truth's times" if clock["offset_s"] else "")
@@ -53,8 +53,8 @@ def clock_words(clock: Mapping[str, Any]) -> str:
             f"{clock['speed_error_m_s']:.2f} m/s{was})")
 
 
-def bones_words(bones: Mapping[str, Mapping[str, float]]) -> str:
-    """How far bones are from the truth's lengths, and how much they change."""
+def bones_text(bones: Mapping[str, Mapping[str, float]]) -> str:
+    """Errors of bone lengths, and their change over time."""
     worst = max(bones, key=lambda name: abs(bones[name]["longer_mm"]))
     change = max(bone["run_sd_mm"] for bone in bones.values())
     off = np.mean([abs(bone["longer_mm"]) for bone in bones.values()])

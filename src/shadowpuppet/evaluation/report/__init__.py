@@ -1,1 +1,1 @@
-"""A page about one run: how good it is, in figures, plots and pictures. Needs the extra `report`."""
+"""The report page of a run: figures, plots and pictures. Needs the extra `report`."""

@@ -1,4 +1,4 @@
-"""Plots of an evaluation, as SVG that stands in a page."""
+"""Plots of an evaluation, as SVG for a page."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.evaluation.error_metrics import runs_of
+from shadowpuppet.evaluation.error_metrics import true_stretches
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import accelerations
 
-# Colours that people who see colours differently tell apart: Okabe & Ito 2008.
+# Colours that colour-blind people can tell apart: Okabe & Ito 2008.
 BLUE, ORANGE, GREEN, PINK, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8a8f98"
 SIDES = {"left": GREEN, "right": PINK}
 STATUSES = {"tracked": "#dfe6ee", "uncertain": "#F0C75E", "predicted": "#9ECAE1", "lost": ORANGE, "absent": "#b9bdc4"}
 WAYS = {"none": ("as it stands", BLUE, "-"), "root": ("from the root", GREEN, "--"), "rigid": ("each frame moved and turned", ORANGE, "-.")}
 POINTS = 1200
-"""Points that a line has at most; more do not show, and make the page heavy."""
+"""Greatest number of points of a line; more do not show."""
 INK = "#2b2f36"
 STYLE = {"svg.fonttype": "none", "font.size": 9.5, "axes.edgecolor": "#c4c9d0", "axes.labelcolor": INK, "text.color": INK,
          "xtick.color": "#5b6470", "ytick.color": "#5b6470", "axes.grid": True, "grid.color": "#e6e9ed", "grid.linewidth": 0.8,
@@ -30,12 +30,12 @@ STYLE = {"svg.fonttype": "none", "font.size": 9.5, "axes.edgecolor": "#c4c9d0", 
 
 
 def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
-    """Error of the joints over time, with the statuses below, and the frames at `marks` (s) by letter."""
+    """Joint error over time, with the statuses below and letters at `marks` (s)."""
     assert of.table is not None
     assert of.errors is not None
     errors, times = 1000 * np.where(of.errors.known, of.errors.distance, np.nan), of.table.times
-    seen = np.isfinite(errors).any(1)
-    t, low, quarter, middle, high, top = _binned(times[seen], _spread(errors[seen]))
+    known = np.isfinite(errors).any(1)
+    t, low, quarter, middle, high, top = _binned(times[known], _spread(errors[known]))
     with _drawing("time", (10, 3.7), rows=2, ratios=(14, 1)) as (figure, (axes, strip)):
         axes.fill_between(t, low, top, color=BLUE, alpha=0.13, lw=0, label="all joints")
         axes.fill_between(t, quarter, high, color=BLUE, alpha=0.25, lw=0, label="middle half")
@@ -55,7 +55,7 @@ def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
 
 
 def by_joint_and_time(of: Evaluation) -> str:
-    """Error as a colour, a row a joint."""
+    """Error over time as a colour, a row a joint."""
     assert of.table is not None
     assert of.errors is not None
     errors, times = 1000 * np.where(of.errors.known, of.errors.distance, np.nan), of.table.times
@@ -63,11 +63,11 @@ def by_joint_and_time(of: Evaluation) -> str:
     with _drawing("map", (10, 0.6 + 0.21 * len(rows))) as (figure, axes):
         from matplotlib import colormaps
 
-        shown = np.ma.masked_invalid(rows)
-        top = float(np.percentile(shown.compressed(), 99)) if shown.count() else 1.0
+        masked = np.ma.masked_invalid(rows)
+        top = float(np.percentile(masked.compressed(), 99)) if masked.count() else 1.0
         edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:] + 1e-9])
         colours = colormaps["YlOrBr"].with_extremes(bad="#6b7078")
-        image = axes.pcolormesh(edges, np.arange(len(rows) + 1), shown, cmap=colours, vmin=0, vmax=top, rasterized=True)
+        image = axes.pcolormesh(edges, np.arange(len(rows) + 1), masked, cmap=colours, vmin=0, vmax=top, rasterized=True)
         axes.set_yticks(np.arange(len(rows)) + 0.5, [name.replace("_", " ") for name in of.errors.names], fontsize=8.5)
         axes.invert_yaxis()
         axes.grid(False)
@@ -80,7 +80,7 @@ def by_joint_and_time(of: Evaluation) -> str:
 
 
 def by_joint(of: Evaluation) -> str:
-    """How large the errors of each joint are: 5, 25, 50, 75 and 95 % of the frames lie below."""
+    """Percentiles of the errors of each joint: 5, 25, 50, 75 and 95 %."""
     assert of.errors is not None
     kept = [(name, 1000 * of.errors.distance[of.errors.known[:, j], j]) for j, name in enumerate(of.errors.names)]
     kept = [(name, values) for name, values in kept if len(values)]
@@ -100,7 +100,7 @@ def by_joint(of: Evaluation) -> str:
 
 
 def shares(distances: Mapping[str, Array], known: NDArray[np.bool_]) -> str:
-    """Which share of joints is nearer to the truth than so much, in each way of laying them over it."""
+    """Share of joints below each error, after each alignment."""
     with _drawing("shares", (5.2, 3.5)) as (figure, axes):
         far = max(float(np.percentile(1000 * distances["none"][known], 98)), 1.0)
         limits = np.linspace(0, far, 300)
@@ -115,7 +115,7 @@ def shares(distances: Mapping[str, Array], known: NDArray[np.bool_]) -> str:
 
 
 def path_of(of: Evaluation, joint: str) -> str:
-    """One joint's place along each axis over time, run and truth."""
+    """Position of one joint over time, run and truth."""
     assert of.table is not None
     assert of.truth is not None
     ours, theirs = (table.select([joint]).positions[:, 0] for table in (of.table, of.truth))
@@ -133,7 +133,7 @@ def path_of(of: Evaluation, joint: str) -> str:
 
 
 def jitter_by_joint(of: Evaluation) -> str:
-    """Root mean square accelerations of each joint, run beside truth."""
+    """Root mean square acceleration of each joint, run and truth."""
     assert of.table is not None
     assert of.truth is not None
     assert of.errors is not None
@@ -153,7 +153,7 @@ def jitter_by_joint(of: Evaluation) -> str:
 
 
 def fit_over_time(of: Evaluation) -> str:
-    """Overlap and cost of the run, frame by frame, as recorded."""
+    """Overlap and cost over time."""
     motion, several = of.run.motion, "cost_m2" in of.measured
     scale, unit = (1e4, "cm²") if several else (1.0, "pixels")
     t, overlap, cost = _binned(motion.times, [motion.overlap, scale * motion.cost])
@@ -169,20 +169,20 @@ def fit_over_time(of: Evaluation) -> str:
         return _svg(figure, "fit")
 
 
-def honesty(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
-    """Stated against found shares of the intervals."""
-    with _drawing("honesty", (3.6, 3.3)) as (figure, axes):
+def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
+    """Found against stated coverage of the intervals."""
+    with _drawing("coverage", (3.6, 3.3)) as (figure, axes):
         stated = [float(level) for level in levels]
         axes.plot([0, 100], [0, 100], color="#c4c9d0", lw=1.2, label="honest")
         axes.plot(stated, [100 * coverage[f"within_{level}"] for level in levels], "o-", color=BLUE, label="this run")
         axes.set(xlim=(0, 100), ylim=(0, 100), xlabel="stated, %", ylabel="of the truth within, %")
         axes.set_aspect("equal")
         axes.legend(loc="upper left")
-        return _svg(figure, "honesty")
+        return _svg(figure, "coverage")
 
 
 class _drawing:
-    """A figure in our style with so many panels, for a `with` block."""
+    """Context of a matplotlib figure with panels, in our style."""
 
     def __init__(self, name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,)) -> None:
         from matplotlib import rc_context
@@ -205,7 +205,7 @@ class _drawing:
 
 
 def _svg(figure: Any, name: str) -> str:
-    """The figure's SVG as it stands in a page: without header and metadata, its ids its own."""
+    """The figure's SVG without header and metadata, with unique ids."""
     out = io.StringIO()
     figure.savefig(out, format="svg", transparent=True, dpi=150, metadata={"Date": None, "Creator": None})
     text = out.getvalue()
@@ -216,14 +216,14 @@ def _svg(figure: Any, name: str) -> str:
 
 
 def _spread(errors: Array) -> list[Array]:
-    """Of each frame's errors (T, J) the least, quarter, mean, three quarters and greatest."""
+    """Least, lower quartile, mean, upper quartile and greatest of each frame's errors (T, J)."""
     with np.errstate(invalid="ignore"):
         quarter, high = np.nanpercentile(errors, [25, 75], axis=1)
     return [np.nanmin(errors, 1), quarter, np.nanmean(errors, 1), high, np.nanmax(errors, 1)]
 
 
 def _binned(times: Array, series: Sequence[Array]) -> tuple[Array, ...]:
-    """Times and series (T,) as at most `POINTS`: means of neighbours."""
+    """Times and series (T,) reduced to `POINTS` means of neighbours."""
     if len(times) <= POINTS:
         return (times, *series)
     groups = np.minimum(np.arange(len(times)) * POINTS // len(times), POINTS - 1)
@@ -237,12 +237,12 @@ def _binned(times: Array, series: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def _statuses(axes: Any, of: Evaluation) -> dict[str, Any]:
-    """Draw the statuses as a strip; what stands for each."""
+    """Draw the statuses as a strip; returns the handles for a legend."""
     motion = of.run.motion
     step = float(np.median(np.diff(motion.times))) if len(motion) > 1 else 1.0
     handles = {}
     for status in motion.status_counts:
-        bars = [(motion.times[first] - step / 2, (end - first) * step) for first, end in runs_of(motion.status == status)]
+        bars = [(motion.times[first] - step / 2, (end - first) * step) for first, end in true_stretches(motion.status == status)]
         handles[status] = axes.broken_barh(bars, (0, 1), facecolors=STATUSES[status], lw=0)
     axes.set(ylim=(0, 1), yticks=[], xlabel="time, s")
     axes.grid(False)
@@ -257,7 +257,7 @@ def _span(*times: Array) -> tuple[float, float]:
 
 
 def _size(vectors: Array) -> Array:
-    """Root mean square length (J,) of vectors (T, J, 3); not a number where none is known."""
+    """Root mean square length (J,) of vectors (T, J, 3); NaN if none is known."""
     squares = (vectors**2).sum(2)
     known = np.isfinite(squares)
     return np.sqrt(np.where(known, squares, 0).sum(0) / np.where(known.any(0), known.sum(0), np.nan))

@@ -1,4 +1,4 @@
-"""Bits of HTML: what is in files or names is text there, never markup."""
+"""Pieces of HTML; text from files and names is escaped."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from html import escape
 
 
 def plain(text: object) -> str:
-    """Text as it is shown, whatever signs are in it."""
+    """Escaped text."""
     return escape(str(text))
 
 
 def figure(svg: str, caption: str) -> str:
-    """A plot with what it shows below."""
+    """A plot with a caption."""
     return f"<figure>{svg}<figcaption>{caption}</figcaption></figure>"
 
 
 def rows(cells: Iterable[Sequence[str]], sums: int = 0) -> str:
-    """Rows of a table, the last `sums` of them set off."""
+    """Rows of a table, the last `sums` set off."""
     made = ["<td>" + "</td><td>".join(map(plain, row)) + "</td>" for row in cells]
     first = len(made) - sums
     return "".join(f"<tr{' class=sum' if n >= first else ''}>{row}</tr>" for n, row in enumerate(made))
@@ -30,5 +30,5 @@ def table(head: Sequence[str], body: str) -> str:
 
 
 def definitions(pairs: Iterable[tuple[str, str]]) -> str:
-    """Names beside what they are; the latter may have markup."""
+    """A list of names and values; values may be markup."""
     return "<dl>" + "".join(f"<dt>{plain(name)}</dt><dd>{text}</dd>" for name, text in pairs) + "</dl>"

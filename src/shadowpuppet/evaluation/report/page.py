@@ -1,4 +1,4 @@
-"""The page itself: one file that needs nothing else, and from which no request leaves."""
+"""The report page: one file that needs nothing else and makes no request."""
 
 from __future__ import annotations
 
@@ -14,30 +14,39 @@ from shadowpuppet.evaluation.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation.interval_coverage import LEVELS
 from shadowpuppet.evaluation.report import charts
 from shadowpuppet.evaluation.report.html import figure, plain, rows, table
-from shadowpuppet.evaluation.report.pictures import Chosen, chosen_frames, pictures
-from shadowpuppet.evaluation.report.sections import axes_table, body_tables, cards, facts, joint_table, meanings, notes, ways
-from shadowpuppet.evaluation.summary_text import coverage_words
+from shadowpuppet.evaluation.report.pictures import ReportFrame, pictures, report_frames
+from shadowpuppet.evaluation.report.sections import (
+    alignments_table,
+    axes_table,
+    body_tables,
+    cards,
+    definitions_section,
+    joint_table,
+    notes,
+    run_facts,
+)
+from shadowpuppet.evaluation.summary_text import coverage_text
 from shadowpuppet.io.files.text import write_whole
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
-"""What a browser may fetch for this page: nothing."""
+"""Forbids the browser to fetch anything."""
 
 
 def check_report(path: str | Path, folder: str | Path) -> None:
-    """Raise `ShadowPuppetError` where no page can be made at a path."""
+    """Raise `ShadowPuppetError` if no page can be written there."""
     check_output(path, folder, ".html")
     if importlib.util.find_spec("matplotlib") is None:
         raise ShadowPuppetError(f"{path}: a report needs matplotlib: pip install 'shadowpuppet[report]'")
 
 
 def write_report(path: str | Path, of: Evaluation) -> None:
-    """Write a page about an evaluation. Raises `ShadowPuppetError` where it cannot be written, or matplotlib is not there."""
+    """Write the page of an evaluation. Raises `ShadowPuppetError` if it cannot be written, or without matplotlib."""
     check_report(path, of.run.folder)
     write_whole(Path(path), page(of))
 
 
 def page(of: Evaluation) -> str:
-    """The page's text (HTML)."""
+    """The page, HTML."""
     name = of.run.folder.resolve().name
     css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
     return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
@@ -46,7 +55,7 @@ def page(of: Evaluation) -> str:
 
 
 def _parts(of: Evaluation, name: str) -> Iterator[str]:
-    chosen = chosen_frames(of)
+    chosen = report_frames(of)
     shots, source = pictures(of, chosen)
     yield f"<header><h1>{plain(name)}</h1>{_under(of)}</header>"
     yield cards(of)
@@ -62,8 +71,8 @@ def _parts(of: Evaluation, name: str) -> Iterator[str]:
     yield _silhouettes(of)
     if of.errors is not None:
         yield _intervals(of)
-    yield meanings(of)
-    yield facts(of)
+    yield definitions_section(of)
+    yield run_facts(of)
 
 
 def _silhouettes(of: Evaluation) -> str:
@@ -71,8 +80,8 @@ def _silhouettes(of: Evaluation) -> str:
             "is needed.</p>")
     if not len(of.run.motion):
         return head + "<p>The run has no frames.</p>"
-    said = "Above the overlap (intersection over union), below the cost: the area in which model and silhouette differ."
-    return head + figure(charts.fit_over_time(of), said)
+    note = "Above the overlap (intersection over union), below the cost: the area in which model and silhouette differ."
+    return head + figure(charts.fit_over_time(of), note)
 
 
 def _under(of: Evaluation) -> str:
@@ -81,34 +90,34 @@ def _under(of: Evaluation) -> str:
     return f'<p class="under">{plain(str(of.run.info.get("method", "a run")))}; {len(of.run.motion)} frames{against}</p>'
 
 
-def _errors(of: Evaluation, chosen: Sequence[Chosen]) -> Iterator[str]:
-    marks = {each.letter: each.time for each in chosen if not each.usual}
+def _errors(of: Evaluation, chosen: Sequence[ReportFrame]) -> Iterator[str]:
+    marks = {each.letter: each.time for each in chosen if not each.typical}
     yield "<h2>Error over time</h2>"
-    said = ("Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, and all of them. Letters "
+    note = ("Distance between each joint and its truth, frame by frame: the mean, the middle half of the joints, and all of them. Letters "
             "are the worst frames, shown below; the strip tells the run's own status.")
-    yield figure(charts.over_time(of, marks), said)
+    yield figure(charts.over_time(of, marks), note)
     yield figure(charts.by_joint_and_time(of), "The same by joint, darker where it is farther off; grey where the run has no pose.")
 
 
-def _frames(of: Evaluation, chosen: Sequence[Chosen], shots: Mapping[str, bytes], source: str) -> str:
+def _frames(of: Evaluation, chosen: Sequence[ReportFrame], shots: Mapping[str, bytes], source: str) -> str:
     white = ", with the truth's bones in white" if of.truth is not None else ""
     wide = " wide" if len(of.cameras) > 1 or source == "overlay.mp4" else ""
     tiles = "".join(_shot(of, each, shots[each.letter]) for each in chosen if each.letter in shots)
     worst = "largest error" if of.errors is not None else "least overlap"
-    usual = ", and two usual ones" if any(each.usual for each in chosen) else ""
+    usual = ", and two usual ones" if any(each.typical for each in chosen) else ""
     return (f'<h2>Worst frames</h2><p class="said">The frames of {worst}, some time apart{usual}. From {source}{white}.</p>'
             f'<div class="shots{wide}">{tiles}</div>')
 
 
-def _shot(of: Evaluation, each: Chosen, image: bytes) -> str:
+def _shot(of: Evaluation, each: ReportFrame, image: bytes) -> str:
     motion = of.run.motion
-    said = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
-    said += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
+    note = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
+    note += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
     worst = ", ".join(f"{plain(name.replace('_', ' '))} {off:.0f}" for name, off in each.worst)
     error = f"<b>{each.error:.0f} mm</b> in the mean; farthest off: {worst}. " if each.error == each.error else ""
     data = base64.b64encode(image).decode()
     return (f'<figure><img alt="frame {each.frame}" src="data:image/jpeg;base64,{data}"><figcaption><span class="badge'
-            f'{" usual" if each.usual else ""}">{each.letter}</span> {error}{", ".join(said)}{", a usual frame" if each.usual else ""}'
+            f'{" usual" if each.typical else ""}">{each.letter}</span> {error}{", ".join(note)}{", a usual frame" if each.typical else ""}'
             "</figcaption></figure>")
 
 
@@ -123,8 +132,8 @@ def _joints(of: Evaluation) -> Iterator[str]:
     right = figure(charts.shares(distances, of.errors.known), "How many joints are nearer than so much, as they stand and in posture "
                                                               "alone.")
     yield f'<div class="pair">{left}{right}</div>'
-    yield f'<div class="pair"><div><h3>Laid over each other</h3>{ways(of)}</div><div><h3>Along the world\'s axes, run less truth</h3>' \
-          f"{axes_table(of)}</div></div>"
+    yield (f'<div class="pair"><div><h3>Laid over each other</h3>{alignments_table(of)}</div>'
+           f"<div><h3>Along the world's axes, run less truth</h3>{axes_table(of)}</div></div>")
 
 
 def _motion(of: Evaluation) -> Iterator[str]:
@@ -144,12 +153,12 @@ def _motion(of: Evaluation) -> Iterator[str]:
 
 def _intervals(of: Evaluation) -> str:
     coverage = of.measured["coverage"]
-    text = f"<h2>Stated uncertainty</h2><p>{plain(coverage_words(coverage)).capitalize()}.</p>"
+    text = f"<h2>Stated uncertainty</h2><p>{plain(coverage_text(coverage)).capitalize()}.</p>"
     if coverage is None:
         return text
     cells = ((name.replace("_", " "), *(f"{100 * row[f'within_{level}']:.0f}" for level in LEVELS), f"{row['rms_z']:.2f}",
               f"{row['sd_mean_mm']:.1f}") for name, row in coverage["joints"].items())  # fmt: skip
     by_joint = table(["joint", *(f"{level} %" for level in LEVELS), "rms z", "mean sd, mm"], rows(cells))
-    said = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
-    return f'{text}<div class="pair">{figure(charts.honesty(coverage, list(LEVELS)), said)}<div>{by_joint}</div></div>'
+    note = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
+    return f'{text}<div class="pair">{figure(charts.coverage_chart(coverage, list(LEVELS)), note)}<div>{by_joint}</div></div>'
 

@@ -1,4 +1,4 @@
-"""Frames that show what a run did, worst first: from its overlay, or drawn over the recording; with the truth's bones where it is known."""
+"""Pictures of the worst frames of a run, from its overlay or drawn over the recording, with the truth's bones."""
 
 from __future__ import annotations
 
@@ -27,38 +27,38 @@ from shadowpuppet.pipeline.overlay_video import grid_of
 if TYPE_CHECKING:
     from shadowpuppet.video import Image
 
-WORST, TYPICAL, MOST_LOST = 6, 2, 2
-"""Frames that are shown, and how many of them may be without a pose."""
-BETWEEN = 0.5
-"""Seconds between the worst frames, less in short runs and more in long ones: neighbours show the same."""
-VIEWS = 5
-"""Cameras that are shown side by side, of several those that see the person largest."""
-WIDEST = 1280
-"""Pixels of a picture's width in the page."""
-SHARP = 440
-"""Pixels of height from which on thin lines are drawn well."""
+WORST, TYPICAL, MAX_LOST = 6, 2, 2
+"""Number of frames shown, and how many of the worst may be without a pose."""
+SPACING = 0.5
+"""Seconds between the worst frames; less in short runs, more in long ones."""
+MAX_VIEWS = 5
+"""Cameras shown side by side: those that see the person largest."""
+MAX_WIDTH = 1280
+"""Of a picture in the page, pixels."""
+MIN_HEIGHT = 440
+"""Height of a picture at which thin lines look good, pixels."""
 QUALITY = 82
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """A frame to show."""
+class ReportFrame:
+    """A frame shown in the report."""
 
     letter: str
     frame: int
-    """Of the run."""
+    """Index in the run."""
     time: float
     """Seconds."""
     error: float
-    """Mean over the joints, mm; not a number without a truth."""
+    """Mean over the joints, mm; NaN without a truth."""
     worst: tuple[tuple[str, float], ...]
-    """The joints that are farthest off, and by how many mm."""
-    usual: bool
-    """Whether it is shown for being usual, not bad."""
+    """The joints of greatest error, and their errors, mm."""
+    typical: bool
+    """Whether it is shown as a typical frame, not a bad one."""
 
 
-def chosen_frames(of: Evaluation) -> list[Chosen]:
-    """The worst frames, a while apart, and two usual ones; without a truth those that overlap the silhouettes worst."""
+def report_frames(of: Evaluation) -> list[ReportFrame]:
+    """The worst frames, some time apart, and typical ones; without a truth by the overlap with the silhouettes."""
     motion = of.run.motion
     if not len(motion):
         return []
@@ -66,18 +66,19 @@ def chosen_frames(of: Evaluation) -> list[Chosen]:
         badness, times = np.where(np.isfinite(motion.overlap), 1 - motion.overlap, np.nan), motion.times
         means = np.full(len(motion), np.nan)
     else:
-        means, times = _means(of.errors.distance, of.errors.known), of.table.times
+        means, times = _mean_errors(of.errors.distance, of.errors.known), of.table.times
         badness = means
     index, there = match(motion.times, times)
     blank = np.isin(motion.status[index], BLANK)
     badness = np.where(there, badness, np.nan)
     letters = iter("ABCDEFGHIJKLMNOP")
-    frames = [(n, False) for n in _worst(badness, times, blank)] + [(n, True) for n in _usual(badness, times, blank)]
-    return [Chosen(next(letters), int(index[n]), float(times[n]), float(1000 * means[n]), _off(of, n), usual) for n, usual in frames]
+    chosen = [(n, False) for n in _worst_frames(badness, times, blank)] + [(n, True) for n in _typical_frames(badness, times, blank)]
+    return [ReportFrame(next(letters), int(index[n]), float(times[n]), float(1000 * means[n]), _worst_joints(of, n), typical)
+            for n, typical in chosen]
 
 
-def pictures(of: Evaluation, chosen: Sequence[Chosen]) -> tuple[dict[str, bytes], str]:
-    """JPEG by letter, and where they are from; none, and why, where there is neither an overlay nor the recording."""
+def pictures(of: Evaluation, chosen: Sequence[ReportFrame]) -> tuple[dict[str, bytes], str]:
+    """JPEG by letter, and their source; none, and the reason, without overlay and recording."""
     wanted = {each.frame: each.letter for each in chosen}
     film = of.run.folder / "overlay.mp4"
     if not wanted:
@@ -90,7 +91,7 @@ def pictures(of: Evaluation, chosen: Sequence[Chosen]) -> tuple[dict[str, bytes]
 
 
 def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
-    """Frames of the run's overlay, the rows of a single camera side by side, the truth's bones over what shows them best."""
+    """Frames of the run's overlay with the truth's bones; the rows of a single camera side by side."""
     from shadowpuppet.video import open_frames
 
     cameras, last = of.cameras, max(wanted)
@@ -98,7 +99,7 @@ def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterat
         if n in wanted:
             image, places = np.array(in_colour(frame.image)), _truth_at(of, n)
             if len(cameras) <= 1:
-                rows = [_scaled(row, height=max(len(row), SHARP)) for row in np.split(image[: len(image) // 3 * 3], 3)]
+                rows = [_scaled(row, height=max(len(row), MIN_HEIGHT)) for row in np.split(image[: len(image) // 3 * 3], 3)]
                 if cameras and places is not None:
                     draw_bones(rows[2], cameras[0], places)
                 image = np.concatenate(rows, axis=1)
@@ -110,9 +111,9 @@ def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterat
 
 
 def _of_grid(image: Image, of: Evaluation, frame: int) -> Image:
-    """The person in the tiles of an overlay of several cameras, with the truth's bones."""
+    """The person cut out of the overlay of several cameras, with the truth's bones."""
     columns, rows, _ = grid_of([camera.size for camera in of.cameras])
-    image = _scaled(image, height=max(image.shape[0], 2 * SHARP * rows))  # so that lines are thin
+    image = _scaled(image, height=max(image.shape[0], 2 * MIN_HEIGHT * rows))  # so that lines are thin
     height, width = image.shape[0] // rows, image.shape[1] // columns
     tiles = [image[y * height : (y + 1) * height, x * width : (x + 1) * width] for y in range(rows) for x in range(columns)]
     truth = _truth_at(of, frame)
@@ -123,14 +124,14 @@ def _of_grid(image: Image, of: Evaluation, frame: int) -> Image:
 
 
 def _side_by_side(images: Sequence[Image], cameras: Sequence[Camera], tables: Sequence[JointTable]) -> Image:
-    """The person cut out of the pictures of several cameras, those that see them largest."""
+    """The person cut out of the pictures of the `MAX_VIEWS` cameras that see them largest."""
     boxes = [_box(image, camera, tables) for image, camera in zip(images, cameras)]
     shares = [(box[0].stop - box[0].start) / len(image) if box else 0.0 for image, box in zip(images, boxes)]
-    chosen = sorted(sorted(range(len(images)), key=lambda n: -shares[n])[:VIEWS])
+    chosen = sorted(sorted(range(len(images)), key=lambda n: -shares[n])[:MAX_VIEWS])
     cut = []
     for n in chosen:
-        image = _scaled(np.ascontiguousarray(images[n][boxes[n] or ...]), height=SHARP)
-        write_text(image, cameras[n].name, 0, WHITE, size=SHARP)
+        image = _scaled(np.ascontiguousarray(images[n][boxes[n] or ...]), height=MIN_HEIGHT)
+        write_text(image, cameras[n].name, 0, WHITE, size=MIN_HEIGHT)
         cut.append(image)
     return np.concatenate(cut, axis=1)
 
@@ -144,23 +145,23 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
     recording = opened(path, options)
     views = chosen_views(recording, options.camera)
     motion = of.run.motion
-    seen: dict[int, dict[Camera, Image]] = {frame: {} for frame in wanted}
+    by_frame: dict[int, dict[Camera, Image]] = {frame: {} for frame in wanted}
     for view in views:
         footage = footage_of(recording, view, options)
-        for frame, image in _at(footage.shots(False), motion.times, sorted(wanted)):
-            image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * SHARP))
+        for frame, image in _nearest_images(footage.shots(False), motion.times, sorted(wanted)):
+            image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * MIN_HEIGHT))
             for places, own in _tables(of, frame):
                 draw_bones(image, footage.camera, places, own)
-            seen[frame][footage.camera] = image
-    for frame, images in seen.items():
+            by_frame[frame][footage.camera] = image
+    for frame, images in by_frame.items():
         if len(views) == 1:
             yield from ((wanted[frame], image) for image in images.values())
         elif images:
             yield wanted[frame], _side_by_side([*images.values()], [*images], [table for table, _ in _tables(of, frame)])
 
 
-def _at(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int, Image]]:
-    """The shots that are nearest to the times of some frames (increasing)."""
+def _nearest_images(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int, Image]]:
+    """Images nearest to the times of frames, in increasing order."""
     held, waiting = None, list(frames)
     for shot in shots:
         while waiting and shot.time >= times[waiting[0]]:
@@ -174,8 +175,8 @@ def _at(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int,
 
 
 def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False) -> None:
-    """Draw a table of one frame's bones into a picture (H, W, 3) of a camera, at whatever size; the run's `own` in the sides' colours, the
-    truth's thin and white."""
+    """Draw the bones of one frame into a picture (H, W, 3) of a camera, at any size; `own`: the run's, in the sides' colours, else thin and
+    white."""
     import cv2
 
     pixels = dict(zip(places.names, _pixels(image, camera, places)))
@@ -191,13 +192,13 @@ def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = Fal
 
 
 def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:
-    """Where one frame's joints (J, 2) are in a camera's picture, at whatever size."""
+    """Pixels (J, 2) of one frame's joints in a camera's picture, at any size."""
     scale = min(image.shape[1] / camera.size[0], image.shape[0] / camera.size[1])
     return (camera.project(places.positions[0]) + 0.5) * scale - 0.5
 
 
 def _box(image: Image, camera: Camera, tables: Sequence[JointTable]) -> tuple[slice, slice] | None:
-    """Rows and columns around the person, three by four; None where nobody is known."""
+    """Rows and columns around the person, three by four; None if no joint is known."""
     pixels = np.concatenate([_pixels(image, camera, table) for table in tables])
     pixels = np.clip(pixels[np.isfinite(pixels).all(1)], 0, [image.shape[1], image.shape[0]])
     if len(pixels) < 3:
@@ -210,22 +211,22 @@ def _box(image: Image, camera: Camera, tables: Sequence[JointTable]) -> tuple[sl
     return slice(round(y - half_high), round(y + half_high)), slice(round(x - half_wide), round(x + half_wide))
 
 
-def _worst(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
-    """The worst frames, in the order of time."""
+def _worst_frames(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
+    """The worst frames, ordered by time."""
     length = float(times[-1] - times[0])
-    apart = max(min(BETWEEN, length / (2 * WORST)), length / (10 * WORST))
+    apart = max(min(SPACING, length / (2 * WORST)), length / (10 * WORST))
     found: list[int] = []
     for n in np.argsort(-np.nan_to_num(badness, nan=-np.inf), kind="stable"):
         if len(found) == WORST or not np.isfinite(badness[n]):
             break
         crowded = any(abs(times[n] - times[m]) < apart for m in found)
-        if not crowded and not (blank[n] and blank[found].sum() >= MOST_LOST):
+        if not crowded and not (blank[n] and blank[found].sum() >= MAX_LOST):
             found.append(int(n))
     return sorted(found)
 
 
-def _usual(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
-    """Frames whose error is nearest to the median, one of each half of the run."""
+def _typical_frames(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
+    """Frames whose error is nearest to the median, one in each half of the run."""
     known = np.flatnonzero(np.isfinite(badness) & ~blank)
     if len(known) < 4 * (WORST + TYPICAL):
         return []
@@ -233,14 +234,14 @@ def _usual(badness: Array, times: Array, blank: NDArray[np.bool_]) -> list[int]:
     return [int(part[np.abs(badness[part] - middle).argmin()]) for part in np.array_split(known, TYPICAL)]
 
 
-def _means(distance: Array, known: NDArray[np.bool_]) -> Array:
-    """The mean error (T,), metres, of the joints whose truth is known."""
+def _mean_errors(distance: Array, known: NDArray[np.bool_]) -> Array:
+    """Mean error (T,), metres, over the joints with a truth."""
     counts = known.sum(1)
     return np.where(counts > 0, np.where(known, distance, 0).sum(1) / np.maximum(counts, 1), np.nan)
 
 
-def _off(of: Evaluation, n: int) -> tuple[tuple[str, float], ...]:
-    """The three joints that are farthest off in a frame."""
+def _worst_joints(of: Evaluation, n: int) -> tuple[tuple[str, float], ...]:
+    """The three joints of greatest error in a frame."""
     if of.errors is None:
         return ()
     distance = np.where(of.errors.known[n], of.errors.distance[n], -1)
@@ -249,7 +250,7 @@ def _off(of: Evaluation, n: int) -> tuple[tuple[str, float], ...]:
 
 
 def _tables(of: Evaluation, frame: int) -> list[tuple[JointTable, bool]]:
-    """The run's joints in a frame, and the truth's where it is known; with whether they are the run's own."""
+    """Joints of the run and, if known, of the truth in a frame; each with whether it is the run's."""
     truth = _truth_at(of, frame)
     return [(_run_at(of, frame), True)] + ([(truth, False)] if truth is not None else [])
 
@@ -276,7 +277,7 @@ def _scaled(image: Image, *, height: int | None = None, width: int | None = None
 def _jpeg(image: Image) -> bytes:
     import cv2
 
-    small = _scaled(image, width=WIDEST) if image.shape[1] > WIDEST else image
+    small = _scaled(image, width=MAX_WIDTH) if image.shape[1] > MAX_WIDTH else image
     done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     assert done
     return data.tobytes()

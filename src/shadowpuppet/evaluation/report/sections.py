@@ -1,4 +1,4 @@
-"""What the page says in cards, notes and tables."""
+"""Sections of the page: cards, notes, tables."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.evaluation.report.html import definitions, plain, rows, table
-from shadowpuppet.evaluation.summary_text import WAYS, bones_words, clock_words, losses_words, said_root, world_words
+from shadowpuppet.evaluation.summary_text import WAYS, bones_text, clock_text, losses_text, root_text, world_text
 from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 
 
 def cards(of: Evaluation) -> str:
-    """The figures that are looked at first."""
-    made = "".join(f'<div class="card"><span class="name">{name}</span><b>{value} <small>{unit}</small></b><span>{said}</span></div>'
-                   for name, value, unit, said in _cards(of))
+    """Cards with the main figures."""
+    made = "".join(f'<div class="card"><span class="name">{name}</span><b>{value} <small>{unit}</small></b><span>{items}</span></div>'
+                   for name, value, unit, items in _cards(of))
     return f'<div class="cards">{made}</div>'
 
 
@@ -40,7 +40,7 @@ def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
 
 
 def notes(of: Evaluation, no_pictures: str) -> str:
-    """What must be known to read the figures."""
+    """Remarks needed to read the figures."""
     made = "".join(f'<li{"" if grave else " class=fine"}>{plain(text)}</li>' for grave, text in _notes(of, no_pictures))
     return f'<ul class="notes">{made}</ul>' if made else ""
 
@@ -54,7 +54,7 @@ def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
     else:
         world, clock, errors = measured["world"], measured["clock"], measured["errors"]
         if world.get("moved"):
-            yield False, world_words(world)[0].upper() + world_words(world)[1:] + "."
+            yield False, world_text(world)[0].upper() + world_text(world)[1:] + "."
         elif world.get("apart"):
             yield True, (f"The run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run "
                          "is moved and turned as a whole: are they in two worlds, or is the distance wrong? (--align)")
@@ -62,7 +62,7 @@ def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
             yield True, (f"{errors['lost']} of {errors['frames']} frames of the truth have no pose of the run; each joint counts "
                          f"{1000 * LOST_ERROR:.0f} mm there.")
         if clock["offset_s"]:
-            yield False, "Clock: " + clock_words(clock) + "."
+            yield False, "Clock: " + clock_text(clock) + "."
         if clock.get("rival_s") is not None:
             yield True, f"An offset of {clock['rival_s']:.3f} s fits nearly as well: the motion repeats itself."
     if no_pictures:
@@ -70,7 +70,7 @@ def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
 
 
 def joint_table(of: Evaluation) -> str:
-    """Errors of every joint, and of all."""
+    """Table of errors of every joint and of all."""
     errors = of.measured["errors"]
     keys = [key for key in ("mean_mm", "rmse_mm", "p50_mm", "p90_mm", "p95_mm", "max_mm", "plane_mm", "depth_mm") if key in errors]
     names = {"p50_mm": "median", "p90_mm": "90 %", "p95_mm": "95 %"}
@@ -79,30 +79,30 @@ def joint_table(of: Evaluation) -> str:
     return table(["mm", *(names.get(key, key.removesuffix("_mm")) for key in keys), f"over {1000 * FAR_ERROR:.0f}"], made)
 
 
-def ways(of: Evaluation) -> str:
-    """Mean errors after less and less is asked."""
+def alignments_table(of: Evaluation) -> str:
+    """Table of mean errors after each alignment."""
     aligned = of.measured["aligned_mm"]
-    said = ((words.format(root=said_root(aligned)), f"{aligned[way]:.1f}") for way, words in WAYS.items() if way in aligned)
-    return table(["", "mean, mm"], rows(said))
+    items = ((words.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, words in WAYS.items() if way in aligned)
+    return table(["", "mean, mm"], rows(items))
 
 
 def axes_table(of: Evaluation) -> str:
-    """Signed errors along the axes."""
+    """Table of errors along the axes."""
     axes = of.measured["axes_mm"]
     if not axes:
         return "<p>No joint is known in both.</p>"
-    said = ((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}") for axis in "xyz")
-    return table(["", "mean, mm", "sd", "rmse"], rows(said))
+    items = ((axis, f"{axes[axis]['mean']:+.1f}", f"{axes[axis]['sd']:.1f}", f"{axes[axis]['rmse']:.1f}") for axis in "xyz")
+    return table(["", "mean, mm", "sd", "rmse"], rows(items))
 
 
 def body_tables(of: Evaluation) -> str:
-    """Bones, bends and angles."""
+    """Tables of bones, hinges and angles."""
     measured = of.measured
     parts = []
     if measured["bone_errors"]:
         bones = rows((name.replace("_", " ").replace("-", " to "), f"{b['run_mm']:.1f}", f"{b['truth_mm']:.1f}", f"{b['longer_mm']:+.1f}",
                       f"{b['run_sd_mm']:.2f}", f"{b['truth_sd_mm']:.2f}") for name, b in measured["bone_errors"].items())
-        words = bones_words(measured["bone_errors"])
+        words = bones_text(measured["bone_errors"])
         parts.append(f"<h3>Bones, mm</h3><p class=said>{plain(words[0].upper() + words[1:])}.</p>"
                      + table(["", "run", "truth", "longer", "run's sd", "truth's sd"], bones))
     if measured["bends_deg"]:
@@ -115,18 +115,18 @@ def body_tables(of: Evaluation) -> str:
 
 
 def _angles(angles: Mapping[str, Mapping[str, float]]) -> str:
-    """A table of errors of angles."""
-    said = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
-    return table(["", "run less truth", "mean size", "rmse"], rows(said))
+    """Table of errors of angles."""
+    items = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
+    return table(["", "run less truth", "mean size", "rmse"], rows(items))
 
 
-def meanings(of: Evaluation) -> str:
-    """What each figure is, and how it comes about."""
-    said = [("Overlap", "Intersection over union of drawn body and silhouette, from 0 to 1, as recorded by the run."),
+def definitions_section(of: Evaluation) -> str:
+    """Definitions of the figures."""
+    items = [("Overlap", "Intersection over union of drawn body and silhouette, from 0 to 1, as recorded by the run."),
             ("Cost", "The area in which drawn body and silhouette differ (XOR), as recorded by the run.")]
     if of.errors is not None:
-        root = plain(said_root(of.measured["aligned_mm"]))
-        said = [
+        root = plain(root_text(of.measured["aligned_mm"]))
+        items = [
             ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
                             f"has no pose, each joint counts {1000 * LOST_ERROR:.0f} mm, so that leaving out bad frames never helps. "
                             "<span class=formula>rmse = √(mean of d²)</span>."),
@@ -139,24 +139,24 @@ def meanings(of: Evaluation) -> str:
             ("Bent", "The angle between the bones before and after an elbow or knee; 0 is straight."),
             ("Times", "Run and truth are compared at the times of the slower one; the other is interpolated between frames at most one and "
                       "a half steps apart, and never beyond its ends."),
-            *said,
+            *items,
         ]
-    return "<h2>What the figures mean</h2>" + definitions(said)
+    return "<h2>What the figures mean</h2>" + definitions(items)
 
 
-def facts(of: Evaluation) -> str:
-    """What the run was."""
+def run_facts(of: Evaluation) -> str:
+    """Facts about the run."""
     info, measured = of.run.info, of.measured
     settings = of.run.settings
-    said = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")),
+    items = [("Recording", info.get("recording")), ("Truth", measured["truth"]), ("Method", info.get("method")),
             ("Body", of.run.motion.body_name),
             ("Preset and seed", f"{settings.get('preset', 'default')}, {settings.get('seed', 'unknown')}" if settings else None),
             ("Frames", ", ".join(f"{count} {status}" for status, count in measured["status"].items())),
-            ("No pose", losses_words(measured["losses"])),
-            ("Clock", clock_words(measured["clock"]) if "clock" in measured else None),
-            ("World", world_words(measured["world"]) if measured.get("world") else None),
+            ("No pose", losses_text(measured["losses"])),
+            ("Clock", clock_text(measured["clock"]) if "clock" in measured else None),
+            ("World", world_text(measured["world"]) if measured.get("world") else None),
             ("Made with", ", ".join(f"{name} {version}" for name, version in info.get("versions", {}).items()))]
     joints = f"; joints compared: {', '.join(of.errors.names)}" if of.errors is not None else ""
-    return ("<h2>The run</h2>" + definitions((name, plain(text)) for name, text in said if text)
+    return ("<h2>The run</h2>" + definitions((name, plain(text)) for name, text in items if text)
             + f"<footer>Made by shadowpuppet evaluate. All of it is in this file{plain(joints.replace('_', ' '))}.</footer>")
 

@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 
 from shadowpuppet.errors import SettingsError, shown
 from shadowpuppet.io.calibration.calibration_files import read_toml
-from shadowpuppet.pipeline.options import PATHS, make_options, over, settings_in
+from shadowpuppet.pipeline.options import PATHS, make_options, settings_in
+from shadowpuppet.settings import merged
 
 MAX_RUNS = 100_000
 """Combinations, or seeds, beyond which a grid is taken for a mistake."""
@@ -77,7 +78,7 @@ def make_grid(settings: Mapping[str, Any] | None = None, *, cases: Mapping[str, 
     The grid's values replace a case's, and these the settings. `flags` replace the settings and may not be varied. Raises `SettingsError`.
     """
     make_options(dict(settings or {}), source)
-    common = over(settings or {}, flags or {})
+    common = merged(settings or {}, flags or {})
     seed = common.pop("seed", None)
     make_options(common, "flags")
     chosen_seeds = seeds if seeds is not None else seed
@@ -146,8 +147,8 @@ def _case(source: str, name: str, table: object, common: Mapping[str, Any], chos
     if not isinstance(table, Mapping) or "seed" in table:
         found = "a seed in it" if isinstance(table, Mapping) else shown(table)[:80]
         raise SettingsError(f"{place}: found {found}, expected a table of settings; seeds = ... belongs at the top of the file")
-    make_options(over(common, table), place)
-    values = over(over(common, table), _nested(dict(chosen)))
+    make_options(merged(common, table), place)
+    values = merged(merged(common, table), _nested(dict(chosen)))
     make_options(values, f"{source}: grid" if chosen else place)
     return Case(name, values, dict(_flat(table)) | dict(chosen), tuple(name for name, _ in chosen))
 
@@ -170,7 +171,7 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in flat.items():
         *outer, last = name.split(".")
         inner = value if not outer else _nested({".".join([*outer[1:], last]): value})
-        made = over(made, {(outer or [last])[0]: inner})
+        made = merged(made, {(outer or [last])[0]: inner})
     return made
 
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from shadowpuppet.body.models import BodyName
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, merged, plain_values, validate
 
 
 def pixel_scale(size: tuple[int, int]) -> float:
@@ -100,7 +100,7 @@ def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None =
     name, or an impossible value, with the possible ones."""
     if preset not in PRESETS:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(PRESETS)}")
-    return validate(MonocularSettings, _merge(_plain(MonocularSettings()), PRESETS[preset], overrides or {}), source)
+    return validate(MonocularSettings, merged(plain_values(MonocularSettings()), PRESETS[preset], overrides or {}), source)
 
 
 @checked

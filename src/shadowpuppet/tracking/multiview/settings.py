@@ -9,7 +9,7 @@ from pydantic import Field
 
 from shadowpuppet.body.models import WholeBodyName
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, merged, plain_values, validate
 
 
 @checked
@@ -156,4 +156,4 @@ def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any
     """A preset of `MULTIVIEW_PRESETS` with some values replaced, as `make_settings`."""
     if preset not in MULTIVIEW_PRESETS:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(MULTIVIEW_PRESETS)}")
-    return validate(MultiviewSettings, _merge(_plain(MultiviewSettings()), MULTIVIEW_PRESETS[preset], overrides or {}), source)
+    return validate(MultiviewSettings, merged(plain_values(MultiviewSettings()), MULTIVIEW_PRESETS[preset], overrides or {}), source)

@@ -1,4 +1,4 @@
-"""Figures made of what there is: a body's poses, a skeleton that moves, or joints alone."""
+"""Figures of a body's poses, of a moving skeleton, or of joints alone."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.viewer.scene.show import Figure
+from shadowpuppet.viewer.scene.scene import Figure
 
 DOT = 0.06
-"""Metres; length of what marks a joint on which no bone ends."""
-BRIDGES = {"neck": ("left_shoulder", "right_shoulder"), "pelvis": ("left_hip", "right_hip")}
-"""Joints that stand in the middle of two others, where they are missing themselves."""
+"""Length of the mark of a joint without bones, metres."""
+MIDPOINTS = {"neck": ("left_shoulder", "right_shoulder"), "pelvis": ("left_hip", "right_hip")}
+"""Joints that, if missing, are put between two others."""
 
 
-def of_animation(name: str, animation: Animation, mesh: Mesh | None = None, kind: str = "estimate", **more) -> Figure:
-    """A skeleton that moves, carrying a mesh; a stick along every bone where none is given. `more`: fields of `Figure`."""
+def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, kind: str = "estimate", **more) -> Figure:
+    """A moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `Figure`."""
     places, turns = animation.world()
     return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind, **more)
 
 
-def of_poses(name: str, body: Body, times: Array, poses: Array, root: Array, kind: str = "estimate") -> Figure:
+def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, kind: str = "estimate") -> Figure:
     """A body in poses (T, D); `root` (4, 4): the body's frame to the world."""
-    return of_animation(name, BodyTree(body).animation(times, poses, root), body_mesh(body), kind)
+    return animation_figure(name, BodyTree(body).animation(times, poses, root), body_mesh(body), kind)
 
 
-def of_table(name: str, table: JointTable, kind: str = "estimate", **more) -> Figure:
-    """Joints alone: a stick between every two of a person's that are bones, a dot for each other one. `more`: fields of `Figure`."""
-    table = _bridged(table)
+def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -> Figure:
+    """Joints alone: a stick for every bone between them, a dot for each other joint. `more`: fields of `Figure`."""
+    table = _with_midpoints(table)
     names = list(table.names)
     pairs = [(names.index(a), names.index(b)) for a, b in BONES if a in names and b in names]
     used = {n for pair in pairs for n in pair}
@@ -45,7 +45,7 @@ def of_table(name: str, table: JointTable, kind: str = "estimate", **more) -> Fi
 
 
 def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]], kind: str, **more) -> Figure:
-    """Sticks between points (T, 3), each of its median length, that lie where its two ends are."""
+    """Sticks between moving points (T, 3), each of its median length."""
     T, J = len(times), len(ends) + 1
     lengths = [_median(np.linalg.norm(b - a, axis=1)) for a, b, _ in ends]
     offsets = np.zeros((J, 3))
@@ -55,13 +55,13 @@ def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]]
     frame = Animation(("", *(side for _, _, side in ends)), parents, offsets, tips, times, eye, np.zeros((T, J, 3)))
     places, turns = np.full((T, J, 3), np.nan), np.full((T, J, 3, 3), np.nan)
     for n, (a, b, _) in enumerate(ends):
-        places[:, n + 1], turns[:, n + 1] = a, _toward(b - a)
+        places[:, n + 1], turns[:, n + 1] = a, _rotations_along(b - a)
         places[~np.isfinite(b).all(1), n + 1] = np.nan
     return Figure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, **more)
 
 
-def _toward(along: Array) -> Array:
-    """Rotations (T, 3, 3) whose z is the way that vectors (T, 3) point, with as little turning about it from frame to frame as x allows."""
+def _rotations_along(along: Array) -> Array:
+    """Rotations (T, 3, 3) whose z is along vectors (T, 3), and that turn little about it from frame to frame."""
     lengths = np.linalg.norm(along, axis=1, keepdims=True)
     good = np.isfinite(lengths[:, 0]) & (lengths[:, 0] > 1e-9)
     z = np.where(good[:, None], along / np.where(good[:, None], lengths, 1), [0.0, 0.0, 1.0])
@@ -80,10 +80,10 @@ def _median(values: Array) -> float:
     return float(np.median(known)) if len(known) else 0.0
 
 
-def _bridged(table: JointTable) -> JointTable:
-    """With a neck and a pelvis between shoulders and hips, where these are known and the others are no joints of the table."""
+def _with_midpoints(table: JointTable) -> JointTable:
+    """The table with a neck and a pelvis added between shoulders and hips, if missing."""
     names, places = list(table.names), [table.positions]
-    for name, (left, right) in BRIDGES.items():
+    for name, (left, right) in MIDPOINTS.items():
         if name not in names and left in names and right in names:
             places.append((table.positions[:, [names.index(left)]] + table.positions[:, [names.index(right)]]) / 2)
             names.append(name)

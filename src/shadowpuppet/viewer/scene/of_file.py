@@ -1,4 +1,4 @@
-"""Files of motion and of calibrations to be shown."""
+"""The scene of a file of motion or of a calibration."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETONS
 from shadowpuppet.io.motion.skeletons import read_animation
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.viewer.scene.figures import of_animation, of_table
-from shadowpuppet.viewer.scene.show import Eye, Show
+from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure
+from shadowpuppet.viewer.scene.scene import Scene, SceneCamera
 
 
-def show_motion(path: Path, rate: float | None = None) -> Show:
-    """A file of motion of any kind that `convert` reads; `rate`: frames/s of an .amc file. Raises `FormatError`."""
+def motion_scene(path: Path, rate: float | None = None) -> Scene:
+    """The scene of a file of motion that `convert` reads; `rate`: frames/s of an .amc file. Raises `FormatError`."""
     if path.suffix.lower() in SKELETONS:
         animation = read_animation(path, rate)
-        figures, count = (of_animation(path.name, animation),), len(animation.names)
+        figures, count = (animation_figure(path.name, animation),), len(animation.names)
         times = animation.times
     else:
         table = _joints(path, rate)
-        figures, count = (of_table(path.name, table),), len(table.names)
+        figures, count = (joint_figure(path.name, table),), len(table.names)
         times = table.times
     if not len(times):
         raise FormatError(f"{path}: found no frame in it, expected one at least")
     facts = {"file": str(path), "joints": str(count), "frames": str(len(times))}
-    return Show(title=path.name, times=times, figures=figures, facts=facts)
+    return Scene(title=path.name, times=times, figures=figures, facts=facts)
 
 
 def _joints(path: Path, rate: float | None) -> JointTable:
-    """The joints that are known by our names; where none is, all points of the file."""
+    """The joints with one of our names; if there are none, all points of the file."""
     try:
         return read_motion(path, rate)
     except FormatError:
         return read_motion(path, rate, own_names=True)
 
 
-def show_calibration(path: Path) -> Show:
-    """A calibration of any kind that is read. Raises `CalibrationError`."""
+def calibration_scene(path: Path) -> Scene:
+    """The scene of a calibration file. Raises `CalibrationError`."""
     look, found = look_at_calibration(path, None, None)
-    eyes = tuple(Eye(camera) for camera in found.cameras)
-    if not any(eye.camera.oriented for eye in eyes):
+    cameras = tuple(SceneCamera(camera) for camera in found.cameras)
+    oriented = tuple(each for each in cameras if each.camera.oriented)
+    if not oriented:
         raise ShadowPuppetError(f"{path}: found no camera of which it tells where it stands, expected one at least")
     labels = () if look.middle is None else (("what all look at", look.middle),)
-    facts = {"file": str(path), "kind": look.format, "cameras": ", ".join(eye.camera.name for eye in eyes), "unit": look.unit}
-    return Show(title=path.name, times=np.zeros(1), eyes=tuple(eye for eye in eyes if eye.camera.oriented), labels=labels, facts=facts,
-                notes=look.notes, lacks=look.doubts)
+    facts = {"file": str(path), "kind": look.format, "cameras": ", ".join(each.camera.name for each in cameras), "unit": look.unit}
+    return Scene(title=path.name, times=np.zeros(1), cameras=oriented, labels=labels, facts=facts, notes=look.notes, problems=look.doubts)

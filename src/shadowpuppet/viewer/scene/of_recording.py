@@ -1,4 +1,4 @@
-"""A recording to be shown: its cameras, what they saw, points on the visual hull, and the truth where it has one."""
+"""The scene of a recording: its cameras and films, points on the visual hull, and the truth."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from shadowpuppet.pipeline.footage import Footage, footage_of, opened
 from shadowpuppet.pipeline.footage_rig import chosen_views
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.frames import ASSUMED_RATE
-from shadowpuppet.viewer.scene.figures import of_table
-from shadowpuppet.viewer.scene.footage import FilmSeen, hull_of
-from shadowpuppet.viewer.scene.show import Eye, Figure, Show
+from shadowpuppet.viewer.scene.figures import joint_figure
+from shadowpuppet.viewer.scene.film_images import FilmImages, hull_function
+from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
 
 
-def show_recording(path: str | Path, options: Options) -> Show:
-    """A recording folder, or a film with a field of view. Raises a `ShadowPuppetError` where something cannot be used."""
+def recording_scene(path: str | Path, options: Options) -> Scene:
+    """The scene of a recording folder, or of a film with a field of view. Raises a `ShadowPuppetError`."""
     recording = opened(path, options)
-    eyes, footage, ready = eyes_of(recording, options)
-    figures, lacks = _truth(recording)
+    cameras, footage, ready = cameras_of(recording, options)
+    figures, problems = _truth(recording)
     made = "ready, from masks/" if ready else "made as `track` makes them"
-    facts = {"recording": str(recording.path), "cameras": ", ".join(eye.camera.name for eye in eyes), "silhouettes": made}
-    return Show(title=recording.name, times=times_of(footage), figures=figures, eyes=eyes, hull=hull_of(eyes, options), facts=facts,
-                lacks=lacks)
+    facts = {"recording": str(recording.path), "cameras": ", ".join(each.camera.name for each in cameras), "silhouettes": made}
+    return Scene(title=recording.name, times=frame_times(footage), figures=figures, cameras=cameras, hull=hull_function(cameras, options),
+                 facts=facts, problems=problems)
 
 
-def eyes_of(recording: Recording, options: Options, ready: bool | None = None) -> tuple[tuple[Eye, ...], list[Footage], bool]:
-    """The cameras with their films; and whether ready silhouettes are shown: if `ready` is left out, where every camera has some."""
+def cameras_of(recording: Recording, options: Options, ready: bool | None = None) -> tuple[tuple[SceneCamera, ...], list[Footage], bool]:
+    """The cameras with their films; and whether ready silhouettes are shown, by default if every camera has some."""
     views = chosen_views(recording, options.camera)
     ready = all(view.masks is not None for view in views) if ready is None else ready
     options = replace(options, masks=ready)
     footage = [footage_of(recording, view, options) for view in views]
-    return tuple(Eye(each.camera, FilmSeen(each, options)) for each in footage), footage, ready
+    return tuple(SceneCamera(each.camera, FilmImages(each, options)) for each in footage), footage, ready
 
 
-def times_of(footage: Sequence[Footage]) -> Array:
-    """Times of the frames of the film of the middle rate, as it tells its rate and length; seconds."""
+def frame_times(footage: Sequence[Footage]) -> Array:
+    """Times of the frames of the film with the median rate, seconds."""
     rates = [film.rate if np.isfinite(film.rate) else ASSUMED_RATE for film in (each.film() for each in footage)]
     n = int(np.argsort(rates)[(len(rates) - 1) // 2])
     count = footage[n].count
-    if count is None:  # films that do not tell it are gone through once
+    if count is None:  # the film is read once
         return np.array([shot.time for shot in footage[n].shots(ready=False)])
     return np.arange(max(count, 1)) / rates[n]
 
@@ -55,6 +55,6 @@ def _truth(recording: Recording) -> tuple[tuple[Figure, ...], tuple[str, ...]]:
     if recording.truth is None:
         return (), ()
     try:
-        return (of_table("truth", read_truth(recording.truth), "truth"),), ()
+        return (joint_figure("truth", read_truth(recording.truth), "truth"),), ()
     except ShadowPuppetError as error:
         return (), (f"the truth is not shown: {error}",)

@@ -1,4 +1,4 @@
-"""Whatever can be looked at, by its path: a run, a recording, a film, a calibration, a prior, a file of motion."""
+"""Scenes by path: of a run, a recording, a film, a calibration, a prior, a file of motion."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from shadowpuppet.io.calibration.calibration_files import find_calibration, is_c
 from shadowpuppet.io.motion.motion_files import ENDINGS
 from shadowpuppet.io.prior import FORMAT
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.scene.of_file import show_calibration, show_motion
-from shadowpuppet.viewer.scene.of_prior import show_prior
-from shadowpuppet.viewer.scene.of_recording import show_recording
-from shadowpuppet.viewer.scene.of_run import show_run
-from shadowpuppet.viewer.scene.show import Show
+from shadowpuppet.viewer.scene.of_file import calibration_scene, motion_scene
+from shadowpuppet.viewer.scene.of_prior import prior_scene
+from shadowpuppet.viewer.scene.of_recording import recording_scene
+from shadowpuppet.viewer.scene.of_run import run_scene
+from shadowpuppet.viewer.scene.scene import Scene
 
 
-def show_of(path: str | Path, options: Options | None = None, truth: Path | None = None, recording: Path | None = None) -> Show:
-    """What there is to be seen of a path. `options`: of recordings and films; `truth` and `recording`: in place of those that a run names.
+def open_scene(path: str | Path, options: Options | None = None, truth: Path | None = None, recording: Path | None = None) -> Scene:
+    """The scene of a path. `options`: of recordings and films; `truth` and `recording`: replace those that a run names.
 
-    Raises a `ShadowPuppetError` where it is nothing that can be shown, or cannot be read.
+    Raises a `ShadowPuppetError` if it cannot be shown or read.
     """
     path = Path(path)
     if not path.exists():
         raise FormatError(f"{path}: no such file or folder; a run, a recording, a film with --fov, a calibration, a prior (.npz) or a "
                           f"file of motion ({choices(ENDINGS)}) can be shown")
     if (path / "run.toml").exists():
-        return show_run(path, truth, recording)
+        return run_scene(path, truth, recording)
     for name, value in (("truth", truth), ("recording", recording)):
         if value is not None:
             raise ShadowPuppetError(f"{path}: {name}: found {value}, expected none: it belongs to a run, and this is none")
     if path.is_dir():
         return _of_folder(path, options or Options())
     if path.suffix.lower() == ".npz" and is_prior(path):
-        return show_prior(path)
+        return prior_scene(path)
     if path.suffix.lower() in ENDINGS:
-        return show_motion(path)
-    return show_calibration(path) if is_calibration(path) else show_recording(path, options or Options())
+        return motion_scene(path)
+    return calibration_scene(path) if is_calibration(path) else recording_scene(path, options or Options())
 
 
 def is_prior(path: Path) -> bool:
-    """Whether an archive of arrays says that it is a motion prior."""
+    """Whether an .npz file is a motion prior."""
     from shadowpuppet.io.files.npz import BROKEN
 
     try:
@@ -53,20 +53,20 @@ def is_prior(path: Path) -> bool:
         return False
 
 
-def between(show: Show, start: float | None, end: float | None) -> Show:
-    """The part of a show from `start` to `end`, seconds of its own time. Raises `ShadowPuppetError` where there is nothing."""
+def cut_scene(scene: Scene, start: float | None, end: float | None) -> Scene:
+    """The part of a scene from `start` to `end`, seconds. Raises `ShadowPuppetError` if it is empty."""
     low, high = (-np.inf if start is None else start), (np.inf if end is None else end)
-    kept = show.times[(show.times >= low - 1e-6) & (show.times <= high + 1e-6)]
+    kept = scene.times[(scene.times >= low - 1e-6) & (scene.times <= high + 1e-6)]
     if not len(kept):
-        raise ShadowPuppetError(f"{show.title}: start and end: found {start} and {end} s, expected a part of "
-                                f"{show.times[0]:.2f} to {show.times[-1]:.2f} s")
-    return replace(show, times=kept)
+        raise ShadowPuppetError(f"{scene.title}: start and end: found {start} and {end} s, expected a part of "
+                                f"{scene.times[0]:.2f} to {scene.times[-1]:.2f} s")
+    return replace(scene, times=kept)
 
 
-def _of_folder(path: Path, options: Options) -> Show:
+def _of_folder(path: Path, options: Options) -> Scene:
     made = any((path / name).exists() for name in ("video", "recording.toml"))
     if not made and is_calibration(path):
-        return show_calibration(path)
+        return calibration_scene(path)
     if not made and (found := find_calibration(path)) is not None:
-        return show_calibration(found)
-    return show_recording(path, options)
+        return calibration_scene(found)
+    return recording_scene(path, options)

@@ -20,43 +20,43 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate
 from shadowpuppet.tracking.resampling import normalise
-from shadowpuppet.viewer.scene.show import Cloud, Eye, Spread
+from shadowpuppet.viewer.scene.scene import Ellipsoids, ParticleCloud, SceneCamera
 
 SEED = 0
-"""The same frame has the same particles whenever it is looked at."""
-FEWEST = 1e-4
-"""Metres; no axis of an ellipsoid is drawn shorter."""
+"""Makes the particles of a frame the same every time."""
+SHORTEST_AXIS = 1e-4
+"""Shortest axis of an ellipsoid, metres."""
 
 
-class Rerun:
-    """`rerun(time)`: the particles of the frame nearest to a time (s); None where it, or the one before, has no pose or no silhouette.
+class ParticleRerun:
+    """`rerun(time)`: particles of the frame nearest to a time (s); None if it has no silhouette, or it or the one before has no pose.
 
-    Not the run's own, which are gone, but drawn by the same filter with the same settings from the run's pose a frame before; of several
-    cameras by plain dynamics, without the motion prior that the run may have had.
+    The run does not keep its particles: the same filter runs again, with the same settings, from the run's pose a frame before; with
+    several cameras by plain dynamics, without a motion prior.
     """
 
-    def __init__(self, body: Body, motion: Motion, options: Options, eyes: Sequence[Eye]) -> None:
-        """`motion`: the run's, of this body. Raises `ShadowPuppetError` where no frame is known."""
+    def __init__(self, body: Body, motion: Motion, options: Options, cameras: Sequence[SceneCamera]) -> None:
+        """`motion`: the run's, of this body. Raises `ShadowPuppetError` if no frame is known."""
         self.body, self.motion, self.options = body, motion, options
-        self.eyes = [eye for eye in eyes if eye.seen is not None]
+        self.cameras = [each for each in cameras if each.images is not None]
         self.names = [name for name in motion.joint_names if name in body.landmark_names]
         self.bones = [(self.names.index(a), self.names.index(b)) for a, b in BONES if a in self.names and b in self.names]
         self.root = self._root()
 
-    def __call__(self, time: float) -> Cloud | None:
+    def __call__(self, time: float) -> ParticleCloud | None:
         """See the class."""
         n = int(np.abs(self.motion.times - time).argmin())
         before = self.motion.poses[max(n - 1, 0)]
         if not (np.isfinite(before).all() and np.isfinite(self.motion.poses[n]).all()):
             return None
         rng = np.random.default_rng(SEED + n)
-        found = self._one(rng, float(self.motion.times[n]), before) if len(self.eyes) == 1 else self._several(
+        found = self._one(rng, float(self.motion.times[n]), before) if len(self.cameras) == 1 else self._several(
             rng, float(self.motion.times[n]), before)  # fmt: skip
         return None if found is None else self._cloud(*found)
 
     def _one(self, rng: np.random.Generator, time: float, before: Array) -> tuple[Array, Array] | None:
-        """Poses (N, D) and weights (N,) of all stages together."""
-        mask = self.eyes[0].seen.mask(time) if self.eyes[0].seen else None
+        """Poses (N, D) and weights (N,) of all stages, one camera."""
+        mask = self.cameras[0].images.mask(time) if self.cameras[0].images else None
         if mask is None or not mask.any():
             return None
         tracker = self._tracker
@@ -72,7 +72,7 @@ class Rerun:
         return np.concatenate(poses), np.concatenate([weight / weight.max() for weight in weights])
 
     def _several(self, rng: np.random.Generator, time: float, before: Array) -> tuple[Array, Array] | None:
-        tracker, masks = self._rig_tracker, [eye.seen.mask(time) if eye.seen else None for eye in self.eyes]
+        tracker, masks = self._rig_tracker, [each.images.mask(time) if each.images else None for each in self.cameras]
         evidence = Evidence(tracker.stage, self._hull.points(masks), masks)
         if not tracker.is_present(evidence):
             return None
@@ -82,7 +82,7 @@ class Rerun:
         weights = normalise(found.log_weights)
         return found.poses, weights / weights.max()
 
-    def _cloud(self, poses: Array, weights: Array) -> Cloud:
+    def _cloud(self, poses: Array, weights: Array) -> ParticleCloud:
         places = self.body.points(poses, self.root, self.names)
         lines = np.stack([places[:, [a for a, _ in self.bones]], places[:, [b for _, b in self.bones]]], 2)
         share = weights / weights.sum()
@@ -91,23 +91,23 @@ class Rerun:
         variances, turns = np.linalg.eigh(np.einsum("n,nkx,nky->kxy", share, off, off))
         mirrored = np.linalg.det(turns) < 0
         turns[mirrored, :, 0] *= -1
-        return Cloud(lines, weights, Spread(middle, np.maximum(np.sqrt(np.maximum(variances, 0)), FEWEST), turns))
+        return ParticleCloud(lines, weights, Ellipsoids(middle, np.maximum(np.sqrt(np.maximum(variances, 0)), SHORTEST_AXIS), turns))
 
     @cached_property
     def _tracker(self) -> MonocularTracker:
-        camera = self.eyes[0].camera
+        camera = self.cameras[0].camera
         return MonocularTracker(Picture(self.body, camera, camera.T_camera_world @ self.root), self.options.tracker)
 
     @cached_property
     def _rig_tracker(self) -> MultiviewTracker:
-        return MultiviewTracker(self.body, tuple(eye.camera for eye in self.eyes), self.options.multiview)
+        return MultiviewTracker(self.body, tuple(each.camera for each in self.cameras), self.options.multiview)
 
     @cached_property
     def _hull(self) -> VisualHull:
-        return VisualHull([eye.camera for eye in self.eyes], self.options.multiview.hull)
+        return VisualHull([each.camera for each in self.cameras], self.options.multiview.hull)
 
     def _root(self) -> Array:
-        """Where the body's frame stands in the world (4, 4)."""
+        """From the body's frame to the world (4, 4)."""
         known = self.motion.known
         if not known.any():
             raise ShadowPuppetError("found no frame with a pose, expected one at least")

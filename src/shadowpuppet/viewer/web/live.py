@@ -16,10 +16,10 @@ from shadowpuppet.live.display.drawing import drawn
 from shadowpuppet.live.display.view import Display, View
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.mesh import body_mesh
-from shadowpuppet.viewer.scene.show import Eye, Figure, Show
-from shadowpuppet.viewer.web.pictures import Plain
+from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
+from shadowpuppet.viewer.web.frustum_images import Undistorter
+from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
 from shadowpuppet.viewer.web.server import address_of, close_server, open_server
-from shadowpuppet.viewer.web.stage import Stage, Wish
 
 MOST_A_SECOND = 10.0
 """Views that are drawn a second; more cost the tracker time."""
@@ -48,7 +48,7 @@ class ViewerDisplay(Display):
         self._phase = ""
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._follow, name="viewer", daemon=True)
-        self._stage: _Scene | None = None
+        self._stage: _LiveScene | None = None
 
     def __enter__(self) -> Self:
         """Begin to draw."""
@@ -100,11 +100,11 @@ class ViewerDisplay(Display):
         if view.picture is None or view.image is None:
             return
         if self._stage is None or self._stage.picture is not view.picture:
-            self._stage = _Scene(self.server, view.picture)
+            self._stage = _LiveScene(self.server, view.picture)
         self._stage.to(view)
 
 
-class _Scene:
+class _LiveScene:
     """What there is to be drawn once a person is known; made anew when they are measured anew."""
 
     def __init__(self, server: Any, picture: Picture) -> None:
@@ -114,16 +114,16 @@ class _Scene:
         rest = picture.body.skeleton.clamp(np.zeros((1, len(picture.body.skeleton.dofs))))
         self.figure = posed(picture.body, self.tree, self.mesh, rest[0], self.root)
         server.scene.reset()
-        show = Show(title="live", times=np.zeros(1), figures=(self.figure,), eyes=(Eye(picture.camera),))
-        self.stage = Stage(server, show, Wish(), width=WIDE)
+        show = Scene(title="live", times=np.zeros(1), figures=(self.figure,), cameras=(SceneCamera(picture.camera),))
+        self.stage = SceneView(server, show, ViewOptions(), width=WIDE)
         for client in server.get_clients().values():  # who looks already
             client.camera.position, client.camera.look_at = show.viewpoint, show.middle
-        self.plain = Plain(picture.camera, WIDE)
+        self.plain = Undistorter(picture.camera, WIDE)
 
     def to(self, view: View) -> None:
         """Draw a view."""
         figure = None if view.pose is None else posed(self.picture.body, self.tree, self.mesh, view.pose, self.root)
-        puppet, eye = self.stage.figures[0], self.stage.eyes[0]
+        puppet, eye = self.stage.figures[0], self.stage.frustums[0]
         image = drawn(View(phase=view.phase, image=view.image, mask=view.mask))
         with self.stage.server.atomic():
             if figure is not None:

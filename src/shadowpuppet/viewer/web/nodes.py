@@ -1,4 +1,4 @@
-"""What a show is drawn of: figures as skinned meshes, cameras as frustums."""
+"""Nodes of a scene in viser: figures as skinned meshes, cameras as frustums."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.viewer.scene.show import Eye, Figure
-from shadowpuppet.viewer.web.pictures import Look, Plain, shown
+from shadowpuppet.viewer.scene.scene import Figure, SceneCamera
+from shadowpuppet.viewer.web.frustum_images import PictureMode, Undistorter, frustum_image
 
 if TYPE_CHECKING:
     import viser
 
 NOWHERE = np.array([0.0, 0.0, -1e4])
-"""Where bones are put that are not known: out of sight."""
-PLAIN = {"truth": (64, 196, 122), "other": None, "mean": None, "estimate": None}
-"""Colours by a figure's kind; those without have the mesh's, left warm and right blue."""
+"""Position of unknown bones: out of sight."""
+COLOURS = {"truth": (64, 196, 122), "other": None, "mean": None, "estimate": None}
+"""Colours by kind of figure; None: those of the mesh, left warm and right blue."""
 BLENDED = {"other": ((150, 98, 196), 0.55), "mean": ((150, 156, 164), 0.35)}
-"""Colours that a kind's own are mixed with, and how much."""
+"""Colours mixed into those of a kind, and their share."""
 BY_CAMERA = np.array([(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (213, 94, 0), (240, 228, 66)], np.uint8)
-"""Colours of cameras (Okabe and Ito 2008), and of the surface points on their contours."""
-GLASS = 0.5
-"""How opaque figures are that are seen through."""
+"""Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
+TRANSPARENT_OPACITY = 0.5
+"""Opacity of transparent figures."""
 
 
-class Puppet:
-    """A figure's nodes: a skinned mesh a colour, so that left and right are told apart."""
+class FigureNodes:
+    """Nodes of a figure: a skinned mesh for each colour."""
 
-    def __init__(self, server: viser.ViserServer, figure: Figure, name: str, glass: bool) -> None:
-        """`glass`: from the start, for a mesh that is changed later is made anew by the page, which in a file shows at every loop."""
+    def __init__(self, server: viser.ViserServer, figure: Figure, name: str, transparent: bool) -> None:
+        """`transparent` from the start: the page rebuilds a mesh that changes later, which would show in a file at every loop."""
         self.figure = figure
         self.frame = server.scene.add_frame(name, show_axes=False, position=figure.shift)
-        mesh, opacity = figure.mesh, GLASS if glass and figure.kind != "truth" else None
+        mesh, opacity = figure.mesh, TRANSPARENT_OPACITY if transparent and figure.kind != "truth" else None
         colours, which = np.unique(mesh.colours, axis=0, return_inverse=True)
         self.parts = []
         for k in range(len(colours)):
@@ -56,9 +56,9 @@ class Puppet:
                 side="double" if mesh.two_sided else "front", cast_shadow=False, receive_shadow=False)  # fmt: skip
             self.parts.append((handle, joints))
 
-    def to(self, time: float, wished: bool) -> None:
-        """Set it to a time, seconds; it is not seen where it is not wished for, or not known."""
-        n = self.figure.at(time) if wished else None
+    def to(self, time: float, visible: bool) -> None:
+        """Show the figure at a time, seconds; hide it if not `visible` or unknown then."""
+        n = self.figure.at(time) if visible else None
         self.frame.visible = n is not None
         if n is None:
             return
@@ -76,42 +76,43 @@ class Puppet:
 
 
 class Frustum:
-    """A camera's node, with what it saw in it."""
+    """Node of a camera, with its image."""
 
-    def __init__(self, server: viser.ViserServer, n: int, eye: Eye, plain: Plain, scale: float) -> None:
-        """The camera's number tells its colour; its picture is put `scale` metres before it."""
-        self.eye, self.plain = eye, plain
+    def __init__(self, server: viser.ViserServer, n: int, scene_camera: SceneCamera, undistort: Undistorter, scale: float) -> None:
+        """`n`: number of the camera, which chooses its colour; `scale`: distance of the image, metres."""
+        self.scene_camera, self.undistort, camera = scene_camera, undistort, scene_camera.camera
         from scipy.spatial.transform import Rotation
 
-        T = inverse(eye.camera.T_camera_world)
+        T = inverse(camera.T_camera_world)
         turn = np.roll(Rotation.from_matrix(T[:3, :3]).as_quat(), 1)
         self.wxyz, self.centre = turn, T[:3, 3]
-        name = f"/cameras/{n} {clean(eye.camera.name)}"
+        name = f"/cameras/{n} {node_name(camera.name)}"
         colour = tuple(BY_CAMERA[n % len(BY_CAMERA)].tolist())
-        self.volume = float(np.cbrt(np.tan(plain.fov / 2) ** 2 * plain.aspect / 3))  # viser's scale is one of volumes
+        self.volume = float(np.cbrt(np.tan(undistort.fov / 2) ** 2 * undistort.aspect / 3))  # viser's scale is that of a volume
         self.handle = server.scene.add_camera_frustum(
-            name, plain.fov, plain.aspect, scale=scale * self.volume, thickness=1.6, thickness_units="screen", color=colour, wxyz=turn,
-            position=three(T[:3, 3]), cast_shadow=False, receive_shadow=False)  # fmt: skip
-        server.scene.add_label(f"{name}/name", eye.camera.name, font_screen_scale=0.8, anchor="bottom-center")
+            name, undistort.fov, undistort.aspect, scale=scale * self.volume, thickness=1.6, thickness_units="screen", color=colour,
+            wxyz=turn, position=triple(T[:3, 3]), cast_shadow=False, receive_shadow=False)  # fmt: skip
+        server.scene.add_label(f"{name}/name", camera.name, font_screen_scale=0.8, anchor="bottom-center")
 
-    def reach(self, away: float) -> None:
-        """Put the picture so many metres before the camera."""
-        self.handle.scale = away * self.volume
+    def set_distance(self, distance: float) -> None:
+        """Put the image at a distance from the camera, metres."""
+        self.handle.scale = distance * self.volume
 
-    def seen(self, time: float, look: Look) -> NDArray[np.uint8] | None:
-        """What it is to show at a time, seconds: this takes its time."""
-        return None if self.eye.seen is None else shown(self.eye.seen, self.plain, time, look)
+    def image(self, time: float, mode: PictureMode) -> NDArray[np.uint8] | None:
+        """Make the image for a time, seconds; slow."""
+        images = self.scene_camera.images
+        return None if images is None else frustum_image(images, self.undistort, time, mode)
 
-    def put(self, image: NDArray[np.uint8] | None, wished: bool) -> None:
-        """Show a picture, (H, W, 3) red green blue or (H, W, 4); or none."""
-        self.handle.visible = wished
-        if wished and (image is not None or self.handle.image is not None):
+    def put(self, image: NDArray[np.uint8] | None, visible: bool) -> None:
+        """Show an image, RGB or RGBA; or none."""
+        self.handle.visible = visible
+        if visible and (image is not None or self.handle.image is not None):
             self.handle.image = image
 
 
 @lru_cache(maxsize=1)
-def ball(count: int = 120) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """A unit ball as triangles: points (V, 3) spread by the golden angle, and corners (F, 3), counterclockwise from outside."""
+def unit_sphere(count: int = 120) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """A unit sphere: points (V, 3) spread by the golden angle, and triangles (F, 3), counterclockwise from outside."""
     from scipy.spatial import ConvexHull
 
     n = np.arange(count) + 0.5
@@ -125,22 +126,22 @@ def ball(count: int = 120) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
 
 
 def colour_of(kind: str, linear: Array) -> tuple[int, int, int]:
-    """A mesh's colour, linear RGB, as a figure of a kind has it, 0..255."""
-    plain = PLAIN.get(kind)
-    if plain is not None:
-        return plain
+    """Colour 0..255 for a mesh colour (linear RGB) of a kind of figure."""
+    fixed = COLOURS.get(kind)
+    if fixed is not None:
+        return fixed
     own = 255 * np.clip(linear, 0, 1) ** (1 / 2.2)
     mixed, share = BLENDED.get(kind, ((0, 0, 0), 0.0))
     red, green, blue = ((1 - share) * own + share * np.array(mixed)).round().astype(int).tolist()
     return red, green, blue
 
 
-def clean(name: str) -> str:
-    """A name as one step of a path in the scene's tree."""
+def node_name(name: str) -> str:
+    """A name as one part of a path in viser's scene tree."""
     return "".join(sign if sign.isalnum() or sign in " -_.," else "_" for sign in name)[:60]
 
 
-def three(values: Sequence[float] | Array) -> tuple[float, float, float]:
+def triple(values: Sequence[float] | Array) -> tuple[float, float, float]:
     """Three numbers as viser takes them."""
     x, y, z = (float(value) for value in values)
     return x, y, z

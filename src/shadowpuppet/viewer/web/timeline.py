@@ -1,4 +1,4 @@
-"""A timeline: which frame is shown now, by a clock, a speed, and what was asked for."""
+"""A timeline: the current frame, by a clock, a speed, and the user's commands."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-"""Seconds of the motion a second."""
+"""Playback speeds."""
 REST = 1.0
-"""Seconds that the last frame is seen before a loop begins anew, at most."""
+"""Longest pause at the last frame before a loop starts again, seconds."""
 
 
 class Timeline:
-    """Frames at times (T,), seconds, of which one is the current. May be used from several threads."""
+    """Frames at times (T,), seconds, one of them current. Thread-safe."""
 
     def __init__(self, times: Array, clock: Callable[[], float], loop: bool = True) -> None:
-        """`clock`: seconds that never go back."""
+        """`clock`: monotonic seconds."""
         self.times, self._clock, self.loop = np.asarray(times, float), clock, loop
         self._lock = threading.RLock()
         self._frame, self._speed = 0, 1.0
@@ -27,22 +27,22 @@ class Timeline:
 
     @property
     def frame(self) -> int:
-        """The current one."""
+        """Index of the current frame."""
         return self._frame
 
     @property
     def time(self) -> float:
-        """The current frame's, seconds."""
+        """Time of the current frame, seconds."""
         return float(self.times[self._frame])
 
     @property
     def playing(self) -> bool:
-        """Whether it goes on by itself."""
+        """Whether it plays."""
         return self._began is not None
 
     @property
     def speed(self) -> float:
-        """Seconds of the motion a second."""
+        """Playback speed."""
         return self._speed
 
     @speed.setter
@@ -53,7 +53,7 @@ class Timeline:
                 self.play()
 
     def play(self) -> None:
-        """Go on from the current frame; from the first, where it is the last."""
+        """Play from the current frame; from the first after the last."""
         with self._lock:
             if len(self.times) < 2:
                 return
@@ -62,26 +62,26 @@ class Timeline:
             self._began = self._clock(), self.time
 
     def pause(self) -> None:
-        """Stay at the current frame."""
+        """Stop at the current frame."""
         with self._lock:
             self._began = None
 
     def seek(self, frame: int) -> None:
-        """Go to a frame, and go on from there where it plays."""
+        """Go to a frame; playing goes on from there."""
         with self._lock:
             self._frame = int(np.clip(frame, 0, len(self.times) - 1))
             if self.playing:
                 self._began = self._clock(), self.time
 
     def step(self, frames: int) -> None:
-        """Go some frames on or back, and stay there."""
+        """Go some frames forward or back, and stop."""
         with self._lock:
             self.pause()
             wanted, last = self._frame + frames, len(self.times) - 1
             self._frame = wanted % (last + 1) if self.loop else int(np.clip(wanted, 0, last))
 
     def tick(self) -> int:
-        """The frame for now: the last one whose time has come."""
+        """Advance to the current time; returns the frame."""
         with self._lock:
             if self._began is None:
                 return self._frame

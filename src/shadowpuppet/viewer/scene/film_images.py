@@ -1,4 +1,4 @@
-"""What a camera of a recording saw, frame by frame as it is asked for: pictures and silhouettes, of which one of each is held."""
+"""Pictures and silhouettes of a camera of a recording, read on demand; and the visual hull made of them."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image
 from shadowpuppet.video.seeking import Seeker
-from shadowpuppet.viewer.scene.show import Eye, Surface
+from shadowpuppet.viewer.scene.scene import HullPoints, SceneCamera
 
-SAMPLED = 40
-"""Frames that are looked at before silhouettes are made, where the empty scene is known by a film of its own."""
+SAMPLE = 40
+"""Frames sampled before segmentation if the empty scene has a film of its own."""
 
 
-class FilmSeen:
-    """A film's pictures and silhouettes at any time of the recording (s), of the size that is worked on.
+class FilmImages:
+    """Pictures and silhouettes of a film at any time of the recording (s), at the working size; keeps the last of each.
 
-    Ready silhouettes are taken where the recording has them and `options.masks` asks for them; others are made as `track` makes them: the
-    background is learnt when the first is asked for.
+    Uses the recording's silhouettes if it has them and `options.masks` is set; else segments the film as `track` does, and learns the
+    background at the first request.
     """
 
     def __init__(self, footage: Footage, options: Options) -> None:
-        """The film is opened at once. Raises `VideoError` where it cannot be."""
+        """Opens the film. Raises `VideoError`."""
         self.footage, self.options = footage, options
         view, rate = footage.view, footage.recording.rate
         assert not isinstance(view.video, (int, str))
@@ -41,21 +41,21 @@ class FilmSeen:
         self._masked: tuple[float, Mask | None] = (np.nan, None)
 
     def picture(self, time: float) -> Image | None:
-        """The picture (H, W, 3), blue green red."""
+        """Picture (H, W, 3), BGR."""
         with self._lock:
             if self._pictured[0] != time:
-                self._pictured = time, self._film.at(time + self.footage.view.start) if self._counts(time) else None
+                self._pictured = time, self._film.at(time + self.footage.view.start) if self._is_within(time) else None
             return self._pictured[1]
 
     def mask(self, time: float) -> Mask | None:
-        """The silhouette (H, W); None where there is no picture."""
+        """Silhouette (H, W); None if there is no picture."""
         with self._lock:
             if self._masked[0] != time:
                 self._masked = time, None if self.trouble else self._tried(time)
             return self._masked[1]
 
     def _tried(self, time: float) -> Mask | None:
-        """A silhouette; where none can be made that is said, once, and the film is shown without."""
+        """A silhouette; if that fails, warns once and returns None from then on."""
         try:
             return self._mask(time)
         except (SilhouetteError, VideoError) as error:
@@ -65,31 +65,31 @@ class FilmSeen:
 
     def _mask(self, time: float) -> Mask | None:
         if self._ready is not None:
-            image = self._ready.at(time + self.footage.view.start) if self._counts(time) else None
+            image = self._ready.at(time + self.footage.view.start) if self._is_within(time) else None
             return None if image is None else ready_mask(image)
         image = self.picture(time)
         return None if image is None else self._silhouettes(Shot(time, image, None))
 
-    def _counts(self, time: float) -> bool:
-        """Whether a time is one of the recording's."""
+    def _is_within(self, time: float) -> bool:
+        """Whether a time is within the recording."""
         end = self.footage.recording.duration
         return time >= 0 and (end is None or time < end)
 
     @cached_property
     def _silhouettes(self) -> Silhouettes:
-        longest = LOOKED_AT if self.footage.view.background is None else SAMPLED
+        longest = LOOKED_AT if self.footage.view.background is None else SAMPLE
         return silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
 
 
-def hull_of(eyes: Sequence[Eye], settings: Options):
-    """A function from a time (s) to points on the visual hull of what cameras see; None where fewer than two can make one."""
-    able = [eye for eye in eyes if eye.seen is not None and eye.camera.oriented]
-    if len(able) < 2:
+def hull_function(cameras: Sequence[SceneCamera], settings: Options):
+    """A function from a time (s) to points on the visual hull of the silhouettes; None with fewer than two cameras."""
+    useful = [(each.camera, each.images) for each in cameras if each.images is not None and each.camera.oriented]
+    if len(useful) < 2:
         return None
-    hull = VisualHull([eye.camera for eye in able], settings.multiview.hull)
+    hull = VisualHull([camera for camera, _ in useful], settings.multiview.hull)
 
-    def points(time: float) -> Surface:
-        found = hull.points([eye.seen.mask(time) if eye.seen else None for eye in able])
-        return Surface(found.points, found.cameras)
+    def points(time: float) -> HullPoints:
+        found = hull.points([images.mask(time) for _, images in useful])
+        return HullPoints(found.points, found.cameras)
 
     return points

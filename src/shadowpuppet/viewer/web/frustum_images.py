@@ -1,4 +1,4 @@
-"""Pictures of a camera as they are shown in its frustum."""
+"""Images of a camera as its frustum shows them."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.video import Image
-from shadowpuppet.viewer.scene.show import Seen
+from shadowpuppet.viewer.scene.scene import CameraImages
 
 WIDEST = 1.9
-"""Tangent of half the angle across which pictures are shown: fisheye pictures are cut there."""
+"""Tangent of half the greatest field of view; fisheye pictures are cut there."""
 PERSON, OUTLINE = (46, 92, 138), (255, 200, 60)
-"""Colours of a silhouette, and of its outline over a picture; red green blue."""
+"""Colours of a silhouette, and of its outline over a picture, RGB."""
 VEIL = 40
-"""How opaque a silhouette's ground is, of 255."""
+"""Opacity of the background of a silhouette, of 255."""
 
 
-class Look(Enum):
-    """What is shown of what a camera saw."""
+class PictureMode(Enum):
+    """What frustums show."""
 
     PICTURE = "pictures"
     """The picture, with the silhouette's outline."""
     SILHOUETTE = "silhouettes"
-    """The silhouette alone: nobody's face, nothing of the room."""
+    """The silhouette alone: no face, nothing of the room."""
     NOTHING = "nothing"
 
 
-def shown(seen: Seen, plain: Plain, time: float, look: Look) -> NDArray[np.uint8] | None:
-    """What a frustum shows at a time (s): (H, W, 3) red green blue, or (H, W, 4) with what is seen through; None where nothing is."""
+def frustum_image(images: CameraImages, undistort: Undistorter, time: float, mode: PictureMode) -> NDArray[np.uint8] | None:
+    """Image of a frustum at a time (s): RGB (H, W, 3), or RGBA (H, W, 4); None if there is none."""
     import cv2
 
-    if look is Look.NOTHING:
+    if mode is PictureMode.NOTHING:
         return None
-    mask = seen.mask(time)
-    outline = None if mask is None else plain(mask.astype(np.uint8) * 255)
-    if look is Look.SILHOUETTE:
+    mask = images.mask(time)
+    outline = None if mask is None else undistort(mask.astype(np.uint8) * 255)
+    if mode is PictureMode.SILHOUETTE:
         if outline is None:
             return None
         out = np.empty((*outline.shape, 4), np.uint8)
         out[..., :3], out[..., 3] = PERSON, np.maximum(outline, VEIL)
         return out
-    image = seen.picture(time)
+    image = images.picture(time)
     if image is None:
         return None
-    out = np.ascontiguousarray(plain(image)[..., ::-1])
+    out = np.ascontiguousarray(undistort(image)[..., ::-1])
     if outline is None:
         return out
     lines = cv2.findContours((outline > 127).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
@@ -54,16 +54,16 @@ def shown(seen: Seen, plain: Plain, time: float, look: Look) -> NDArray[np.uint8
     return out
 
 
-class Plain:
-    """A camera's pictures as one without distortion and with its axis in the middle sees them, of another size: those of a frustum."""
+class Undistorter:
+    """Makes pictures of a camera into those of a pinhole camera with a central axis, scaled: those of a frustum."""
 
     def __init__(self, camera: Camera, width: int) -> None:
-        """`width`: pixels of what is made."""
+        """`width`: of the result, pixels."""
         (full, high), (fx, fy) = camera.size, np.diag(camera.matrix)[:2]
         self.size = (min(width, full), max(1, round(min(width, full) * high / full)))
         half = min(full / (2 * fx), WIDEST), min(high / (2 * fy), WIDEST * high / full)
         self.fov = 2 * float(np.arctan(half[1]))
-        """Angle from top to bottom, radians."""
+        """Vertical field of view, radians."""
         self.aspect = half[0] / half[1]
         columns, rows = ((np.arange(side) + 0.5) / side * 2 - 1 for side in self.size)
         x, y = np.meshgrid(half[0] * columns, half[1] * rows)
@@ -73,7 +73,7 @@ class Plain:
         self._shrunk = max(full / self.size[0], 1.0)
 
     def __call__(self, image: Image) -> Image:
-        """A picture (H, W) or (H, W, 3) of the camera, as it is shown; black where the camera saw nothing."""
+        """Undistorted picture of (H, W) or (H, W, 3); black outside the camera's picture."""
         import cv2
 
         if self._shrunk > 1.5:  # so that thin things do not flicker

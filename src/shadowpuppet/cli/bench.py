@@ -1,0 +1,81 @@
+"""The command `bench`: how fast it is on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from shadowpuppet.cli.flags import Quiet, Switch
+from shadowpuppet.cli.tables import pairs, show, table
+
+# what was timed, its name, factor to the unit, unit, and the key of its ratio to the row above
+MONO_ROWS = (
+    ("particle", "a particle of cardbox, pose to cost", 1e6, "us", ""),
+    ("opencv", "  OpenCV, its polygons ready-made", 1e6, "us", "mono.ratio_opencv_full"),
+    ("boxes", "  boxes instead of cardbox", 1e6, "us", "mono.ratio_boxes"),
+    ("arm", "a particle of an arm's stage", 1e6, "us", ""),
+    ("opencv_arm", "  OpenCV, its polygons ready-made", 1e6, "us", "mono.ratio_opencv_arm"),
+    ("step", "a frame of the filter at Table I", 1e3, "ms", ""),
+    ("naive_frame", "  plain NumPy and Python", 1e3, "ms", "mono.ratio_naive_frame"),
+    ("default", "a frame of the default filter", 1e3, "ms", ""),
+)
+MULTI_ROWS = (
+    ("hull", "silhouettes to surface points", 1e3, "ms", ""),
+    ("forces", "simulated forces, a particle and iteration", 1e6, "us", ""),
+    ("naive_forces", "  plain NumPy", 1e6, "us", "multi.ratio_naive"),
+    ("gauss_newton", "Gauss-Newton, a particle and iteration", 1e6, "us", ""),
+    ("naive_gauss_newton", "  plain NumPy", 1e6, "us", "multi.ratio_naive_gauss_newton"),
+    ("forces_frame", "a frame of ni2008, silhouettes to pose", 1e3, "ms", ""),
+    ("default_frame", "a frame of the default preset", 1e3, "ms", ""),
+)
+CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
+
+
+def bench(*, json: Path | None = None, quick: Switch = False, quiet: Quiet = False) -> None:
+    """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
+
+    Parameters
+    ----------
+    json
+        File that gets all figures, by flat keys such as "mono.particle_us".
+    quick
+        Fewer rounds, a shorter film, nothing compiled anew.
+    """
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.evaluation.bench.run import check_writable, run_bench, write_figures
+
+    if json is not None:
+        check_writable(json)
+    with terminal(quiet) as listener:
+        found = run_bench(quick, listener)
+    if json is not None:
+        write_figures(json, found)
+    if not quiet:
+        show(*_tables(found))
+
+
+def _tables(found: Mapping[str, Any]) -> Iterator[Any]:
+    for title, rows in (("one camera, 320 x 240", MONO_ROWS), ("seven cameras, 640 x 480", MULTI_ROWS)):
+        cells = ((name, *(f"{scale * found['raw'][key][which]:.4g}" for which in ("median", "least")), unit,
+                  f"{found[ratio]:.3g}" if ratio else "") for key, name, scale, unit, ratio in rows)  # fmt: skip
+        yield table(f"time, {title}", ("", "median", "least", "", "times"), cells, right=(1, 2, 4))
+    here = found["environment"]
+    stages = ", ".join(f"{name} {found[f'mono.{stage}_ms']:.1f}" for stage, name in CHAIN.items())
+    yield pairs([
+        ("filter", f"{found['mono.step_fps']:.0f} frames/s at Table I, {found['mono.default_fps']:.0f} with the default preset"),
+        ("film to pose", f"{found['mono.chain_fps']:.0f} frames/s, {found['mono.one_core']} (ms a frame: {stages})"),
+        ("memory", f"{_megabytes(found['mono.peak_mb'])} at most, grown by {_megabytes(found['mono.growth_mb'])} over "
+                   f"{found['mono.chain_frames']} frames"),
+        ("several", f"{found['multi.fps']:.0f} frames/s with the default preset, {found['multi.forces_fps']:.0f} with ni2008"),
+        ("films to pose", f"{found['multi.chain_fps']:.0f} frames/s from seven films, {found['multi.cores']}; "
+                          f"{_megabytes(found['multi.peak_mb'])} at most"),
+        ("first pose", f"{found['mono.start_s']:.1f} s after the start of a new process, {found['mono.compile_s']:.1f} s where all kernels "
+                       "must be compiled" if "mono.compile_s" in found else None),
+        ("machine", f"{here['cpu']}, {here['cores']} cores, {here['vectors']}, Python {here['python']}, Numba {here['numba']}, "
+                    f"OpenCV {here['opencv-python-headless']}"),
+    ])  # fmt: skip
+
+
+def _megabytes(value: float | None) -> str:
+    return "not told here" if value is None else f"{value:.1f} MB"

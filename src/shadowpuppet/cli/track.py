@@ -1,0 +1,210 @@
+"""The commands that track: `track`, `live`, `demo`; `play`, which replays a run; and `fit-person`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from shadowpuppet.cli.flags import (
+    Config,
+    LookFlags,
+    OutletFlags,
+    Quiet,
+    Recording,
+    RunFlags,
+    Switch,
+    flags_of,
+    given,
+    options_from,
+    output,
+    unpacked,
+)
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, show, table
+from shadowpuppet.errors import SettingsError
+from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.stream.settings import OutletSettings
+from shadowpuppet.pipeline.options import PATHS, Options
+from shadowpuppet.settings import validate
+
+if TYPE_CHECKING:
+    from shadowpuppet.pipeline.person import Found
+
+    DemoFlags = SessionFlags = LiveFlags = Any
+else:
+    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay")
+    DemoFlags = unpacked(flags_of(Options, without=KNOWN))
+    """Options for recordings that are known."""
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "prior", "training", "multiview")))
+    """Options of a live session."""
+    LiveFlags = unpacked(flags_of(LiveSettings))
+
+BARS = "▁▂▃▄▅▆▇█"
+
+
+def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
+          config: Config = None, quiet: Quiet = False, flags: RunFlags = None) -> None:
+    """Track a person: from video to joints.csv, angles.csv, motion.npz, run.toml and metrics.json.
+
+    Prints what it found first, as `info` does.
+    `shadowpuppet settings` lists more settings; each is a flag, such as --tracker.arm.particles 300.
+    """
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.pipeline.track import track_recording
+
+    options = options_from(flags, config)
+    folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
+    with terminal(quiet, folder) as listener:
+        summary = track_recording(recording, folder, options, listener)
+    if not quiet:
+        _show_run(folder, summary.metrics)
+
+
+def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
+         quiet: Quiet = False, flags: SessionFlags = None, settings: LiveFlags = None, outlets: OutletFlags = None) -> None:
+    """Track a person in front of a camera as it happens, shown in a window or on a page for a browser; Ctrl-C ends it.
+
+    Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
+    Pictures are kept only with --record. Joints are sent to other programs only with --osc, --websocket or --lsl.
+    """
+    import sys
+    from time import strftime
+
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.live.display.choice import open_display
+    from shadowpuppet.live.run import run_live
+    from shadowpuppet.live.stream.choice import open_outlets
+
+    options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
+    folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
+    with terminal(quiet, folder) as listener:
+        opened = open_outlets(validate(OutletSettings, given(outlets), "flags"))
+        if chosen.show == "viewer":
+            from shadowpuppet.viewer.web.live import open_viewer
+
+            display = open_viewer(chosen.listen, chosen.port, chosen.record)
+        else:
+            display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
+        metrics = run_live(folder, options, chosen, listener, display, outlets=opened)
+    if metrics is None:
+        print("nobody was tracked: nothing was written", file=sys.stderr)
+    elif not quiet:
+        show(metrics_table(metrics), pairs([*_live_rows(metrics["live"]), files_in(folder, "joints.csv", "angles.csv", "recording")]))
+
+
+def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, speed: float = 1.0,
+         loop: Switch = False, quiet: Quiet = False, outlets: OutletFlags = None) -> None:
+    """Send a run's motion to other programs at its own pace, as `live` does, to test a receiver. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    speed
+        Playback speed; 2 is twice as fast.
+    loop
+        Start again at the end, until Ctrl-C.
+    """
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.live.play import play_run
+    from shadowpuppet.live.stream.choice import open_outlets
+
+    if not 0 < speed <= 100:
+        raise SettingsError(f"flags: speed: found {speed}, expected more than 0, up to 100")
+    chosen = validate(OutletSettings, given(outlets), "flags")
+    if chosen == OutletSettings():
+        raise SettingsError("flags: found nobody to give the motion to, expected one of --osc, --websocket and --lsl")
+    with terminal(quiet) as listener:
+        play_run(run, open_outlets(chosen), listener, speed=speed, loop=loop)
+
+
+def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and runs.")] = Path("shadowpuppet-demo"),
+         config: Config = None, quiet: Quiet = False, flags: DemoFlags = None) -> None:
+    """Make two sample recordings with known truth, with one camera and with four, track them, and name the pictures to open.
+
+    Needs no data and no network.
+    """
+    from dataclasses import replace
+
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.pipeline.synthesize import run_demo
+
+    options = replace(options_from(flags, config), overlay=True)
+    with terminal(quiet, folder) as listener:
+        summaries = run_demo(folder, options, listener)
+    for summary in () if quiet else summaries:
+        print(f"\n{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
+        _show_run(summary.folder, summary.metrics, "overlay.png")
+
+
+def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
+               config: Config = None, quiet: Quiet = False, flags: LookFlags = None) -> None:
+    """Measure a person once, from reference pictures or the film, or from the first seconds of several cameras; `track --person` uses the
+    sizes."""
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.pipeline.person import Found
+    from shadowpuppet.pipeline.track import fit_person
+
+    with terminal(quiet) as listener:
+        listener.begin("looking")
+        found, look = fit_person(recording, file, options_from(flags, config))
+        listener.doubt(look)
+    if not quiet and found.person is not None:
+        curves, rows = _fit_tables(found) if isinstance(found, Found) else ((), _rig_fit_rows(found.told))
+        show(_sizes_table(found.person.sizes), *curves, pairs([*rows, ("saved", str(file))]))
+
+
+def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
+    """Metrics of a run and its files."""
+    stages = ", ".join(f"{stage} {value:.1f}" for stage, value in metrics["ms_per_frame"].items())
+    speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
+    errors = [error_table(metrics["errors"])] if "errors" in metrics else []
+    files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv")
+    show(metrics_table(metrics), *errors, pairs([("speed", speed), files]))
+
+
+def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
+    """How well a live session kept up."""
+    late, frames = live["latency_ms"], live["latency_frames"]
+    return [("latency", f"{late['median']:.0f} ms from capture to pose ({frames['median']:.2f} of a frame's time); 5 % of frames over "
+                        f"{late['p95']:.0f} ms ({frames['p95']:.2f})"),
+            ("speed", f"{live['frames_per_s']:.1f} frames/s of {1000 / live['interval_ms']:.1f}; {live['dropped']} dropped"),
+            ("breaks", f"{live['breaks']} times no pictures came" if live["breaks"] else None)]
+
+
+def _sizes_table(sizes: Any) -> Any:
+    """The named sizes in two columns: a1..a18 of an upper body, or those of a whole body."""
+    from shadowpuppet.body.sizes import CardboxSizes
+
+    names = sizes.names()
+    rows = [(f"a{n}" if isinstance(sizes, CardboxSizes) else "", name, f"{1000 * value:.0f}")
+            for n, (name, value) in enumerate(zip(names, sizes.to_array()), 1)]  # fmt: skip
+    half = (len(rows) + 1) // 2
+    both = ((*left, *right) for left, right in zip(rows[:half], [*rows[half:], ("", "", "")]))
+    return table("sizes, mm", ("", "size", "mm", "", "size", "mm"), both, right=(2, 5))
+
+
+def _fit_tables(found: Found) -> tuple[list[Any], Sequence[tuple[str, str | None]]]:
+    """Cost over the rounds of Algorithm 1, a row a search of a subset of sizes; and how well the sizes fit."""
+    curves = [(name if n == 1 else "", str(n), str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
+              for name, searches in found.fit.curves.items() for n, curve in enumerate(searches, 1)]  # fmt: skip
+    overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
+    rows = [("overlap", f"{overlaps}; film {found.start:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"), ("source", found.source)]
+    return [table("cost by round, pixels", ("sizes", "search", "rounds", "first", "last", "curve"), curves, right=(1, 2, 3, 4))], rows
+
+
+def _rig_fit_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | None]]:
+    """How well sizes from several cameras fit."""
+    residual = summary["residual"]
+    return [("overlap", f"{summary['overlap']:.2f} of body and silhouettes, in {summary['frames']} frames"),
+            ("surface", f"{1000 * residual:.1f} mm (rms) from the points of the hulls" if abs(residual) < float("inf") else None),
+            ("source", summary["source"])]
+
+
+def sparkline(values: Any, width: int = 30) -> str:
+    """Numbers as a line of bars."""
+    import numpy as np
+
+    chosen = np.asarray(values, float)[np.unique(np.linspace(0, len(values) - 1, width).astype(int))]
+    span = float(np.ptp(chosen)) or 1.0
+    return "".join(BARS[int((value - chosen.min()) / span * (len(BARS) - 1))] for value in chosen)
