@@ -16,7 +16,7 @@ from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.motion.metrics import FAR, LOST
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.prior.training import Trained
+from shadowpuppet.motion.prior.training import TrainedPrior
 from shadowpuppet.pipeline.look import Look
 from shadowpuppet.pipeline.person import Found
 from shadowpuppet.synthetic.spec import Spec
@@ -177,7 +177,7 @@ def trial_table(found: HumanEva, folder: Path) -> RenderableType:
     return pairs(rows)
 
 
-def prior_tables(trained: Trained, file: Path) -> list[RenderableType]:
+def prior_tables(trained: TrainedPrior, file: Path) -> list[RenderableType]:
     """What a motion prior was learnt from, how well it follows that, and where it lies."""
     clips = plain_table("learnt from; joints off the body in mm", ("motion", "frames", "parts", "joints", "worst frame"))
     for clip in trained.clips:

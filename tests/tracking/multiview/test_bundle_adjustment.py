@@ -43,7 +43,7 @@ def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsil
 
 def test_what_sizes_do_to_distances_is_their_derivative(rng):
     """Of a longer loin: what hangs on the chest rises, so that the points there are less far out along their normals."""
-    body, settings, step = actor.body(), SurfaceSettings(), bundle_adjustment.NUDGE
+    body, settings, step = actor.body(), SurfaceSettings(), bundle_adjustment.SIZE_STEP
     pose, k = actor.stance(body.skeleton), NAMES.index("lumbar_height")
     seen = actor.surface(body, pose, rng, 20)
     cloud = make_cloud(seen.points + 0.005 * seen.normals, seen.normals, seen.weights)
@@ -171,7 +171,7 @@ def test_nothing_is_ever_made_worse_and_more_rounds_do_more():
         of = bundle_adjustment._model(anatomical(found.sizes))
         frames = [bundle_adjustment._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
         strain = (found.sizes.to_array() - MEAN.to_array()) / SPREAD
-        worth = bundle_adjustment.WORTH / bundle_adjustment.NOISE**2
+        worth = bundle_adjustment.INDEPENDENT_POINTS / bundle_adjustment.POINT_NOISE**2
         return worth * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
 
     costs = [cost(found) for found in residuals]

@@ -12,7 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.local_pca import Subspaces
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
-from shadowpuppet.tracking.multiview.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
+from shadowpuppet.tracking.multiview.proposals import ARM_NOISE, GLOBAL, JOINT_CHANCE, NOISE_SCALES, Proposals
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 SKELETON = actor.body().skeleton
@@ -57,12 +57,12 @@ def test_what_is_refined_afterwards_is_moved_joint_by_joint_near_and_far():
     for joint in SKELETON.joints:
         own = [d for d, dof in enumerate(SKELETON.dofs) if dof.joint == joint.name]
         if own:
-            assert moved[:, own].any(1).mean() == pytest.approx(MOVED, abs=0.04)
+            assert moved[:, own].any(1).mean() == pytest.approx(JOINT_CHANCE, abs=0.04)
     chest, knee = SKELETON.dof_indices(["chest_x", "left_knee_flexion"])
     assert np.corrcoef(moved[:, chest], moved[:, knee])[0, 1] == pytest.approx(0, abs=0.1)  # while one joint stays another is moved
     far = np.abs((drawn(settings, many()) - POSE)[1:, chest])
-    assert far.max() > 2.5 * 0.01 * REACH[1]
-    assert far.std() == pytest.approx(0.01 * np.sqrt(MOVED * np.mean(np.square(REACH))), rel=0.15)
+    assert far.max() > 2.5 * 0.01 * NOISE_SCALES[1]
+    assert far.std() == pytest.approx(0.01 * np.sqrt(JOINT_CHANCE * np.mean(np.square(NOISE_SCALES))), rel=0.15)
 
 
 def test_a_share_tries_an_arm_in_a_usual_posture():
@@ -79,7 +79,7 @@ def test_a_share_tries_an_arm_in_a_usual_posture():
     usual = np.stack(list(usual_arms(SKELETON, "left").values()), 1)
     arms = found[300:][left][:, sides["left"]]
     off = arms[:, None] - usual
-    assert np.median(np.sqrt((off**2).mean(2)).min(1)) < 1.5 * EXPLORED
+    assert np.median(np.sqrt((off**2).mean(2)).min(1)) < 1.5 * ARM_NOISE
     assert not (np.abs(drawn(replace(still, method="particle_filter"), many(400)) - POSE) > 1e-3).any()
 
 
@@ -103,7 +103,7 @@ def test_the_first_is_the_last_pose_moved_on(settings, speed):
     wanted[ROOT] += speed * velocity[ROOT]
     np.testing.assert_allclose(found[0], SKELETON.clamp(wanted))
     shift = found[1:, ROOT] - (POSE[ROOT] + 0.01 + speed * velocity[ROOT])
-    assert np.abs(shift).max() < 6 * max(REACH) * settings.sigma_heading
+    assert np.abs(shift).max() < 6 * max(NOISE_SCALES) * settings.sigma_heading
 
 
 @pytest.mark.parametrize("settings", [PLAIN, HYBRID], ids=["particle_filter", "hybrid"])

@@ -15,7 +15,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
-from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -42,7 +42,7 @@ def followed(of: MultiviewTracker, seen) -> list[MultiviewState]:
     rng = np.random.default_rng(0)
     states = [of.start(rng, *seen[0])]
     for points, masks in seen[1:]:
-        states.append(of.cycle(rng, states[-1], Evidence(of.stage, points, masks)))
+        states.append(of.cycle(rng, states[-1], MultiviewObservation(of.views, points, masks)))
     return states
 
 
@@ -150,11 +150,11 @@ def test_a_state_says_what_its_pose_costs_and_how_it_moved():
     _, seen = actor.filmed()
     states = track(of, seen[:3])
     for before, state, (points, masks) in zip(states, states[1:], seen[1:]):
-        evidence = Evidence(of.stage, points, masks)
+        observation = MultiviewObservation(of.views, points, masks)
         pose = state.pose[None]
-        costs = of.refiner.costs(pose, evidence.full) + of.settings.silhouettes * evidence.differing(pose)
-        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.usual.strain(pose)[0])
-        assert state.overlap == evidence.overlap(state.pose)
+        costs = of.refiner.costs(pose, observation.full) + of.settings.silhouettes * observation.differing(pose)
+        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.posture_prior.penalty(pose)[0])
+        assert state.overlap == observation.overlap(state.pose)
         np.testing.assert_array_equal(state.velocity, state.pose - before.pose)
         np.testing.assert_array_equal(state.pose, state.particles.best)
         np.testing.assert_allclose(state.particles.log_weights, -state.particles.costs / of.settings.sigma_cost**2)
@@ -264,12 +264,12 @@ def test_a_camera_may_fall_out():
 
 @pytest.mark.parametrize(("overlap", "status"), [(0.49, "lost"), (0.51, "uncertain"), (0.69, "uncertain"), (0.71, "tracked")])
 def test_overlap_decides(overlap, status, monkeypatch):
-    monkeypatch.setattr(Evidence, "overlap", lambda *_: overlap)
+    monkeypatch.setattr(MultiviewObservation, "overlap", lambda *_: overlap)
     of, (points, masks) = tracker(), actor.filmed()[1][0]
-    evidence = Evidence(of.stage, points, masks)
+    observation = MultiviewObservation(of.views, points, masks)
     pose = actor.filmed()[0][0]
-    particles = evaluate(pose[None], of.weigh(evidence))
-    assert of.judge(pose, 0 * pose, particles, evidence, of.weigh(evidence)).status == status
+    particles = evaluate(pose[None], of.weigh(observation))
+    assert of.judge(pose, 0 * pose, particles, observation, of.weigh(observation)).status == status
 
 
 # Priors ---------------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import _runs
 from shadowpuppet.motion.motion import JointTable
 
-SIDES = {"left_": "right_", "right_": "left_"}
+OTHER_SIDE = {"left_": "right_", "right_": "left_"}
 
 
 def mirrored(table: JointTable) -> JointTable:
@@ -33,7 +33,7 @@ def without_gaps(values: ArrayLike, shortest: int = 2) -> list[Array]:
 
 
 def _other_side(name: str) -> str:
-    for side, other in SIDES.items():
+    for side, other in OTHER_SIDE.items():
         if name.startswith(side):
             return other + name.removeprefix(side)
     return name

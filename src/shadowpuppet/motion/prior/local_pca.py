@@ -16,7 +16,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 
 Regions = NDArray[np.int64]
-ORTHONORMAL = 1e-6
+ORTHONORMAL_TOLERANCE = 1e-6
 """How far products of basis vectors may be from one and zero."""
 
 
@@ -50,7 +50,7 @@ class Subspaces:
         for name in ("variances", "noise"):
             if getattr(self, name).min() <= 0:
                 raise ShadowPuppetError(f"{name}: found {getattr(self, name).min()}, expected variances, which are more than zero")
-        if np.abs(self.bases.transpose(0, 2, 1) @ self.bases - np.eye(m)).max() > ORTHONORMAL:
+        if np.abs(self.bases.transpose(0, 2, 1) @ self.bases - np.eye(m)).max() > ORTHONORMAL_TOLERANCE:
             raise ShadowPuppetError("bases: found vectors that are not orthonormal, expected an orthonormal basis of each region")
 
     def __len__(self) -> int:

@@ -17,7 +17,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.local_pca import Regions, Subspaces
 
-SUM = 1e-6
+SUM_TOLERANCE = 1e-6
 """How far the sum of probabilities may be from one."""
 
 
@@ -62,7 +62,7 @@ class MotionPrior:
             object.__setattr__(self, name, values)
             if values.shape != shape:
                 raise ShadowPuppetError(f"{name}: found shape {values.shape}, expected {shape}")
-            if not ((values >= 0).all() and np.abs(values.sum(-1) - 1).max() <= SUM):
+            if not ((values >= 0).all() and np.abs(values.sum(-1) - 1).max() <= SUM_TOLERANCE):
                 raise ShadowPuppetError(f"{name}: found numbers that are no probabilities, expected none below zero and a sum of one")
         object.__setattr__(self, "names", tuple(str(name) for name in self.names))
         if self.names and (len(self.names) != D or len(set(self.names)) != D):

@@ -21,18 +21,18 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.clips import mirrored, without_gaps
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.motion.prior.vqpca import Choice, Fit, choose_regions, fit_prior
+from shadowpuppet.motion.prior.vqpca import PriorFit, RegionChoice, choose_regions, fit_prior
 
 RATE = 60.0
 """Frames/s that are learnt where nothing else is wanted: HumanEva's, and the recordings' of the paper."""
-DOUBTFUL, WRONG = 0.03, 0.1
+DOUBTFUL_RESIDUAL, WRONG_RESIDUAL = 0.03, 0.1
 """Residuals of joints, metres, from which on a motion is doubted, and refused: it is no person's, or its joints are others than ours."""
-STILL = np.radians(0.5)
+MIN_MOTION = np.radians(0.5)
 """Root mean square deviation of the angles, rad, below which nobody moves."""
 
 
 @dataclass(frozen=True, eq=False)
-class Clip:
+class TrainingClip:
     """Joints of one file as poses."""
 
     name: str
@@ -47,13 +47,13 @@ class Clip:
         return sum(map(len, self.parts))
 
 
-class Trained(NamedTuple):
+class TrainedPrior(NamedTuple):
     """A prior, and what it was learnt from."""
 
     prior: MotionPrior
-    fit: Fit
-    clips: tuple[Clip, ...]
-    choice: Choice | None
+    fit: PriorFit
+    clips: tuple[TrainingClip, ...]
+    choice: RegionChoice | None
     """How the number of regions was chosen, where it was."""
     error: float
     """Root mean square of what encoding and reconstructing loses of a pose, rad (and metres, where there are places among the DOF)."""
@@ -62,7 +62,7 @@ class Trained(NamedTuple):
 
 
 def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], settings: PriorSettings | None = None, *,
-                body: str = "anatomical", rate: float = RATE, candidates: Sequence[int] = ()) -> Trained:
+                body: str = "anatomical", rate: float = RATE, candidates: Sequence[int] = ()) -> TrainedPrior:
     """Learn a motion from joints (metres, Z up) of one or several clips, by their names, of any frame rates and people.
 
     `candidates`: numbers of regions to choose among, instead of that in `settings`. Raises `ShadowPuppetError` naming the clip, where
@@ -84,7 +84,7 @@ def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], sett
     choice = choose_regions(rng, chosen, candidates, settings) if candidates else None
     fit = fit_prior(rng, chosen, settings if choice is None else replace(settings, regions=choice.regions), names=names, rate=rate)
     error, joint_error = reconstruction_errors(fit.prior, clips)
-    return Trained(fit.prior, fit, clips, choice, error, joint_error)
+    return TrainedPrior(fit.prior, fit, clips, choice, error, joint_error)
 
 
 def modelled(skeleton: Skeleton, dofs: str = "articulation") -> tuple[str, ...]:
@@ -108,7 +108,7 @@ def matched(prior: MotionPrior, skeleton: Skeleton, rate: float) -> MotionPrior:
     return replace(prior, transitions=rows / rows.sum(1, keepdims=True), rate=rate)
 
 
-def reconstruction_errors(prior: MotionPrior, clips: Sequence[Clip]) -> tuple[float, float]:
+def reconstruction_errors(prior: MotionPrior, clips: Sequence[TrainingClip]) -> tuple[float, float]:
     """Root mean square of what encoding and reconstructing the clips' poses loses: of the DOF, and of the joints' places (metres)."""
     squares, places = list[Array](), list[Array]()
     for clip in clips:
@@ -131,7 +131,7 @@ def _sides(tables: Mapping[str, JointTable], both: bool) -> Iterator[tuple[str, 
             yield f"{name}, mirrored", mirrored(table)
 
 
-def _clip(name: str, table: JointTable, body: str, rate: float) -> Clip:
+def _clip(name: str, table: JointTable, body: str, rate: float) -> TrainingClip:
     """Poses of a table: slower ones are fitted first and then resampled, which leaves bones their length, faster ones the other way."""
     known = np.flatnonzero(np.isfinite(table.positions).all(2).any(0))
     table = table.select([table.names[n] for n in known])
@@ -141,16 +141,16 @@ def _clip(name: str, table: JointTable, body: str, rate: float) -> Clip:
     _check_fit(name, fitted)
     complete = np.asarray(np.isfinite(table.positions).all((1, 2)))
     poses = resampled(fitted.times, np.where(complete[:, None], fitted.poses, np.nan), rate)[1]
-    return Clip(name, fitted, without_gaps(poses))
+    return TrainingClip(name, fitted, without_gaps(poses))
 
 
 def _check_fit(name: str, fitted: FittedPoses) -> None:
     residual = fitted.residual
-    if residual < DOUBTFUL:
+    if residual < DOUBTFUL_RESIDUAL:
         return
     worst = max(fitted.by_joint, key=fitted.by_joint.__getitem__)
     said = f"{name}: joints lie {1000 * residual:.0f} mm off the body on average, {worst} {1000 * fitted.by_joint[worst]:.0f} mm"
-    if residual >= WRONG:
+    if residual >= WRONG_RESIDUAL:
         raise ShadowPuppetError(f"{said}, expected a person with the body's joints, whose bones keep their lengths")
     warn(f"{said}: are its joints those of the body?", ShadowPuppetWarning, stacklevel=4)
 
@@ -167,6 +167,6 @@ def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
 
 
 def _check_moves(clips: Sequence[Array], names: str) -> None:
-    if float(np.sqrt(np.concatenate(clips).var(0).mean())) < STILL:
+    if float(np.sqrt(np.concatenate(clips).var(0).mean())) < MIN_MOTION:
         warn(f"{names}: nobody moves there, so that the prior knows one posture only", ShadowPuppetWarning, stacklevel=3)
 

@@ -22,13 +22,13 @@ from shadowpuppet.motion.prior.local_pca import Regions, Subspaces, principal_su
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 
-GREATEST = 1e9
+MAX_VALUE = 1e9
 """Numbers of poses are less than this: squares of greater ones have too few digits."""
-LEAST_VARIANCE = 1e-150
+MIN_VARIANCE = 1e-150
 """Where the poses hardly vary, so that densities stay finite."""
 
 
-class Fit(NamedTuple):
+class PriorFit(NamedTuple):
     """A prior, and how it was learnt."""
 
     prior: MotionPrior
@@ -38,7 +38,7 @@ class Fit(NamedTuple):
     """Of the training clips, before each iteration of expectation-maximisation, and after the last; never falls."""
 
 
-class Choice(NamedTuple):
+class RegionChoice(NamedTuple):
     """How well numbers of regions do, and the one to take."""
 
     regions: int
@@ -52,7 +52,7 @@ class Choice(NamedTuple):
 
 
 def fit_prior(rng: np.random.Generator, clips: Sequence[ArrayLike], settings: PriorSettings | None = None, *, names: Sequence[str] = (),
-        rate: float | None = None) -> Fit:
+        rate: float | None = None) -> PriorFit:
     """Learn a motion from clips (T, D), one or several, of poses in the order of time, all at one frame rate.
 
     `names` (D of them) and `rate` (frames/s) are kept in the prior. Raises `ShadowPuppetError` for clips that do not fit together, have
@@ -64,11 +64,11 @@ def fit_prior(rng: np.random.Generator, clips: Sequence[ArrayLike], settings: Pr
     initial = np.full(len(subspaces), 1 / len(subspaces))  # equal, as the paper has it, and kept: a film may start anywhere in the motion
     densities = [subspaces.log_densities(clip) for clip in arrays]
     transitions, log_likelihoods = _maximise(densities, initial, settings)
-    return Fit(MotionPrior(subspaces, transitions, initial, tuple(names), rate), tuple(errors), tuple(log_likelihoods))
+    return PriorFit(MotionPrior(subspaces, transitions, initial, tuple(names), rate), tuple(errors), tuple(log_likelihoods))
 
 
 def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candidates: Sequence[int] = (5, 10, 15, 20, 30, 40, 60, 80),
-                   settings: PriorSettings | None = None, *, folds: int = 5, margin: float = 0.05) -> Choice:
+                   settings: PriorSettings | None = None, *, folds: int = 5, margin: float = 0.05) -> RegionChoice:
     """The least number of regions that reconstructs unseen motion as well as any, but for a share `margin`.
 
     Each clip, poses (T, D), is cut into `folds` pieces; each piece in turn is left out and reconstructed from what was learnt without.
@@ -91,7 +91,7 @@ def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candida
                        for number in tried])
     training, held_out = np.sqrt((errors**2).mean(1)).T
     chosen = tried[int(np.flatnonzero(held_out <= (1 + margin) * held_out.min())[0])]
-    return Choice(chosen, tuple(tried), tuple(training.tolist()), tuple(held_out.tolist()))
+    return RegionChoice(chosen, tuple(tried), tuple(training.tolist()), tuple(held_out.tolist()))
 
 
 def reconstruction_error(prior: MotionPrior, clips: Sequence[ArrayLike]) -> float:
@@ -114,10 +114,10 @@ def check_clips(clips: Sequence[ArrayLike]) -> list[Array]:
             raise ShadowPuppetError(f"clip {c}: found shape {poses.shape}, expected (frames, numbers of a pose)")
         if arrays and poses.shape[1] != arrays[0].shape[1]:
             raise ShadowPuppetError(f"clip {c}: found poses of {poses.shape[1]} numbers, expected {arrays[0].shape[1]}, as in clip 0")
-        bad = np.argwhere(~(np.abs(poses) < GREATEST))
+        bad = np.argwhere(~(np.abs(poses) < MAX_VALUE))
         if len(bad):
             raise ShadowPuppetError(f"clip {c}: found {poses[*bad[0]]} in frame {bad[0, 0]}, the first of {len(np.unique(bad[:, 0]))} such "
-                                    f"frames, expected numbers less than {GREATEST:g}; cut clips with gaps by clips.without_gaps")
+                                    f"frames, expected numbers less than {MAX_VALUE:g}; cut clips with gaps by clips.without_gaps")
         arrays.append(poses)
     if not arrays:
         raise ShadowPuppetError("clips: found none, expected one or more")
@@ -161,7 +161,7 @@ def _error(subspaces: Subspaces, poses: Array) -> float:
 def learn_subspaces(rng: np.random.Generator, poses: Array, settings: PriorSettings) -> tuple[Subspaces, list[float]]:
     """Regions of poses (T, D), in order of time, and the errors of the rounds in which they were learnt. Raises as `fit_prior` does."""
     _check_settings(settings, poses)
-    floor = max(settings.noise * float(poses.var(0).mean()), LEAST_VARIANCE)
+    floor = max(settings.noise * float(poses.var(0).mean()), MIN_VARIANCE)
     learnt = [_quantise(rng, poses, settings, floor) for _ in range(settings.starts)]
     partition, errors = min(learnt, key=lambda each: each[1][-1])
     return principal_subspaces(poses, _in_order_of_time(partition), settings.regions, settings.dimensions, floor), errors

@@ -18,7 +18,7 @@ from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.tracking.resampling import Scheme
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
-from shadowpuppet.tracking.status import ABSENT, SETTLE_CYCLES, status_of
+from shadowpuppet.tracking.status import ABSENT_AREA, SETTLE_CYCLES, status_of
 
 
 class State(NamedTuple):
@@ -109,7 +109,7 @@ class MonocularTracker:
 
     def is_absent(self, mask: Mask, pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
-        return int(np.count_nonzero(mask)) < max(ABSENT * count(self.picture.draw(pose)), 1)
+        return int(np.count_nonzero(mask)) < max(ABSENT_AREA * count(self.picture.draw(pose)), 1)
 
     @staticmethod
     def absent(state: State) -> State:

@@ -17,17 +17,26 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
+from shadowpuppet.tracking.multiview.refinement.correspondence import (
+    LANES,
+    Cloud,
+    Single,
+    closest_on_part,
+    closest_point,
+    nearest,
+    part_constants,
+    place_parts,
+)
 from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 Measured = TypeVar("Measured", bound=Sizes)
-NUDGE = 1e-3
+SIZE_STEP = 1e-3
 """Step (m) by which what a size does to the points is found."""
-NOISE, WORTH = 0.01, 30.0
+POINT_NOISE, INDEPENDENT_POINTS = 0.01, 30.0
 """Deviation (m) of a surface point from its body, and how many points of a frame tell something of their own: neighbours err alike, and
 all points of a body of simple shape."""
 ROUNDS = 10
-FARTHEST, FARTHEST_TURN = 0.03, 0.3
+MAX_SIZE_STEP, MAX_POSE_STEP = 0.03, 0.3
 """No size (m) and no DOF (rad or m) goes farther in a round."""
 
 
@@ -44,7 +53,7 @@ class Bundle(Generic[Measured]):
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
-                 first: Measured | None = None, worth: float = WORTH) -> Bundle[Measured]:
+                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS) -> Bundle[Measured]:
     """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
 
     Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull`, one or (F, D), holds poses to
@@ -53,7 +62,7 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
-    free, scale = np.flatnonzero(spread > 0), worth / NOISE**2
+    free, scale = np.flatnonzero(spread > 0), worth / POINT_NOISE**2
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
@@ -93,7 +102,7 @@ def _model(body: Body) -> _Model:
         if parent >= 0:
             above[:, j] |= above[:, parent]
     chain = make_chain(skeleton)
-    return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), constants(limbs),
+    return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), part_constants(limbs),
                   above[chain.owners])
 
 
@@ -122,7 +131,7 @@ class _Solution(NamedTuple):
 
 def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[_Model]:
     """Bodies of which one size each is larger."""
-    return [_model(make(kind.from_array(at + NUDGE * (np.arange(len(at)) == k)))) for k in free]
+    return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k)))) for k in free]
 
 
 def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: Array,
@@ -142,10 +151,10 @@ def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float,
         parts.append(solved)
     step = np.linalg.solve(total, right)
     sizes = best.at[0].copy()
-    step = np.clip(step, -FARTHEST, FARTHEST)
+    step = np.clip(step, -MAX_SIZE_STEP, MAX_SIZE_STEP)
     sizes[free] += step
     moves = np.array([solved[:, K] - solved[:, :K] @ step for solved in parts])
-    return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -FARTHEST_TURN, FARTHEST_TURN))
+    return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -MAX_POSE_STEP, MAX_POSE_STEP))
 
 
 def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
@@ -155,7 +164,7 @@ def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, s
     distances, weights, levers = out[0], out[1] / max(cloud.total, 1e-9), out[2:8].T
     screws[:, 3:] -= np.cross(cloud.origin, screws[:, :3])
     moves = (levers @ screws.T) * model.reach[:, model.joints[near[:, LANES:].ravel().astype(int)]].T
-    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / NUDGE for other in nudged]
+    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / SIZE_STEP for other in nudged]
     rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), len(nudged))], 1)
     weighed = rows * weights[:, None]
     squared = float(weights @ distances**2 / max(weights.sum(), 1e-9))
@@ -187,12 +196,12 @@ def _tangents(T, joints, rotations, starts, parts, rows, spheres, origin, epsilo
             if not used:
                 continue
             q = parts[s]
-            measure(q, points, room)
+            closest_on_part(q, points, room)
             for i in range(LANES):
                 if own[LANES + i] != s:
                     continue
                 at = group * LANES + i
-                x, y, z = foot(q, room, i)
+                x, y, z = closest_point(q, room, i)
                 nx, ny, nz = points[3 * LANES + i], points[4 * LANES + i], points[5 * LANES + i]
                 share = own[i] / tau
                 fade = one / (one + share * share)

@@ -19,21 +19,21 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation, silhouette_costs
 
 
-class Stage:
+class BodyInViews:
     """A body among cameras: what is needed to draw it in their pictures, at half their size."""
 
     def __init__(self, body: Body, cameras: Sequence[Camera]) -> None:
         """`cameras`: calibrated, with their places in the world."""
         self.body = body
-        self.pictures = tuple(Picture(body, _thinned(camera), camera.T_camera_world) for camera in cameras)
+        self.pictures = tuple(Picture(body, _half_size(camera), camera.T_camera_world) for camera in cameras)
 
 
-class Evidence:
+class MultiviewObservation:
     """One frame: surface points, and the masks (H, W) that they were made from, None for a camera without any."""
 
-    def __init__(self, stage: Stage, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
+    def __init__(self, stage: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
         """Nothing is computed until it is asked for. `also`: a cost of your own (m^2), which is added to that of the surface."""
-        self.stage, self.surface, self.masks, self.also = stage, surface, masks, also
+        self.views, self.surface, self.masks, self.also = stage, surface, masks, also
 
     def cloud(self, share: int = 1) -> Cloud:
         """Every `share`-th of the surface points."""
@@ -52,7 +52,7 @@ class Evidence:
     @cached_property
     def people(self) -> tuple[tuple[Picture, Mask], ...]:
         """The silhouettes of people, thinned, and the pictures to be drawn in their place."""
-        return tuple((picture, mask[::2, ::2]) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
+        return tuple((picture, mask[::2, ::2]) for picture, mask in zip(self.views.pictures, self.masks, strict=True)
                      if mask is not None and may_be_person(mask))
 
     @cached_property
@@ -81,7 +81,7 @@ class Evidence:
         return float(np.mean(overlaps)) if overlaps else 0.0
 
 
-def _thinned(camera: Camera) -> Camera:
+def _half_size(camera: Camera) -> Camera:
     """The camera of which the pictures are every second pixel of every second row."""
     width, height = camera.size
     return replace(camera, size=((width + 1) // 2, (height + 1) // 2), matrix=np.diag([0.5, 0.5, 1.0]) @ camera.matrix)

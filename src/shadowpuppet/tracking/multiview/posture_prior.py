@@ -11,11 +11,11 @@ import numpy as np
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 
-WIDER, LEAST = 1.5, 0.15
+INFLATION, MIN_DEVIATION = 1.5, 0.15
 """What training poses' deviations are multiplied by, and what they are at least (rad): others than those come."""
-SEEN = ("left_", "right_")
+OBSERVED_JOINTS = ("left_", "right_")
 """Joints whose angles the surface shows well enough."""
-BOUND = 9.0
+MAX_PENALTY = 9.0
 """No DOF counts for more than this, three deviations' worth (see `Skeleton.strain`)."""
 
 ARMS = ((8, 5, 10), (0, 90, 0), (90, 10, 5), (170, 10, 10), (20, 20, 95), (-30, 20, 60))
@@ -25,7 +25,7 @@ LEGS = (((3, 5), (3, 5), 0), ((25, 10), (-15, 20), 0), ((-15, 20), (25, 10), 0),
 
 
 @dataclass(frozen=True, eq=False)
-class Usual:
+class PosturePrior:
     """Rest and deviations of every DOF; infinite where nothing is usual."""
 
     rest: Array
@@ -33,27 +33,27 @@ class Usual:
     above: Array
 
     @classmethod
-    def of(cls, skeleton: Skeleton, library: Array | None = None) -> Usual:
+    def of(cls, skeleton: Skeleton, library: Array | None = None) -> PosturePrior:
         """As the skeleton has it; angles but the heading as the poses of a `library` (L, D), such as training motion, have it."""
         rest, below, above = (np.array(each) for each in skeleton.usual)
         if library is not None and len(library) > 1:
             known = np.isfinite(below)
-            spread = np.maximum(WIDER * library.std(0), LEAST)
+            spread = np.maximum(INFLATION * library.std(0), MIN_DEVIATION)
             rest, below, above = (np.where(known, new, old) for new, old in ((library.mean(0), rest), (spread, below), (spread, above)))
-        seen = np.array([not dof.joint.startswith(SEEN) for dof in skeleton.dofs])
+        seen = np.array([not dof.joint.startswith(OBSERVED_JOINTS) for dof in skeleton.dofs])
         return cls(rest, np.where(seen, below, np.inf), np.where(seen, above, np.inf))
 
-    def strain(self, poses: Array) -> Array:
+    def penalty(self, poses: Array) -> Array:
         """Squared deviations of poses (N, D), summed (N,), each DOF bounded."""
         squared = self._squared(poses)
-        return (squared / (1 + squared / BOUND)).sum(1)
+        return (squared / (1 + squared / MAX_PENALTY)).sum(1)
 
     def pull(self, pose: Array) -> Array:
         """Weights (D,) of squared distances from rest that make up the strain near a pose (D,), 1 / rad^2."""
-        fade = 1 + self._squared(pose[None])[0] / BOUND
+        fade = 1 + self._squared(pose[None])[0] / MAX_PENALTY
         return 1 / (np.where(pose < self.rest, self.below, self.above) * fade) ** 2
 
-    def held(self, pose: Array, pull: float, weight: float) -> tuple[Array, Array]:
+    def quadratic(self, pose: Array, pull: float, weight: float) -> tuple[Array, Array]:
         """Where a pose (D,) is held that is pulled to itself, and by the `weight` of its strain to rest: centre and pull, each (D,)."""
         rest = weight * self.pull(pose)
         return (pull * pose + rest * self.rest) / (pull + rest + 1e-30), pull + rest

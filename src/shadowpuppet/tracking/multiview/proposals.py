@@ -14,11 +14,11 @@ from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
-REACH = (0.3, 1.0, 2.0)
+NOISE_SCALES = (0.3, 1.0, 2.0)
 """What the noise of a defensive proposal is multiplied by, one of these each."""
-EXPLORED, TRIED = 0.4, 16
+ARM_NOISE, ARM_CANDIDATES = 0.4, 16
 """Noise about an arm that is tried, its own or a usual one (rad), and of how many the one is taken that is most like the silhouettes."""
-MOVED = 0.3
+JOINT_CHANCE = 0.3
 """Chance of each joint to be moved by it: a limb that was lost is found again while all else stays."""
 
 
@@ -70,8 +70,8 @@ class Proposals:
         if self.settings.method == "particle_filter":
             return poses + noise
         explored = round(self.settings.explore * len(poses))
-        far = rng.choice(REACH, size=(len(poses), 1))
-        moved = rng.random((len(poses), len(self.skeleton.joints))) < MOVED
+        far = rng.choice(NOISE_SCALES, size=(len(poses), 1))
+        moved = rng.random((len(poses), len(self.skeleton.joints))) < JOINT_CHANCE
         out = poses + noise * far * moved[:, self.owners]
         if explored:
             out[-explored:] = self._other_arms(rng, out[-explored:], unlike)
@@ -79,11 +79,11 @@ class Proposals:
 
     def _other_arms(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array]) -> Array:
         """Poses (N, D) with another arm each: of some near its own and near usual ones, the most like what is seen."""
-        out = np.repeat(poses, TRIED, axis=0)
+        out = np.repeat(poses, ARM_CANDIDATES, axis=0)
         for n, pose in enumerate(poses):
             dofs, arms = self.arms[rng.integers(2)]
-            usual = arms[rng.integers(len(arms), size=TRIED)]
-            about = np.where(rng.random((TRIED, 1)) < 0.5, pose[dofs], usual)
-            out[n * TRIED : (n + 1) * TRIED, dofs] = about + EXPLORED * rng.standard_normal((TRIED, len(dofs)))
+            usual = arms[rng.integers(len(arms), size=ARM_CANDIDATES)]
+            about = np.where(rng.random((ARM_CANDIDATES, 1)) < 0.5, pose[dofs], usual)
+            out[n * ARM_CANDIDATES : (n + 1) * ARM_CANDIDATES, dofs] = about + ARM_NOISE * rng.standard_normal((ARM_CANDIDATES, len(dofs)))
         out = self.skeleton.clamp(out)
-        return out[np.arange(len(poses)) * TRIED + unlike(out).reshape(-1, TRIED).argmin(1)]
+        return out[np.arange(len(poses)) * ARM_CANDIDATES + unlike(out).reshape(-1, ARM_CANDIDATES).argmin(1)]

@@ -14,12 +14,12 @@ from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.tracking.multiview.refinement.correspondence import (
     FAR,
     LANES,
-    NUMBERS,
+    PART_NUMBERS,
     Cloud,
-    constants,
+    closest_on_part,
     make_cloud,
-    measure,
     nearest,
+    part_constants,
     place_parts,
 )
 
@@ -37,7 +37,7 @@ def some_points(rng: np.random.Generator, count: int, around=0.0, reach: float =
 
 
 def placed(limbs: Limbs, T: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    parts = constants(limbs)
+    parts = part_constants(limbs)
     place_parts(T, origin, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), parts)
     return parts
 
@@ -53,7 +53,7 @@ def measured(part: np.ndarray, cloud: Cloud) -> np.ndarray:
     out = np.zeros(8 * LANES, np.float32)
     every = []
     for rows in cloud.rows:
-        measure(part, rows, out)
+        closest_on_part(part, rows, out)
         every.append(out.reshape(8, LANES).T.copy())
     return np.concatenate(every).astype(float)
 
@@ -154,7 +154,7 @@ def test_a_part_lies_within_its_sphere(seed):
     rng = np.random.default_rng(seed)
     limbs, T = naive_limbs.random_limbs(rng, [0, 1]), joint_frames(rng, 2)
     parts = placed(limbs, T, ORIGIN)
-    assert parts.shape == (2, NUMBERS)
+    assert parts.shape == (2, PART_NUMBERS)
     for s in range(2):
         surface = naive_limbs.samples(limbs, s, 0.03) @ limbs.rotations[s].T + limbs.starts[s]
         world = surface @ T[s, :3, :3].T + T[s, :3, 3] - ORIGIN

@@ -23,7 +23,7 @@ from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import rotation_about
 from shadowpuppet.tracking.multiview.refinement import refiner
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
-from shadowpuppet.tracking.multiview.refinement.normal_equations import EQUATIONS, gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.normal_equations import EQUATIONS, accumulate_sums, gather_down
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
@@ -53,7 +53,7 @@ def test_normal_equations_are_those_of_the_plain_version(seen):
     room = of._room()
     place_one(pose, of._chain, room[1], room[2], room[3])
     points = made.rows, made.spheres, made.origin
-    sweep(EQUATIONS, room[1], of._limbs, *points, numbers, of._which(made), room)
+    accumulate_sums(EQUATIONS, room[1], of._limbs, *points, numbers, of._which(made), room)
     gather_down(of._chain, room[6])
     refiner._normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
     plain = naive.normal_equations(body, pose, *cloud, SURFACE)

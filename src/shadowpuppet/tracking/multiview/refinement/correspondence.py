@@ -21,8 +21,8 @@ Single = NDArray[np.float32]
 LANES = 16
 """Points of a group: what one AVX-512 instruction works on."""
 FAR = np.float32(1e6)
-LEAST = np.float32(1e-12)
-NUMBERS = 25
+TINY = np.float32(1e-12)
+PART_NUMBERS = 25
 """Numbers of a part: 9 of its frame's axes, 3 of its origin, 3 of its middle, bounding radius, length, shear (2), radii (4), caps (2)."""
 
 
@@ -70,9 +70,9 @@ def _along_a_curve(points: Array, bits: int = 6, reach: float = 1.5) -> NDArray[
     return key.argsort(kind="stable")
 
 
-def constants(limbs: Limbs) -> Single:
+def part_constants(limbs: Limbs) -> Single:
     """Numbers of the parts that do not change with the pose, of shape (S, NUMBERS); the rest is filled in by `place_parts`."""
-    out = np.zeros((len(limbs.joints), NUMBERS), np.float32)
+    out = np.zeros((len(limbs.joints), PART_NUMBERS), np.float32)
     out[:, 16], out[:, 17:19] = limbs.lengths, limbs.shears
     out[:, 19:23], out[:, 23:25] = limbs.radii.reshape(-1, 4), limbs.caps
     high = limbs.lengths + limbs.caps.sum(1)
@@ -99,7 +99,7 @@ def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cove
 
 
 @summing
-def measure(q, rows, out):  # pragma: no cover
+def closest_on_part(q, rows, out):  # pragma: no cover
     """Of a group of points (7 LANES,) to one part q (NUMBERS,): out (8 LANES,) gets the signed distance, the cosine between the normals,
     the closest point (3) and its outward normal (3), all but the first two in the part's frame."""
     for i in range(LANES):
@@ -153,7 +153,7 @@ def _greatest(near):  # pragma: no cover
 
 
 @part
-def foot(q, out, i):  # pragma: no cover
+def closest_point(q, out, i):  # pragma: no cover
     """The closest point that `measure` found for point number i, metres from the cloud's origin."""
     u, v, w = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
     return (q[0] * u + q[3] * v + q[6] * w + q[9], q[1] * u + q[4] * v + q[7] * w + q[10], q[2] * u + q[5] * v + q[8] * w + q[11])
@@ -185,12 +185,12 @@ def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
     ih = one / height if domed else nil
     side = over == nil
     w = over * ih
-    rho2 = square + w * w + LEAST
+    rho2 = square + w * w + TINY
     # the gradient of rho, times rho
     gx, gy = su * ia, sv * ib
     along = -(su * su * slope_a * ia + sv * sv * slope_b * ib + gx * slope_x + gy * slope_y)
     gz = along if side else w * ih
-    irho, steep = one / np.sqrt(rho2), one / np.sqrt(gx * gx + gy * gy + gz * gz + LEAST)
+    irho, steep = one / np.sqrt(rho2), one / np.sqrt(gx * gx + gy * gy + gz * gz + TINY)
     d = (rho2 - np.sqrt(rho2)) * steep
     ux, uy, uz = gx * steep, gy * steep, gz * steep
     fx, fy, fz = px - d * ux, py - d * uy, pz - d * uz
@@ -204,7 +204,7 @@ def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
     shrink = irho if rho2 > one else one
     ex, ey = px - u + u * shrink, py - v + v * shrink
     dx, dy, dz = px - ex, py - ey, pz - level
-    reach = np.sqrt(dx * dx + dy * dy + dz * dz) + LEAST
+    reach = np.sqrt(dx * dx + dy * dy + dz * dz) + TINY
     outside = not side
     end = one if up else -one
     edge = outside & (rho2 > one)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shadowpuppet.body.jacobian import STEP, TRANSLATION, place_one
 from shadowpuppet.jit import kernel, part
-from shadowpuppet.tracking.multiview.refinement.normal_equations import gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.normal_equations import accumulate_sums, gather_down
 
 
 @part
@@ -41,7 +41,7 @@ def push(poses, mode, hierarchical, gains, iterations, chain, limbs, rows, spher
     for n in range(poses.shape[0]):
         for _ in range(iterations):
             place_one(poses[n], chain, T, screws, work)
-            sweep(mode, T, limbs, rows, spheres, origin, numbers, which, room)
+            accumulate_sums(mode, T, limbs, rows, spheres, origin, numbers, which, room)
             force[:] = 0
             for j in range(sums.shape[0]):
                 for k in range(4):

@@ -19,15 +19,15 @@ from shadowpuppet.camera.projection import NEAR, bend_within, make_lens
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel, part
 
-APART = 0.07
+SPHERE_SPACING = 0.07
 """Spheres on a limb's axis are about this far apart, metres."""
-SLIM = 0.7
+RADIUS_SHARE = 0.7
 """A sphere's radius over the limb's smaller one: nobody is shaped like their model to the pixel."""
 TAU = 0.1
 """How far (m) a sphere may reach out until it costs no longer the square."""
-OTHERS = 3
+OUTVOTING_CAMERAS = 3
 """So many others that see somebody at a place outvote a camera that does not: its silhouette may have lost a limb."""
-MARGIN = 24
+WINDOW_MARGIN = 24
 """Pixels around the person to which the way back is looked up; farther out it is that to the nearest of these, and theirs."""
 
 
@@ -61,10 +61,10 @@ def spheres_in(limbs: Limbs) -> Spheres:
     """Spheres along each limb's axis, from its start to its end."""
     joints, places, radii = [], [], []
     for s, length in enumerate(limbs.lengths):
-        for share in np.linspace(0, 1, max(2, round(length / APART) + 1)):
+        for share in np.linspace(0, 1, max(2, round(length / SPHERE_SPACING) + 1)):
             joints.append(limbs.joints[s])
             places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
-            radii.append(SLIM * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
+            radii.append(RADIUS_SHARE * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
     return Spheres(np.array(joints), np.array(places), np.array(radii))
 
 
@@ -93,8 +93,8 @@ def _distances(mask: Mask) -> tuple[NDArray[np.float32], int, int]:
 
     seen = np.ascontiguousarray(mask).view(np.uint8)
     x, y, width, height = cv2.boundingRect(seen)
-    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
-    seen = seen[top : y + height + MARGIN, left : x + width + MARGIN]
+    left, top = max(x - WINDOW_MARGIN, 0), max(y - WINDOW_MARGIN, 0)
+    seen = seen[top : y + height + WINDOW_MARGIN, left : x + width + WINDOW_MARGIN]
     outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - seen, seen))
     return np.asarray(outside - inside, np.float32), left, top
 
@@ -125,7 +125,7 @@ def _placed(T, place):  # pragma: no cover
 
 
 @part
-def _ask(T, spheres, space, c, said):  # pragma: no cover
+def _sphere_distances(T, spheres, space, c, said):  # pragma: no cover
     """What camera c says of the spheres, into said (K, 4): how far (m) a sphere reaches out of the silhouette, and how that grows along the
     camera's axes. Nothing, less than any radius, of spheres that are not in its picture."""
     V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
@@ -158,14 +158,14 @@ def push_inside(T, spheres, space, said, weight, origin, sums, adding):  # pragm
         return 0.0
     total, share = 0.0, weight / (number * cameras)
     for c in range(cameras):
-        _ask(T, spheres, space, c, said[c])
+        _sphere_distances(T, spheres, space, c, said[c])
     for k in range(number):
         inside = outside = 0
         for c in range(cameras):
             middle = said[c, k, 0] - spheres.radii[k]
             outside += middle > 0
             inside += -np.inf < middle <= 0
-        outvoted = outside == 1 and inside >= OTHERS
+        outvoted = outside == 1 and inside >= OUTVOTING_CAMERAS
         for c in range(cameras):
             own, V = said[c, k], space.views[c]
             r = own[0]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.jit import kernel, part, summing
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, foot, measure, nearest, place_parts
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, closest_on_part, closest_point, nearest, place_parts
 
 SUMS = 29
 """Sums of a part: of the normal equations 21 + 6, of the forces 3 + 3 + 1 + 3 + 6, at most."""
@@ -18,7 +18,7 @@ COST, EQUATIONS, FORCES, ROBUST, MODULATED = 0, 1, 4, 1, 2
 
 
 @kernel
-def sweep(mode, T, limbs, rows, spheres, origin, numbers, which, room):  # pragma: no cover
+def accumulate_sums(mode, T, limbs, rows, spheres, origin, numbers, which, room):  # pragma: no cover
     """One pass over the points under transforms T: the summed cost, and another `mode` than `COST` the parts' sums, by joint."""
     parts, _, _, _, out, lanes, sums = room
     joints, rotations, starts = limbs
@@ -39,7 +39,7 @@ def sweep(mode, T, limbs, rows, spheres, origin, numbers, which, room):  # pragm
                     fresh = False
             if fresh:
                 s = np.int64(number)
-                measure(parts[s], points, out)
+                closest_on_part(parts[s], points, out)
                 if mode == EQUATIONS:
                     _add_equations(parts[s], number, points, near, tau, out, lanes[s])
                 else:
@@ -64,7 +64,7 @@ def _add_equations(q, number, rows, near, tau, out, lanes):  # pragma: no cover
     measures, multiplied with one another (21, by rows of the upper triangle) and with the distance to the tangent plane (6)."""
     one, nil = np.float32(1), np.float32(0)
     for i in range(LANES):
-        x, y, z = foot(q, out, i)
+        x, y, z = closest_point(q, out, i)
         nx, ny, nz = rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
         r = (rows[i] - x) * nx + (rows[LANES + i] - y) * ny + (rows[2 * LANES + i] - z) * nz
         share = near[i] / tau
@@ -109,7 +109,7 @@ def _add_forces(q, number, rows, near, tau, mode, out, lanes):  # pragma: no cov
     nil = np.float32(0)
     bounded, modulated = mode & ROBUST, mode & MODULATED
     for i in range(LANES):
-        x, y, z = foot(q, out, i)
+        x, y, z = closest_point(q, out, i)
         dx, dy, dz = rows[i] - x, rows[LANES + i] - y, rows[2 * LANES + i] - z
         distance = np.sqrt(dx * dx + dy * dy + dz * dz) + np.float32(1e-9)
         size = max(out[LANES + i], nil) * distance if modulated else distance

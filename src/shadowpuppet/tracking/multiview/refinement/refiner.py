@@ -14,10 +14,19 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, constants
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, part_constants
 from shadowpuppet.tracking.multiview.refinement.forces import push
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, push_inside, spheres_in
-from shadowpuppet.tracking.multiview.refinement.normal_equations import COST, EQUATIONS, FORCES, MODULATED, ROBUST, SUMS, gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.normal_equations import (
+    COST,
+    EQUATIONS,
+    FORCES,
+    MODULATED,
+    ROBUST,
+    SUMS,
+    accumulate_sums,
+    gather_down,
+)
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 
@@ -50,7 +59,7 @@ class Refiner:
         limbs = body.limbs
         self._spheres, self._nowhere = spheres_in(limbs), free_space(())
         self._limbs = limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts)
-        self._parts = constants(limbs)
+        self._parts = part_constants(limbs)
 
     def costs(self, poses: Array, cloud: Cloud, tau: float | None = None) -> Array:
         """D of eq. 31 for poses (N, D): mean over the points of min(d^2, tau^2), m^2, of shape (N,). `tau`: another than the settings'."""
@@ -111,7 +120,7 @@ class Refiner:
 def _costs(poses, chain, limbs, rows, spheres, origin, numbers, which, room, out):  # pragma: no cover
     for n in range(poses.shape[0]):
         place_one(poses[n], chain, room[1], room[2], room[3])
-        out[n] = sweep(COST, room[1], limbs, rows, spheres, origin, numbers, which, room)
+        out[n] = accumulate_sums(COST, room[1], limbs, rows, spheres, origin, numbers, which, room)
 
 
 @kernel
@@ -178,7 +187,7 @@ def _gauss_newton(poses, centre, pull, chain, limbs, rows, groups, origin, point
         least, damp = np.inf, damping
         for turn in range(iterations + 1):
             place_one(pose, chain, T, screws, work)
-            held = sweep(EQUATIONS if turn < iterations else COST, T, limbs, rows, groups, origin, numbers, which, room) / points
+            held = accumulate_sums(EQUATIONS if turn < iterations else COST, T, limbs, rows, groups, origin, numbers, which, room) / points
             held += push_inside(T, spheres, space, said, emptiness * points, origin, sums, turn < iterations) / points
             for d in range(D):
                 held += pull[d] * (pose[d] - about[d]) ** 2

@@ -12,16 +12,16 @@ from shadowpuppet.jit import compiled
 
 Array = NDArray[np.float64]
 
-ROUNDS = 2
+SMOOTHING_ROUNDS = 2
 """How often a contour is smoothed: each time a vertex becomes the mean 1 4 6 4 1 of its neighbourhood. Takes off the stairs of the
 pixels; a circle of 10 pixels' radius loses less than a tenth of a pixel."""
-EVERY = 2
+VERTEX_STRIDE = 2
 """Of the smoothed vertices every such one is kept."""
-ARM = 2
+TANGENT_ARM = 2
 """A tangent is taken from this many of those before to as many after."""
-FIRM = 2 * ROUNDS + EVERY * ARM
+SAFE_DISTANCE = 2 * SMOOTHING_ROUNDS + VERTEX_STRIDE * TANGENT_ARM
 """Vertices this near to where the picture says nothing are neither smoothed nor used as a person's."""
-STRIDE = 16
+BORDER_STRIDE = 16
 """Along the picture's border every such vertex, and every corner, is kept."""
 INSIDE, UNKNOWN, VISITED = 1, 2, 4
 """Bits of a pixel while contours are followed."""
@@ -38,7 +38,7 @@ class Contours(NamedTuple):
     """Whether a person's outline runs there, of shape (N,): not along or near the picture's border."""
 
 
-def trace(mask: Mask, seen: Mask | None = None) -> Contours:
+def trace_contours(mask: Mask, seen: Mask | None = None) -> Contours:
     """Contours of a mask (H, W), which are also the picture's borders where it is empty: of the part in which a place can be denied.
 
     `seen`, of the same shape: where the picture says anything at all; everywhere, if it is left out. Pixels that touch at a corner
@@ -129,7 +129,7 @@ def _smooth(points, starts, person):  # pragma: no cover
         firm, size = _far_from_others(own), own.size
         path = np.empty((size + 4, 2))  # two more at each end, so that it closes
         path[2:-2] = points[starts[m] : starts[m + 1]]
-        for _ in range(ROUNDS if own.any() else 0):
+        for _ in range(SMOOTHING_ROUNDS if own.any() else 0):
             _close(path)
             last = path.copy()
             for k in range(2, size + 2):
@@ -140,7 +140,7 @@ def _smooth(points, starts, person):  # pragma: no cover
         _close(path)
         for k in range(size):
             straight = path[k + 1, 0] == path[k + 3, 0] or path[k + 1, 1] == path[k + 3, 1]
-            if k % (EVERY if own[k] else STRIDE) == 0 or not (own[k] or straight):
+            if k % (VERTEX_STRIDE if own[k] else BORDER_STRIDE) == 0 or not (own[k] or straight):
                 kept_points[n, 0], kept_points[n, 1], kept_person[n] = path[k + 2, 0], path[k + 2, 1], firm[k]
                 n += 1
         kept_starts[m + 1] = n
@@ -163,9 +163,9 @@ def _far_from_others(person):  # pragma: no cover
     if person.all() or not person.any():
         return person.copy()
     for step in (1, -1):
-        since = FIRM + 1
+        since = SAFE_DISTANCE + 1
         for k in range(2 * size):  # around twice: what is before the start counts
             at = k % size if step > 0 else size - 1 - k % size
             since = since + 1 if person[at] else 0
-            out[at] &= since > FIRM
+            out[at] &= since > SAFE_DISTANCE
     return out

@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.projection import NEAR, bend_within
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import compiled, kernel
-from shadowpuppet.tracking.multiview.surface.contours import ARM
+from shadowpuppet.tracking.multiview.surface.contours import TANGENT_ARM
 
 Indices = NDArray[np.int64]
 
 FAR = 100.0
 """Rays end here (m)."""
-SHORTEST = 1e-6
+MIN_LENGTH = 1e-6
 """What is left of a ray by less than this (m) is rounding."""
-APART = 1e-3
+MIN_BASELINE = 1e-3
 """Cameras nearer to each other than this (m) say nothing about depth along each other's rays."""
-CONFIRMED = 3
+CONFIRMING_VIEWS = 3
 """A place that a view denies is kept where at least so many others see the person: two alone may see different parts of it there."""
-CHUNK = 8
+RUN_LENGTH = 8
 """Sides of a contour in a run."""
 
 
@@ -47,9 +47,9 @@ def straighten(points, starts, person, grid, width, height):  # pragma: no cover
                 low = grid[r + 1, c, axis] + x * (grid[r + 1, c + 1, axis] - grid[r + 1, c, axis])
                 lines[n, axis] = top + y * (low - top)
             n += 1
-        for k in range(size if size > 3 * ARM else 0):
+        for k in range(size if size > 3 * TANGENT_ARM else 0):
             if person[starts[m] + k]:
-                before, after = first + (k - ARM) % size, first + (k + ARM) % size
+                before, after = first + (k - TANGENT_ARM) % size, first + (k + TANGENT_ARM) % size
                 dx, dy = lines[after, 0] - lines[before, 0], lines[after, 1] - lines[before, 1]
                 x, y = lines[first + k, 0], lines[first + k, 1]
                 dz = dx * y - dy * x
@@ -60,16 +60,16 @@ def straighten(points, starts, person, grid, width, height):  # pragma: no cover
 
 
 @compiled(nogil=True)
-def circles(lines, ends):  # pragma: no cover
+def bounding_circles(lines, ends):  # pragma: no cover
     """Runs of sides of closed polygons, each within a circle: circles (3, C), first side and end of each (C, 2)."""
     count = 0
     for m in range(ends.size - 1):
-        count += (ends[m + 1] - ends[m] - 1 + CHUNK - 1) // CHUNK
+        count += (ends[m + 1] - ends[m] - 1 + RUN_LENGTH - 1) // RUN_LENGTH
     circles, spans = np.empty((3, count)), np.empty((count, 2), np.int64)
     n = 0
     for m in range(ends.size - 1):
-        for a in range(ends[m], ends[m + 1] - 1, CHUNK):
-            b = min(a + CHUNK, ends[m + 1] - 1)
+        for a in range(ends[m], ends[m + 1] - 1, RUN_LENGTH):
+            b = min(a + RUN_LENGTH, ends[m + 1] - 1)
             x, y = (lines[a, 0] + lines[b, 0]) / 2, (lines[a, 1] + lines[b, 1]) / 2
             farthest = 0.0
             for k in range(a, b + 1):
@@ -81,7 +81,7 @@ def circles(lines, ends):  # pragma: no cover
 
 
 @compiled(nogil=True)
-def length(lines, outward):  # pragma: no cover
+def contour_length(lines, outward):  # pragma: no cover
     """Length of the contours on which rays are taken."""
     total = 0.0
     for k in range(lines.shape[0] - 1):
@@ -91,7 +91,7 @@ def length(lines, outward):  # pragma: no cover
 
 
 @compiled(nogil=True)
-def spread(lines, outward, step):  # pragma: no cover
+def spaced_vertices(lines, outward, step):  # pragma: no cover
     """Vertices `step` apart along the contours, as near as there are any."""
     out, n, passed = np.empty(lines.shape[0], np.int64), 0, step / 2
     for k in range(lines.shape[0] - 1):
@@ -104,14 +104,14 @@ def spread(lines, outward, step):  # pragma: no cover
     return out[:n]
 
 
-def cut(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
+def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
         tolerated: int) -> tuple[Indices, Array]:
     """What the other views leave of rays (R, 3), z = 1, of cameras (R,): the ray (E,) of each viewing edge, and its depths (E, 2).
 
     `relative` (V, V, 4, 4) leads from view to view; `lines` are (2, N); `circles` (3, C) and `spans` (C, 2) of view j are those from
     `bounds[j]` to `bounds[j + 1]`. Where nothing is left of a ray, what one view denies is, and so on up to what `tolerated` deny.
     """
-    apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > APART  # and no view from itself
+    apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # and no view from itself
     most = lines.shape[1] + 2  # each side is crossed once at most
     scratch = np.empty(most, np.int64), np.empty(most), np.empty((most, 2)), np.empty((2, most, 3))
     polygons = lines[0], lines[1], spans, circles, bounds
@@ -134,10 +134,10 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ra
             return count, False
         while level <= tolerated and count == before:
             at, n = _leave(relative, i, apart, u, v, polygons, level, scratch)
-            k, needed = 0, max(1, (1 + CONFIRMED) * level)
+            k, needed = 0, max(1, (1 + CONFIRMING_VIEWS) * level)
             while k < n:
                 lo, hi, k = _whole(pieces, at, n, k)
-                found = lo > NEAR and hi < FAR and hi - lo > SHORTEST
+                found = lo > NEAR and hi < FAR and hi - lo > MIN_LENGTH
                 if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1

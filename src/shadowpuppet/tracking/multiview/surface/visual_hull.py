@@ -19,14 +19,14 @@ from shadowpuppet.camera.projection import make_lens
 from shadowpuppet.errors import CalibrationError, TrackingError
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.tracking.multiview.settings import HullSettings
-from shadowpuppet.tracking.multiview.surface.contours import trace
-from shadowpuppet.tracking.multiview.surface.viewing_edges import circles, cut, length, spread, straighten
+from shadowpuppet.tracking.multiview.surface.contours import trace_contours
+from shadowpuppet.tracking.multiview.surface.viewing_edges import bounding_circles, contour_length, cut_rays, spaced_vertices, straighten
 
-GRID = 4
+GRID_PITCH = 4
 """The lens is undone exactly at points this far apart (pixels), and linearly between."""
-TRUE = 0.05
+MAX_RETURN_ERROR = 0.05
 """A pixel whose ray comes back farther off than this (pixels) lies beyond what the lens's formula can say."""
-WIDEST = 20.0
+MAX_RADIUS = 20.0
 """Radius on the plane z = 1 up to which rays are used: 87 degrees off the axis."""
 
 
@@ -106,8 +106,8 @@ class VisualHull:
 
     def _edges(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """Viewing edges: camera (E,), ray (E, 3) with z = 1, normal (E, 3), both in the camera's frame, and depths (E, 2)."""
-        step = sum(length(s.lines, s.outward) for s in silhouettes) / self.settings.rays
-        taken = [spread(s.lines, s.outward, step) for s in silhouettes]
+        step = sum(contour_length(s.lines, s.outward) for s in silhouettes) / self.settings.rays
+        taken = [spaced_vertices(s.lines, s.outward, step) for s in silhouettes]
         camera = np.repeat(np.arange(len(which)), [len(t) for t in taken])
         rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
         rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
@@ -120,7 +120,7 @@ class VisualHull:
         lenses = np.stack([self._views[n].lens for n in which])
         T = self._T[which]
         relative = T[None] @ inverse(T)[:, None]  # [i, j]: from camera i to j
-        ray, depths = cut(camera, rays, relative, lines, spans, chunks, bounds, lenses, self.settings.tolerated)
+        ray, depths = cut_rays(camera, rays, relative, lines, spans, chunks, bounds, lenses, self.settings.tolerated)
         return which[camera[ray]], rays[ray], outward[ray], depths
 
     def _sampled(self, camera: NDArray[np.int64], rays: Array, outward: Array, depths: Array) -> SurfacePoints:
@@ -141,12 +141,12 @@ class VisualHull:
 def _view(camera: Camera) -> _View:
     """What of a camera does not change."""
     (width, height), lens = camera.size, make_lens(camera)
-    x, y = (np.linspace(-0.5, side - 0.5, -(-side // GRID) + 1) for side in (width, height))
+    x, y = (np.linspace(-0.5, side - 0.5, -(-side // GRID_PITCH) + 1) for side in (width, height))
     pixels = np.stack(np.meshgrid(x, y), -1)
     rays = camera.rays(pixels)
     back = camera.project(transform(inverse(camera.T_camera_world), rays))
-    good = (np.abs(back - pixels).max(-1) < TRUE) & (np.linalg.norm(rays[..., :2], axis=-1) < min(camera.reach, WIDEST))
-    numbers = [*np.diag(camera.matrix)[:2], *camera.matrix[:2, 2], width, height, camera.fisheye, min(lens[-1], WIDEST)]
+    good = (np.abs(back - pixels).max(-1) < MAX_RETURN_ERROR) & (np.linalg.norm(rays[..., :2], axis=-1) < min(camera.reach, MAX_RADIUS))
+    numbers = [*np.diag(camera.matrix)[:2], *camera.matrix[:2, 2], width, height, camera.fisheye, min(lens[-1], MAX_RADIUS)]
     flat = np.where(good[..., None], rays[..., :2], 0.0)
     return _View(flat, None if good.all() else _seen(good, camera.size), np.pad(np.array([*numbers, *camera.distortion]), (0, 8))[:16])
 
@@ -161,6 +161,6 @@ def _seen(good: NDArray[np.bool_], size: tuple[int, int]) -> Mask:
 
 def _silhouette(mask: Mask, view: _View) -> _Silhouette:
     """A mask's contours on the plane z = 1."""
-    contours = trace(mask, view.seen)
+    contours = trace_contours(mask, view.seen)
     lines, outward, ends = straighten(*contours, view.rays, view.lens[4], view.lens[5])
-    return _Silhouette(lines, ends, outward, *circles(lines, ends))
+    return _Silhouette(lines, ends, outward, *bounding_circles(lines, ends))
