@@ -51,7 +51,7 @@ def test_differing_pixels_and_overlap_are_those_counted_one_by_one(stage, which,
     given = [mask if n in which else None for n, mask in enumerate(masks)]
     observation = MultiviewObservation(stage, surface, given)
     poses = poses_beside(rng)
-    assert len(observation.seen) == len(tuple(which))
+    assert len(observation.silhouettes) == len(tuple(which))
     found = observation.differing(poses)
     assert found.shape == (len(poses),)
     for pose, share in zip(poses, found):
@@ -71,7 +71,7 @@ def test_empty_and_full_masks_say_nothing(stage):
     surface, masks = actor.filmed()[1][0]
     some = [np.zeros_like(masks[0]), np.ones_like(masks[1]), None, masks[3], masks[4]]
     observation, pose = MultiviewObservation(stage, surface, some), actor.filmed()[0][0]
-    assert len(observation.seen) == 2
+    assert len(observation.silhouettes) == 2
     assert observation.area == sum(int(mask[::2, ::2].sum()) for mask in masks[3:])
     nobody = MultiviewObservation(stage, NOTHING, [None] * 5)
     assert (nobody.area, nobody.overlap(pose)) == (0, 0.0)

@@ -11,8 +11,9 @@ import pytest
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.local_pca import Subspaces
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.tracking.multiview.exploration import ARM_NOISE, JOINT_CHANCE, NOISE_SCALES
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
-from shadowpuppet.tracking.multiview.proposals import ARM_NOISE, GLOBAL, JOINT_CHANCE, NOISE_SCALES, Proposals
+from shadowpuppet.tracking.multiview.proposals import GLOBAL, Proposals
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 SKELETON = actor.body().skeleton

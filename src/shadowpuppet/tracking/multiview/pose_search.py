@@ -1,4 +1,4 @@
-"""A first pose from one frame's hull: usual postures, or those of a library, in all directions, refined, the best kept.
+"""A first pose from one frame: usual postures and those of a library, in all directions, refined; the best are kept.
 
 Ni 2008 does not say how tracking begins.
 """
@@ -19,24 +19,26 @@ from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 from shadowpuppet.tracking.particle_filter import Particles, Weigh, evaluate
 
 HEADINGS = 16
-"""Directions that are tried."""
+"""Directions in which each posture is tried."""
 MAX_LIBRARY_POSES = 60
-"""Postures of a library that are tried."""
+"""Larger libraries are sampled."""
 COARSE_CANDIDATES, FINE_CANDIDATES = 96, 32
-"""Poses that are refined on some of the points, and on all of them."""
+"""Poses that are refined on a share of the points, and on all."""
 COARSE_STAGES = ((8, 4, 0.25), (4, 6, 0.12))
 FINE_STAGES = ((4, 4, 0.08), (1, 6, 0.05))
-"""Every so many-th point, iterations, robust scale (m)."""
+"""Stages of refinement: stride of the points, iterations, robust scale (m)."""
 ARM_ROUNDS, ARM_SAMPLES, ARM_SPREAD = 2, 600, 0.6
-"""How often each arm is looked for in the best pose, in how many places, and how far these are from the usual ones (rad)."""
+"""How often each arm of the best pose is searched, with how many candidates, and their noise about the usual arms (rad)."""
 PULL = 1e-4
-"""Pull to the posture that a search began with (see `Refiner.gauss_newton`)."""
+"""Pull to the posture before refinement (see `Refiner.gauss_newton`)."""
 
 
 def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: MultiviewObservation, library: ArrayLike | None,
            weigh: Weigh, number: int) -> Particles:
-    """The `number` best poses (number, D) for a frame's surface points, weighed by `weigh`. `library`: poses (L, D) to begin with, of which
-    place and heading do not count."""
+    """The `number` best poses (number, D) for a frame's surface points, weighed by `weigh`.
+
+    `library`: poses (L, D) to begin with, whose place and heading are ignored.
+    """
     postures = usual_postures(body.skeleton)
     known = np.asarray([] if library is None else library, float)
     if len(known):
@@ -62,7 +64,7 @@ def _refined(refiner: Refiner, observation: MultiviewObservation, poses: Array, 
 
 
 def _best(found: Particles, number: int) -> Particles:
-    """The best of some particles, the best first; over again where there are fewer."""
+    """The `number` best particles, best first; repeated if there are fewer."""
     order = found.costs.argsort(kind="stable")[:number]
     order = order[np.arange(number) % len(order)]
     return Particles(found.poses[order], found.costs[order], found.log_weights[order])
@@ -78,7 +80,7 @@ def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) ->
 
 
 def place_postures(body: Body, postures: Array, middle: Array) -> Array:
-    """Postures (L, D) in all directions, each with its limbs' middle at `middle` (3,), world: of shape (L HEADINGS, D)."""
+    """Postures (L, D) in all directions, with the limbs' centre at `middle` (3,), world; of shape (L HEADINGS, D)."""
     poses = np.repeat(postures, HEADINGS, axis=0)
     place, heading = body.skeleton.dof_indices(GLOBAL[:3]), body.skeleton.dof_indices(GLOBAL[3:])[0]
     poses[:, place] = 0.0

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import OUTVOTING_CAMERAS, TAU, Spheres, free_space, push_inside, spheres_in
-from shadowpuppet.tracking.multiview.refinement.normal_equations import SUMS
+from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 
 BENT = (-0.09, 0.05, 0.0, 0.0)
