@@ -1,4 +1,4 @@
-"""From joints over time to a motion prior of a body: poses fitted, one frame rate, gaps cut, regions learnt (Ni 2008, IV)."""
+"""A motion prior from joints over time (Ni 2008, IV): fit poses, resample to one frame rate, cut gaps, learn."""
 
 from __future__ import annotations
 
@@ -24,49 +24,54 @@ from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import PriorFit, RegionChoice, choose_regions, fit_prior
 
 RATE = 60.0
-"""Frames/s that are learnt where nothing else is wanted: HumanEva's, and the recordings' of the paper."""
+"""Default frame rate of a prior, frames/s: that of HumanEva."""
 DOUBTFUL_RESIDUAL, WRONG_RESIDUAL = 0.03, 0.1
-"""Residuals of joints, metres, from which on a motion is doubted, and refused: it is no person's, or its joints are others than ours."""
+"""Residuals of the joints, metres, from which a motion gives a warning, and an error: no person, or joints that are defined otherwise."""
 MIN_MOTION = np.radians(0.5)
-"""Root mean square deviation of the angles, rad, below which nobody moves."""
+"""Root mean square deviation of the angles, rad, below which there is no motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingClip:
-    """Joints of one file as poses."""
+    """Poses fitted to the joints of one file."""
 
     name: str
     fitted: FittedPoses
-    """At the rate it was measured at, or at the prior's where that is less."""
+    """At the file's frame rate or the prior's, whichever is lower."""
     parts: list[Array]
     """Poses (T, D) of all DOF at the prior's rate, without gaps."""
 
     @property
     def frames(self) -> int:
-        """Frames that were learnt from."""
+        """Number of frames that are learnt from."""
         return sum(map(len, self.parts))
 
 
 class TrainedPrior(NamedTuple):
-    """A prior, and what it was learnt from."""
+    """A prior, its training clips and errors."""
 
     prior: MotionPrior
     fit: PriorFit
     clips: tuple[TrainingClip, ...]
     choice: RegionChoice | None
-    """How the number of regions was chosen, where it was."""
+    """How the number of regions was chosen; None if it was given."""
     error: float
-    """Root mean square of what encoding and reconstructing loses of a pose, rad (and metres, where there are places among the DOF)."""
+    """Root mean square error of encoding and reconstructing a pose, rad (and metres, of translations)."""
     joint_error: float
-    """The same of the joints' places, metres, the pelvis held where it is."""
+    """The same of the joint positions, metres, with the root held."""
 
 
 def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], settings: PriorSettings | None = None, *,
                 body: str = "anatomical", rate: float = RATE, candidates: Sequence[int] = ()) -> TrainedPrior:
-    """Learn a motion from joints (metres, Z up) of one or several clips, by their names, of any frame rates and people.
+    """Learn a motion prior from joints (metres, Z up) of clips by name, of any frame rate and person.
 
-    `candidates`: numbers of regions to choose among, instead of that in `settings`. Raises `ShadowPuppetError` naming the clip, where
-    joints are not a whole person's, or too few frames are left for the regions; warns where they fit badly, or nobody moves.
+    Args:
+        body: the body model whose poses are learnt.
+        rate: frame rate of the prior, frames/s.
+        candidates: numbers of regions to choose from, instead of that in `settings`.
+
+    Raises `ShadowPuppetError`, naming the clip, if joints are not a whole person's or too few frames are left for the regions; warns of a
+    bad fit and of clips without motion.
     """
     settings = settings or PriorSettings()
     if not tables:
@@ -88,14 +93,13 @@ def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], sett
 
 
 def modelled(skeleton: Skeleton, dofs: str = "articulation") -> tuple[str, ...]:
-    """DOF that a prior of a whole body models: `articulation` is all but place and heading, `all` is all, as in the paper."""
+    """Names of the DOF that a prior models: `articulation`: all but position and heading; `all`: all, as in the paper."""
     return tuple(name for name in skeleton.dof_names if dofs == "all" or name not in GLOBAL)
 
 
 def matched(prior: MotionPrior, skeleton: Skeleton, rate: float) -> MotionPrior:
-    """The prior for a skeleton and frames a second: transitions of more or fewer steps than it has learnt.
-
-    Of a step that is a share f of the learnt one, (1 - f) stays. Raises `ShadowPuppetError` where the prior is of another body.
+    """The prior with transitions for another frame rate (frames/s): powers of the transition matrix A, and for a part f of a step
+    (1 - f) I + f A. Raises `ShadowPuppetError` if the prior is of another body than the skeleton.
     """
     other = [name for name in prior.names if name not in skeleton.dof_names]
     if other or not prior.names:
@@ -109,7 +113,7 @@ def matched(prior: MotionPrior, skeleton: Skeleton, rate: float) -> MotionPrior:
 
 
 def reconstruction_errors(prior: MotionPrior, clips: Sequence[TrainingClip]) -> tuple[float, float]:
-    """Root mean square of what encoding and reconstructing the clips' poses loses: of the DOF, and of the joints' places (metres)."""
+    """Root mean square errors of encoding and reconstructing the clips' poses: of the DOF, and of the joint positions (metres)."""
     squares, places = list[Array](), list[Array]()
     for clip in clips:
         body = clip.fitted.body
@@ -124,7 +128,7 @@ def reconstruction_errors(prior: MotionPrior, clips: Sequence[TrainingClip]) -> 
 
 
 def _sides(tables: Mapping[str, JointTable], both: bool) -> Iterator[tuple[str, JointTable]]:
-    """Tables by name, and their mirror images."""
+    """Tables by name, and with `both` their mirror images."""
     for name, table in tables.items():
         yield name, table
         if both:
@@ -132,7 +136,7 @@ def _sides(tables: Mapping[str, JointTable], both: bool) -> Iterator[tuple[str, 
 
 
 def _clip(name: str, table: JointTable, body: str, rate: float) -> TrainingClip:
-    """Poses of a table: slower ones are fitted first and then resampled, which leaves bones their length, faster ones the other way."""
+    """Poses of a table. A lower frame rate is fitted before it is resampled, which keeps the bones' lengths; a higher one after."""
     known = np.flatnonzero(np.isfinite(table.positions).all(2).any(0))
     table = table.select([table.names[n] for n in known])
     slower = len(table.times) < 2 or np.median(np.diff(table.times)) >= 1 / rate
@@ -156,7 +160,7 @@ def _check_fit(name: str, fitted: FittedPoses) -> None:
 
 
 def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
-    """Headings without whole turns between the parts."""
+    """Poses of the parts, with headings that differ by no whole turns."""
     column = skeleton.dof_names.index("root_heading")
     base, out = float(np.median(parts[0][:, column])), []
     for part in parts:

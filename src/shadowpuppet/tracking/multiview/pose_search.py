@@ -71,7 +71,7 @@ def _best(found: Particles, number: int) -> Particles:
 
 
 def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) -> Array:
-    """A pose (D,) with other arms on a side, from all over what they can do, of shape (ARMS_TRIED, D)."""
+    """A pose (D,) with other arms on one side, near the usual ones, of shape (ARMS_TRIED, D)."""
     skeleton, usual = body.skeleton, usual_arms(body.skeleton, side)
     poses, dofs = np.repeat(pose[None], ARM_SAMPLES, axis=0), skeleton.dof_indices(usual)
     arms = np.stack(list(usual.values()), 1)
