@@ -145,6 +145,54 @@ def test_one_particle_is_all_that_image_forces_have():
     assert all(same(a, b) for a, b in zip(by_default, forced))
 
 
+@pytest.mark.parametrize("method", ["hybrid", "particle_filter"])
+def test_ten_cycles_of_the_paper_s_preset_stay_where_the_person_is(method):
+    """The motion since the last frame is added to proposals once a frame: once a cycle, it would grow exponentially."""
+    poses, seen = actor.filmed("cylinders")
+    of = tracker("ni2008", "cylinders", method=method, particles=12, cycles=10, forces={"iterations": 6})
+    states = followed(of, seen[:7])
+    assert all(np.isfinite([*state.pose, *state.velocity, state.cost]).all() for state in states)
+    assert errors(of, states, poses[:7]).max() < 0.4
+
+
+def test_each_cycle_has_less_noise_than_the_last():
+    """Annealing: the spread of the proposals goes with `cooling` to the power of the cycle."""
+    _, seen = actor.filmed()
+    of = tracker(method="particle_filter", particles=200, cycles=3, cooling=0.25, estimate="mean")
+    state, scales = of.start(np.random.default_rng(0), *seen[0]), []
+    proposals = of.proposals
+
+    def recorded(rng, poses, last, velocity, unlike, scale=1.0):
+        scales.append((scale, velocity.any()))
+        return proposals(rng, poses, last, velocity, unlike, scale)
+
+    of.__dict__["proposals"] = recorded
+    of.cycle(np.random.default_rng(0), state._replace(velocity=np.ones_like(state.pose)), MultiviewObservation(of.views, *seen[1]))
+    assert scales == [(1.0, True), (0.25, False), (0.0625, False)]
+
+
+@pytest.mark.parametrize(("cameras", "particles", "free_space"), [(5, 40, True), (6, 16, False), (7, 16, False)])
+def test_from_six_cameras_on_there_are_fewer_particles_and_no_free_space(cameras, particles, free_space, monkeypatch):
+    views = (actor.cameras() * 2)[:cameras]
+    of = MultiviewTracker(actor.body(), views, MultiviewSettings())
+    assert of.number == particles
+    points, masks = actor.filmed()[1][0]
+    asked = []
+    monkeypatch.setattr(MultiviewObservation, "space", property(lambda _: asked.append(True)))
+    of.refine(MultiviewObservation(of.views, points, (masks * 2)[:cameras]), np.zeros(len(NAMES)))
+    assert bool(asked) == free_space
+
+
+@pytest.mark.parametrize("iterations", [1, 5])
+def test_an_odd_number_of_force_iterations_is_done_in_full(iterations, monkeypatch):
+    done, of, (points, masks) = [], tracker("ni2008", "cylinders", forces={"iterations": iterations}), actor.filmed("cylinders")[1][0]
+    monkeypatch.setattr(type(of.refiner), "forces", lambda _, poses, cloud, settings: done.append(settings.iterations) or poses)
+    refine = of.refine(MultiviewObservation(of.views, points, masks), np.zeros(len(of.body.skeleton.dofs)))
+    assert refine is not None
+    refine(np.zeros((1, len(of.body.skeleton.dofs))))
+    assert sum(done) == iterations
+
+
 def test_a_state_says_what_its_pose_costs_and_how_it_moved():
     of = tracker()
     _, seen = actor.filmed()

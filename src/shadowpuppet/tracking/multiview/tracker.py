@@ -100,7 +100,8 @@ class MultiviewTracker:
             # Step 2, selection: draw particles by their weights.
             poses = particles.poses[self.resample(rng, particles.log_weights, self.number)]
             # Step 3, sampling: draw each particle's next pose (eqs. 24-28).
-            poses = self.proposals(rng, poses, pose, state.velocity, observation.differing, s.cooling**cycle)
+            velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
+            poses = self.proposals(rng, poses, pose, velocity, observation.differing, s.cooling**cycle)
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
             poses = poses if refine is None else refine(poses)
             # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
