@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -140,13 +140,11 @@ class MultiviewTracker:
 
     def refine(self, observation: MultiviewObservation, last: Array) -> Refine | None:
         """The function that refines poses (N, D); `last`: the last estimate (D,)."""
-        s, g = self.settings, self.settings.gauss_newton
+        s = self.settings
         if s.method == "particle_filter":
             return None
         if s.refinement == "forces" or s.method == "image_force":
-            some, half = observation.cloud(g.share), s.forces.iterations // 2
-            coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
-            return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), observation.full, fine)
+            return lambda poses: self.refiner.forces(poses, observation.full, s.forces)  # eqs. 32-41, on all points
         return self._gauss_newton(observation, last)
 
     def _gauss_newton(self, observation: MultiviewObservation, last: Array) -> Refine:
