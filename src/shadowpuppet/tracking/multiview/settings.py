@@ -37,6 +37,8 @@ class SurfaceSettings:
     """Weight of the normals: a distance is multiplied by 1 - epsilon cos of the angle between them."""
     tau: Positive = 0.05
     """Bound (m) of a point's distance."""
+    nearest: Literal["euclidean", "modulated"] = "modulated"
+    """How a point's nearest body part is chosen: by the plain distance, as in the paper, or by the one that the normals have multiplied."""
 
 
 @checked
@@ -144,7 +146,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "velocity": 1.0,
         "silhouettes": 0.0,
         "posture": 0.0,
-        "surface": {"epsilon": 0.3, "tau": 0.06},
+        "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
     },
 }
 """Named settings of the tracker for several cameras, as `PRESETS`."""

@@ -49,11 +49,10 @@ def test_normal_equations_are_those_of_the_plain_version(seen):
     made, of = make_cloud(*cloud), Refiner(body, SURFACE)
     D = len(pose)
     H, g = np.zeros((D, D)), np.zeros(D)
-    numbers = np.float32(SURFACE.epsilon), np.float32(SURFACE.tau)
     room = of._room()
     place_one(pose, of._chain, room[1], room[2], room[3])
     points = made.rows, made.spheres, made.origin
-    gauss_newton.sum_equations(room[1], of._limbs, *points, numbers, of._which(made), room)
+    gauss_newton.sum_equations(room[1], of._limbs, *points, of._numbers(), of._which(made), room)
     add_descendants(of._chain, room[6])
     gauss_newton.normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
     plain = naive.normal_equations(body, pose, *cloud, SURFACE)

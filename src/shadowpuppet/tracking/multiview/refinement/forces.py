@@ -35,12 +35,12 @@ def _sum_forces(bounded, modulated, T, limbs, rows, spheres, origin, numbers, wh
     """Fill the joints' sums of forces and moments, under transforms T (J, 3, 4)."""
     parts, _, _, _, out, lanes, sums = room
     joints, rotations, starts = limbs
-    epsilon, tau = numbers
+    epsilon, choice, tau = numbers
     place_parts(T, origin, joints, rotations, starts, parts)
     lanes[:] = 0
     for group in range(spheres.shape[0]):
         near, points = which[group], rows[group]
-        nearest(parts, points, spheres[group], epsilon, near)
+        nearest(parts, points, spheres[group], epsilon, choice, near)
         for i in range(LANES):
             if is_first_of_part(near, i):
                 number = near[LANES + i]

@@ -16,13 +16,13 @@ def sum_equations(T, limbs, rows, spheres, origin, numbers, which, room):  # pra
     """Fill the joints' sums of the normal equations, under transforms T (J, 3, 4); returns the summed cost, as `sum_costs`."""
     parts, _, _, _, out, lanes, sums = room
     joints, rotations, starts = limbs
-    epsilon, tau = numbers
+    epsilon, choice, tau = numbers
     place_parts(T, origin, joints, rotations, starts, parts)
     lanes[:] = 0
     total = 0.0
     for group in range(spheres.shape[0]):
         near, points = which[group], rows[group]
-        nearest(parts, points, spheres[group], epsilon, near)
+        nearest(parts, points, spheres[group], epsilon, choice, near)
         total += bounded_cost(points, near, tau)
         for i in range(LANES):
             if is_first_of_part(near, i):

@@ -20,11 +20,11 @@ def sum_costs(T, limbs, rows, spheres, origin, numbers, which, room):  # pragma:
     """Sum over the points of min(d^2, tau^2) (eq. 30), under transforms T (J, 3, 4)."""
     parts = room[0]
     joints, rotations, starts = limbs
-    epsilon, tau = numbers
+    epsilon, choice, tau = numbers
     place_parts(T, origin, joints, rotations, starts, parts)
     total = 0.0
     for group in range(spheres.shape[0]):
-        nearest(parts, rows[group], spheres[group], epsilon, which[group])
+        nearest(parts, rows[group], spheres[group], epsilon, choice, which[group])
         total += bounded_cost(rows[group], which[group], tau)
     return total
 

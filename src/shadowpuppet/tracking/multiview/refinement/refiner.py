@@ -16,7 +16,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, part_constants
+from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, normal_weights, part_constants
 from shadowpuppet.tracking.multiview.refinement.forces import push
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, spheres_in
 from shadowpuppet.tracking.multiview.refinement.gauss_newton import descend
@@ -93,8 +93,8 @@ class Refiner:
              cloud.rows, cloud.spheres, cloud.origin, self._numbers(), self._which(cloud), self._room(), self._system()[2])
         return poses
 
-    def _numbers(self, tau: float | None = None) -> tuple[np.float32, np.float32]:
-        return np.float32(self.settings.epsilon), np.float32(self.settings.tau if tau is None else tau)
+    def _numbers(self, tau: float | None = None) -> tuple[np.float32, ...]:
+        return *normal_weights(self.settings), np.float32(self.settings.tau if tau is None else tau)
 
     def _room(self) -> tuple[NDArray[Any], ...]:
         """Work arrays of the kernels; new ones for each call, so that threads do not share them."""
@@ -108,7 +108,7 @@ class Refiner:
 
     @staticmethod
     def _which(cloud: Cloud) -> NDArray[np.float32]:
-        return np.zeros((len(cloud.rows), 2 * LANES), np.float32)
+        return np.zeros((len(cloud.rows), 3 * LANES), np.float32)
 
 
 @kernel
