@@ -14,7 +14,7 @@ OVERLAP_DROP = 0.2
 
 
 class TrackerState(Protocol):
-    """What the policy reads of a tracker's state."""
+    """The part of a tracker's state that the policy reads."""
 
     @property
     def overlap(self) -> float:

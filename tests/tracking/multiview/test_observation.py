@@ -52,7 +52,7 @@ def test_differing_pixels_and_overlap_are_those_counted_one_by_one(stage, which,
     observation = MultiviewObservation(stage, surface, given)
     poses = poses_beside(rng)
     assert len(observation.silhouettes) == len(tuple(which))
-    found = observation.differing(poses)
+    found = observation.mismatch(poses)
     assert found.shape == (len(poses),)
     for pose, share in zip(poses, found):
         differing, area, overlaps = plain(stage, given, pose)
@@ -63,7 +63,7 @@ def test_differing_pixels_and_overlap_are_those_counted_one_by_one(stage, which,
 
 def test_the_true_pose_differs_least(stage, rng):
     observation, pose = seen(stage), actor.filmed()[0][0]
-    assert observation.differing(pose[None])[0] < 0.1 < observation.differing(poses_beside(rng)).min()
+    assert observation.mismatch(pose[None])[0] < 0.1 < observation.mismatch(poses_beside(rng)).min()
     assert observation.overlap(pose) > 0.9
 
 
@@ -75,7 +75,7 @@ def test_empty_and_full_masks_say_nothing(stage):
     assert observation.area == sum(int(mask[::2, ::2].sum()) for mask in masks[3:])
     nobody = MultiviewObservation(stage, NOTHING, [None] * 5)
     assert (nobody.area, nobody.overlap(pose)) == (0, 0.0)
-    np.testing.assert_array_equal(nobody.differing(pose[None]), [0.0])
+    np.testing.assert_array_equal(nobody.mismatch(pose[None]), [0.0])
 
 
 @pytest.mark.parametrize("share", [1, 2, 3, 7])

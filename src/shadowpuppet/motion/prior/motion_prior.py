@@ -82,27 +82,20 @@ class MotionPrior:
         return self.subspaces.reconstruct(values, self._checked_regions(codes.regions, len(values)))
 
     def propose(self, rng: np.random.Generator, poses: ArrayLike, regions: ArrayLike | None = None, keep: float = 0.0) -> Proposal:
-        """Poses drawn for the next frame, from poses (N, D) in regions (N,) (Ni 2008, V-A, step 3).
+        """Poses drawn for the next frame, from poses (N, D) in regions (N,; default: the nearest) (Ni 2008, V-A, step 3).
 
-        Args:
-            regions: the poses' states; default: each pose's nearest region.
-            keep: share of a pose's offset from its last region's subspace that the proposal keeps; none in the paper.
-
-        Raises `ShadowPuppetError` for arrays of the wrong shape.
+        `keep`: share of a pose's offset from its last region's subspace that the proposal keeps; none in the paper. Raises
+        `ShadowPuppetError` for arrays of the wrong shape.
         """
         poses = self._checked(poses)
         regions = self.subspaces.nearest(poses)[0] if regions is None else self._checked_regions(regions, len(poses))
         drawn = self._follow(regions, 1 - rng.random(len(poses)))  # step 3a: the next state, eq. 24
         values = self.subspaces.project(poses, drawn)  # step 3b: project into its subspace, eq. 27
-        values += rng.standard_normal(values.shape) * self._deviations[drawn]  # step 3c: noise of the region's variances
+        values += rng.standard_normal(values.shape) * np.sqrt(self.subspaces.variances)[drawn]  # step 3c: noise of the region's variances
         proposed = self.subspaces.reconstruct(values, drawn)  # step 3d: reconstruct, eq. 28
         if keep:
             proposed += keep * (poses - self.subspaces.reconstruct(self.subspaces.project(poses, regions), regions))
         return Proposal(proposed, drawn)
-
-    @cached_property
-    def _deviations(self) -> Array:
-        return np.sqrt(self.subspaces.variances)
 
     @cached_property
     def _cumulative(self) -> Array:

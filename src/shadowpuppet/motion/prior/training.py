@@ -63,15 +63,10 @@ class TrainedPrior(NamedTuple):
 
 def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], settings: PriorSettings | None = None, *,
                 body: str = "anatomical", rate: float = RATE, candidates: Sequence[int] = ()) -> TrainedPrior:
-    """Learn a motion prior from joints (metres, Z up) of clips by name, of any frame rate and person.
+    """Learn a motion prior of a body, at `rate` frames/s, from joints (metres, Z up) of clips by name, of any frame rate and person.
 
-    Args:
-        body: the body model whose poses are learnt.
-        rate: frame rate of the prior, frames/s.
-        candidates: numbers of regions to choose from, instead of that in `settings`.
-
-    Raises `ShadowPuppetError`, naming the clip, if joints are not a whole person's or too few frames are left for the regions; warns of a
-    bad fit and of clips without motion.
+    `candidates`: numbers of regions to choose from, instead of that in `settings`. Raises `ShadowPuppetError`, naming the clip, if joints
+    are not a whole person's or too few frames are left for the regions; warns of a bad fit and of clips without motion.
     """
     settings = settings or PriorSettings()
     if not tables:

@@ -28,10 +28,10 @@ class Exploration:
         arms = (usual_arms(skeleton, side) for side in ("left", "right"))
         self.arms = [(skeleton.dof_indices(arm), np.stack(list(arm.values()), 1)) for arm in arms]
 
-    def __call__(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array], scale: float) -> Array:
+    def __call__(self, rng: np.random.Generator, poses: Array, mismatch: Callable[[Array], Array], scale: float) -> Array:
         """Poses (N, D) with `scale` times the noise on some joints, the last of them with another arm.
 
-        `unlike`: silhouette cost (M,) of poses (M, D), which decides between candidates for an arm.
+        `mismatch`: silhouette cost (M,) of poses (M, D), which decides between candidates for an arm.
         """
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
         scales = rng.choice(NOISE_SCALES, size=(len(poses), 1))
@@ -39,10 +39,10 @@ class Exploration:
         out = poses + noise * scales * moved[:, self.owners]
         explored = round(self.share * len(poses))
         if explored:
-            out[-explored:] = self._other_arms(rng, out[-explored:], unlike)
+            out[-explored:] = self._other_arms(rng, out[-explored:], mismatch)
         return out
 
-    def _other_arms(self, rng: np.random.Generator, poses: Array, unlike: Callable[[Array], Array]) -> Array:
+    def _other_arms(self, rng: np.random.Generator, poses: Array, mismatch: Callable[[Array], Array]) -> Array:
         """Poses (N, D) with another arm each: of candidates near their own and near usual ones, the one of least silhouette cost."""
         out = np.repeat(poses, ARM_CANDIDATES, axis=0)
         for n, pose in enumerate(poses):
@@ -52,4 +52,4 @@ class Exploration:
             candidates = about + ARM_NOISE * rng.standard_normal((ARM_CANDIDATES, len(dofs)))
             out[n * ARM_CANDIDATES : (n + 1) * ARM_CANDIDATES, dofs] = candidates
         out = self.skeleton.clamp(out)
-        return out[np.arange(len(poses)) * ARM_CANDIDATES + unlike(out).reshape(-1, ARM_CANDIDATES).argmin(1)]
+        return out[np.arange(len(poses)) * ARM_CANDIDATES + mismatch(out).reshape(-1, ARM_CANDIDATES).argmin(1)]

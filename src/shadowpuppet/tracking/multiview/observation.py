@@ -70,7 +70,7 @@ class MultiviewObservation:
         """Pixels of all silhouettes together."""
         return sum(observation.area for _, observation in self.silhouettes)
 
-    def differing(self, poses: Array) -> Array:
+    def mismatch(self, poses: Array) -> Array:
         """Pixels in which drawn poses (N, D) and silhouettes differ (Liu 2011, eq. 2), as shares (N,) of the silhouettes' area."""
         differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.silhouettes]
         return sum(differing, np.zeros(len(poses))) / max(self.area, 1)

@@ -54,7 +54,7 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
         tried = _other_arms(rng, body, found.best, side)
         tried = tried[refiner.costs(tried, observation.cloud(share), COARSE_STAGES[1][2]).argsort(kind="stable")[:FINE_CANDIDATES]]
         others = evaluate(_refined(refiner, observation, tried, FINE_STAGES), weigh)
-        found = _best(Particles(*(np.concatenate(pair) for pair in zip(found, others, strict=True))), number)
+        found = _best(Particles(*(np.concatenate(pair) for pair in zip(found[:3], others[:3], strict=True))), number)
     return found
 
 
@@ -67,7 +67,7 @@ def _best(found: Particles, number: int) -> Particles:
     """The `number` best particles, best first; repeated if there are fewer."""
     order = found.costs.argsort(kind="stable")[:number]
     order = order[np.arange(number) % len(order)]
-    return Particles(found.poses[order], found.costs[order], found.log_weights[order])
+    return found.select(order)
 
 
 def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) -> Array:

@@ -74,15 +74,8 @@ def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
 def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
             first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings,
             library: Array | None = None) -> SizeEstimate[Measured]:
-    """Sizes of the person in the `first` frames (surface points and masks, in order of time).
-
-    Args:
-        make: makes a body of some sizes.
-        expected: the sizes before the frames are seen, with standard deviations `spread` (K,).
-        library: poses (L, D) to begin a search with.
-
-    Raises `TrackingError` if no person is found.
-    """
+    """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
+    (K,). Raises `TrackingError` if no person is found."""
     plain, sizes, residual = replace(settings, method="hybrid", refinement="gauss_newton"), expected, np.nan
     for _ in range(ROUNDS if (spread > 0).any() else 0):
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library)
@@ -107,10 +100,8 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
 
 def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cameras: Sequence[Camera],
                   first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings) -> float | None:
-    """Height (m) of the person in the `first` frames: of bodies of several heights, made by `make`, that which fits some frames best.
-
-    None if no person is visible. The hull's extent alone is no height: arms may be overhead, or the person crouches.
-    """
+    """Height (m) of the person in the `first` frames: of bodies of several heights, that which fits some frames best; None if no person is
+    visible. The hull's extent alone is no height: arms may be overhead, or the person crouches."""
     extent = observed_height(first)
     if extent is None:
         return None

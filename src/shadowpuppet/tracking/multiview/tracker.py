@@ -21,7 +21,7 @@ from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
-from shadowpuppet.tracking.particle_filter import Particles, Weigh, evaluate
+from shadowpuppet.tracking.particle_filter import Particles, Weigh
 from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
@@ -69,12 +69,10 @@ class MultiviewTracker:
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:
-        """The state after a new frame. If no person is visible the pose is held; after a loss the person is searched for (`recover`).
+        """The state after a new frame's surface points, and the masks (H, W) that they were made from, one per camera.
 
-        Args:
-            points: surface points of the visual hull.
-            masks: the masks (H, W) that they were made from, one per camera.
-            also: a cost of your own, poses (N, D) to m^2 (N,), added to that of the surface.
+        If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
+        (N, D) to m^2 (N,), added to that of the surface.
         """
         observation = MultiviewObservation(self.views, points, masks, also)
         return track_or_recover(
@@ -95,17 +93,17 @@ class MultiviewTracker:
         """The filter's loop body (V-A), `cycles` times; the steps are numbered as in the paper."""
         s, pose = self.settings, state.pose
         weigh, refine = self.weigh(observation), self.refine(observation, state.pose)
-        particles = state.particles  # step 1: the last frame's particles
+        particles = state.particles  # step 1: the last frame's particles (s, x, w)
         for cycle in range(s.cycles):
             # Step 2, selection: draw particles by their weights.
-            poses = particles.poses[self.resample(rng, particles.log_weights, self.number)]
-            # Step 3, sampling: draw each particle's next pose (eqs. 24-28).
+            selected = particles.select(self.resample(rng, particles.log_weights, self.number))
+            # Step 3, sampling: draw each particle's next state and pose (eqs. 24-28).
             velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
-            poses = self.proposals(rng, poses, pose, velocity, observation.differing, s.cooling**cycle)
+            poses, regions = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
             poses = poses if refine is None else refine(poses)
             # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
-            particles = evaluate(poses, weigh)
+            particles = Particles(poses, *weigh(poses), regions)
             pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
         return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
@@ -133,7 +131,7 @@ class MultiviewTracker:
         """Costs beside the paper's; none with `ni2008`."""
         s, extras = self.settings, list[Cost]()
         if s.silhouettes:
-            extras.append(lambda poses: s.silhouettes * observation.differing(poses))
+            extras.append(lambda poses: s.silhouettes * observation.mismatch(poses))
         if s.posture:
             extras.append(lambda poses: s.posture * self.posture_prior.penalty(poses))
         return extras if observation.also is None else [*extras, observation.also]
