@@ -54,7 +54,8 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
         tried = _other_arms(rng, body, found.best, side)
         tried = tried[refiner.costs(tried, observation.cloud(share), COARSE_STAGES[1][2]).argsort(kind="stable")[:FINE_CANDIDATES]]
         others = evaluate(_refined(refiner, observation, tried, FINE_STAGES), weigh)
-        found = _best(Particles(*(np.concatenate(pair) for pair in zip(found[:3], others[:3], strict=True))), number)
+        poses, costs, log_weights = (np.concatenate(pair) for pair in zip(found[:3], others[:3], strict=True))
+        found = _best(Particles(poses, costs, log_weights), number)
     return found
 
 
