@@ -12,7 +12,7 @@ from papers.liu2011.shown import stem, told
 from shadowpuppet.camera.drawing import draw_model, in_colour, matching
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.status import UNCERTAIN
+from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 from shadowpuppet.video import Image
 
 COLUMNS, WIDTH, GREYS = 6, 1200, 6
@@ -41,9 +41,9 @@ def make(request: Request) -> Outcome:
 def followed(runs: Runs, part: Part) -> str:
     """How well all runs follow a motion."""
     during = runs.overlaps[:, (runs.times >= part.start) & (runs.times <= part.end)]
-    poor = int((np.nanmin(during, axis=1) < UNCERTAIN).sum())
+    poor = int((np.nanmin(during, axis=1) < UNCERTAIN_OVERLAP).sum())
     return (f"Model and silhouette overlap by {np.nanmean(during):.2f} on average over all runs; in {poor} of {len(during)} by less than "
-            f"{UNCERTAIN} at some time.")
+            f"{UNCERTAIN_OVERLAP} at some time.")
 
 
 def moments(case: Case, part: Part) -> list[int]:

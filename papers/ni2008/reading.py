@@ -28,7 +28,7 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
-from shadowpuppet.tracking.multiview.size_estimation import measure, spread_of
+from shadowpuppet.tracking.multiview.size_estimation import estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 OPENING, OPENED, FEW = 2.0, 24, 5
@@ -127,5 +127,6 @@ def _measured(cameras: tuple[Camera, ...], times: Array, bits: list[list[NDArray
     first = [(surface[n], [np.unpackbits(row, axis=1, count=camera.size[0]).astype(bool) for row, camera in zip(bits[n], cameras)])
              for n in chosen]
     settings = make_multiview_settings("ni2008")
-    return measure(np.random.default_rng(0), partial(make_body, BODY), sizes, spread_of(sizes, shown=True), cameras, first, settings,
-                   library).sizes
+    deviations = size_deviations(sizes, shown=True)
+    return estimate_sizes(np.random.default_rng(0), partial(make_body, BODY), sizes, deviations, cameras, first, settings,
+                          library).sizes

@@ -22,8 +22,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.training import modelled
-from shadowpuppet.motion.prior.vqpca import Fit, fit_prior
-from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.motion.prior.vqpca import PriorFit, fit_prior
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
@@ -145,14 +145,14 @@ def follow(case: Case, way: Way, seed: int) -> Track:
         if state is None:
             state = searching.start(rng, points, masks)
         elif len(points.points):
-            state = tracker.cycle(rng, state, Evidence(tracker.stage, points, masks))
+            state = tracker.cycle(rng, state, MultiviewObservation(tracker.views, points, masks))
         seconds.append(time.process_time() - start)
         poses.append(state.pose)
         overlap.append(state.overlap)
     return Track(np.array(poses), np.array(seconds), np.array(overlap))
 
 
-def learn(case: Case, regions: int, seed: int) -> Fit:
+def learn(case: Case, regions: int, seed: int) -> PriorFit:
     """The motion prior of a case's training poses."""
     names = modelled(case.body.skeleton)
     poses = case.training[:, case.body.skeleton.dof_indices(names)]

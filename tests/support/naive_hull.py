@@ -10,7 +10,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.projection import NEAR_PLANE
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.tracking.multiview.surface.viewing_edges import CONFIRMED, FAR, SHORTEST
+from shadowpuppet.tracking.multiview.surface.viewing_edges import CONFIRMING_VIEWS, FAR, MIN_LENGTH
 
 
 def sides(mask: Mask, seen: Mask | None = None) -> dict[tuple[float, float], tuple[tuple[int, int], bool]]:
@@ -55,9 +55,9 @@ def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Se
             if fits and start is None:
                 start = ends[k]
             elif not fits and start is not None:
-                needed = max(1, (1 + CONFIRMED) * level)
+                needed = max(1, (1 + CONFIRMING_VIEWS) * level)
                 seen = sum(_pictured(ray * (start + ends[k]) / 2, relative[j], cameras[j]) for j in others)
-                if start > NEAR_PLANE and ends[k] < FAR and ends[k] - start > SHORTEST and seen >= needed:
+                if start > NEAR_PLANE and ends[k] < FAR and ends[k] - start > MIN_LENGTH and seen >= needed:
                     out.append((start, ends[k]))
                 start = None
         if out:

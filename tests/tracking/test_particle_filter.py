@@ -1,4 +1,4 @@
-"""One estimation cycle: who is resampled, moved, refined and weighed; against Kalman's filter where that is exact."""
+"""One estimation cycle: resampled, moved and weighed; against Kalman's filter where that is exact."""
 
 from __future__ import annotations
 
@@ -17,22 +17,17 @@ def weigh(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return costs, -(costs**2)
 
 
-def test_a_step_resamples_then_moves_then_refines_then_weighs(rng):
+def test_a_step_resamples_then_moves_then_weighs(rng):
     particles = evaluate(np.array([[3.0], [1.0], [2.0]]), weigh)
     seen = {}
 
     def propose(generator, poses):
         assert generator is rng
         seen["proposed"] = poses.copy()
-        return poses + 10
+        return poses + 1
 
-    def refine(poses):
-        seen["refined"] = poses.copy()
-        return poses - 9
-
-    after = step(rng, particles, resample=partial(deterministic, survival=0.7), propose=propose, weigh=weigh, refine=refine, number=3)
+    after = step(rng, particles, resample=partial(deterministic, survival=0.7), propose=propose, weigh=weigh, number=3)
     np.testing.assert_array_equal(seen["proposed"], [[1], [2], [1]])
-    np.testing.assert_array_equal(seen["refined"], [[11], [12], [11]])
     np.testing.assert_array_equal(after.poses, [[2], [3], [2]])
     np.testing.assert_array_equal(after.costs, [2, 3, 2])
     np.testing.assert_array_equal(after.log_weights, [-4, -9, -4])
@@ -41,6 +36,13 @@ def test_a_step_resamples_then_moves_then_refines_then_weighs(rng):
 def test_the_best_pose_is_that_of_least_cost_whatever_the_weights():
     particles = Particles(np.array([[1.0, 1], [2, 2], [3, 3]]), np.array([5.0, 4, 6]), np.array([0.0, -9, -1]))
     np.testing.assert_array_equal(particles.best, [2, 2])
+
+
+def test_selected_particles_keep_all_that_they_carry():
+    particles = Particles(np.array([[1.0], [2], [3]]), np.array([5.0, 4, 6]), np.array([0.0, -9, -1]), np.array([7, 8, 9]))
+    for values, chosen in zip(particles, particles.select(np.array([2, 0, 0, 1])), strict=True):
+        np.testing.assert_array_equal(chosen, values[[2, 0, 0, 1]])
+    assert len(particles._replace(regions=np.zeros(0, int)).select(np.array([1])).regions) == 0  # a method without states
 
 
 @pytest.mark.parametrize("number", [None, 1, 2, 5, 40])

@@ -16,7 +16,7 @@ from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import settings_of, validate
 
 if TYPE_CHECKING:
-    from shadowpuppet.motion.prior.training import Trained
+    from shadowpuppet.motion.prior.training import TrainedPrior
 
     PriorFlags = Any
 else:
@@ -109,7 +109,7 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
         show(pairs([("made", str(target)), ("of", content)]))
 
 
-def _prior_tables(trained: Trained, file: Path) -> Iterator[Any]:
+def _prior_tables(trained: TrainedPrior, file: Path) -> Iterator[Any]:
     """The clips that a motion prior was learnt from, how well it fits them, and where it is."""
     import numpy as np
 

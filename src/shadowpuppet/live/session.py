@@ -25,7 +25,7 @@ from shadowpuppet.pipeline.track import motion_frame, named_body, next_state
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
-from shadowpuppet.tracking.status import LOST
+from shadowpuppet.tracking.status import LOST_OVERLAP
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
 
@@ -147,7 +147,7 @@ class Session:
         """Waits for the fit."""
         if (fit := self._measured()) is None:
             return Outcome(self._view(image, self._mask(shot, image)))
-        if np.median(list(fit.overlaps.values())) < LOST:
+        if np.median(list(fit.overlaps.values())) < LOST_OVERLAP:
             self._waiter, self.phase = Waiter(self.settings.still), "waiting"
             self._waiter.message = "no person's shape: stand whole in the picture, facing the camera"
             return Outcome(self._view(image))

@@ -20,7 +20,7 @@ from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.motion.prior.training import RATE, Trained, matched, train_prior
+from shadowpuppet.motion.prior.training import RATE, TrainedPrior, matched, train_prior
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.threads import one_blas_thread
 
@@ -30,7 +30,7 @@ CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)
 
 @one_blas_thread()
 def prior_from_files(motions: Sequence[str | Path], file: str | Path, settings: PriorSettings | None = None, *, seed: int = 0,
-                     body: str = "anatomical", rate: float = RATE, choose: bool = False) -> Trained:
+                     body: str = "anatomical", rate: float = RATE, choose: bool = False) -> TrainedPrior:
     """Learn a prior from files that `read_motion` reads, at `rate` frames/s, and save it (.npz).
 
     `choose`: find the number of regions among `CANDIDATES`. Raises `FormatError` or `ShadowPuppetError`, naming the file.

@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.learn_prior import familiar
 from shadowpuppet.pipeline.look_rig import Opening
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.track_rig import Puppet
-from shadowpuppet.tracking.multiview.size_estimation import likely_height, measure, spread_of
+from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
@@ -39,16 +39,16 @@ def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options
         sizes, source = read_person(options.person, settings.body).sizes, str(options.person)
         spread = np.zeros(len(sizes.names()))
     elif known.sizes is not None:
-        sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", spread_of(known.sizes, shown=True)
+        sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", size_deviations(known.sizes, shown=True)
     else:
-        seen = height or likely_height(rng, lambda tall: make_body(settings.body, average_sizes(settings.body, tall)), rig.cameras, first,
+        seen = height or estimate_height(rng, lambda tall: make_body(settings.body, average_sizes(settings.body, tall)), rig.cameras, first,
                                        settings) or AVERAGE_HEIGHT
         sizes = average_sizes(settings.body, seen)
         source = f"{'the height' if height else f'a height of {seen:.2f} m as seen'}, and the hulls of the first seconds"
         assert isinstance(sizes, BoneSizes)
-        spread = spread_of(sizes, shown=False)
+        spread = size_deviations(sizes, shown=False)
     library = known.poses if len(known.poses) else None
-    person = measure(rng, partial(make_body, settings.body), sizes, spread, rig.cameras, first, settings, library)
+    person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, rig.cameras, first, settings, library)
     prior = known.prior if settings.method == "hybrid" else None
     tracker = MultiviewTracker(person.body, rig.cameras, settings, prior, library)
     told: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,

@@ -1,6 +1,7 @@
-"""One scheme for both papers: resample, propose, refine, weigh.
+"""The particle filter: weighted poses, and one estimation cycle (resample, propose, weigh).
 
-Knows no bodies and no pictures, only arrays and the functions that a method is made of.
+Knows no bodies and no pictures, only arrays and the functions that make a method. `MultiviewTracker.cycle` has the cycle of Ni 2008,
+which also refines.
 """
 
 from __future__ import annotations
@@ -11,11 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.resampling import Scheme
+from shadowpuppet.tracking.resampling import Indices, Scheme
+
+NO_REGION = -1
+"""State of a particle that was not drawn from the motion prior."""
 
 
 class Particles(NamedTuple):
-    """Poses and how well each explains the picture."""
+    """Poses and how well each explains the observation."""
 
     poses: Array
     """Of shape (N, D)."""
@@ -23,17 +27,22 @@ class Particles(NamedTuple):
     """Of shape (N,), the lower the better (pixels for silhouettes)."""
     log_weights: Array
     """Of shape (N,), not normalised."""
+    regions: Indices = np.zeros(0, np.int64)
+    """State s of each in Ni 2008, its region of the motion prior, or `NO_REGION`, of shape (N,); empty in methods without."""
 
     @property
     def best(self) -> Array:
         """The pose (D,) of least cost."""
         return self.poses[np.argmin(self.costs)]
 
+    def select(self, ancestors: Indices) -> Particles:
+        """The particles of some indices, each with all that it carries."""
+        regions = self.regions[ancestors] if len(self.regions) else self.regions
+        return Particles(self.poses[ancestors], self.costs[ancestors], self.log_weights[ancestors], regions)
+
 
 Propose = Callable[[np.random.Generator, Array], Array]
 """Poses (N, D) to new poses (N, D). The first is the best so far."""
-Refine = Callable[[Array], Array]
-"""Poses (N, D) to better ones (N, D)."""
 Weigh = Callable[[Array], tuple[Array, Array]]
 """Poses (N, D) to costs (N,) and log weights (N,)."""
 
@@ -44,17 +53,14 @@ def evaluate(poses: Array, weigh: Weigh) -> Particles:
 
 
 def step(rng: np.random.Generator, particles: Particles, *, resample: Scheme, propose: Propose, weigh: Weigh,
-         refine: Refine | None = None, number: int | None = None) -> Particles:
-    """One estimation cycle: from the particles of the last to those of this one."""
+         number: int | None = None) -> Particles:
+    """One estimation cycle: the last cycle's particles to `number` new ones (default: as many)."""
     ancestors = resample(rng, particles.log_weights, number or len(particles.poses))
-    poses = propose(rng, particles.poses[ancestors])
-    if refine is not None:
-        poses = refine(poses)
-    return evaluate(poses, weigh)
+    return evaluate(propose(rng, particles.poses[ancestors]), weigh)
 
 
 def diffuse(rng: np.random.Generator, poses: Array, sigma: Array) -> Array:
-    """Gaussian noise of deviations `sigma` (D,) on all poses (N, D) but the first, which stays as it is (Algorithms 3 and 4)."""
+    """Poses (N, D) with Gaussian noise of deviations `sigma` (D,); the first stays as it is (Algorithms 3 and 4)."""
     noise = rng.standard_normal(poses.shape) * sigma
     noise[0] = 0
     return poses + noise

@@ -1,9 +1,9 @@
-"""Resampling: which particles live on. Every scheme has the same signature.
+"""Resampling schemes, all of one signature:
 
     scheme(rng, log_weights, number) -> ancestors (number,), indices of particles
 
-`log_weights` (N,) need not be normalised. `SCHEMES` lists the schemes. In Liu 2011 the best particle comes first and stays as it is:
-`deterministic` (DRS, Algorithm 4) puts it there by its nature, `stratified` (SRS, Algorithm 3) and the others through `with_best`.
+`log_weights` (N,) need not be normalised. In Liu 2011 the best particle comes first and stays as it is: `deterministic` (DRS, Algorithm 4)
+puts it there, `stratified` (SRS, Algorithm 3) and the others through `with_best`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Scheme = Callable[[np.random.Generator, Array, int], Indices]
 
 
 def normalise(log_weights: ArrayLike) -> Array:
-    """Weights (N,) that sum to one; the greatest exponent is taken off first. All -inf means all equal."""
+    """Weights (N,) that sum to one; the largest exponent is subtracted first. All -inf gives equal weights."""
     log_weights = np.asarray(log_weights, float)
     top = log_weights.max()
     if not np.isfinite(top):
@@ -48,12 +48,12 @@ def stratified(rng: np.random.Generator, log_weights: ArrayLike, number: int) ->
 
 
 def systematic(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
-    """One draw, shared by all strata."""
+    """One uniform draw, shared by all strata."""
     return _inverse(log_weights, (np.arange(number) + 1 - rng.random()) / number)
 
 
 def residual(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
-    """floor(number * weight) copies of each for certain, the rest drawn by what remains (Liu & Chen 1998)."""
+    """floor(number * weight) copies of each, the rest drawn by the remainders (Liu & Chen 1998)."""
     expected = normalise(log_weights) * number
     copies = np.floor(expected + 1e-9).astype(np.int64)  # a weight of exactly k / number must not lose a copy to rounding
     certain = np.repeat(np.arange(len(copies)), copies)
@@ -66,14 +66,14 @@ def residual(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> I
 
 
 def deterministic(rng: np.random.Generator, log_weights: ArrayLike, number: int, survival: float = 0.2) -> Indices:
-    """DRS (Liu 2011, Algorithm 4): the best `survival` * number particles live on in their order; copies of the best fill the rest."""
+    """DRS (Liu 2011, Algorithm 4): the best `survival` * number particles survive in their order; copies of the best fill the rest."""
     ranked = np.argsort(-np.asarray(log_weights, float), kind="stable")
     survivors = ranked[: int(survival * number + 1e-9)]
     return np.concatenate([survivors, np.full(number - len(survivors), ranked[0])])
 
 
 def with_best(scheme: Scheme) -> Scheme:
-    """The scheme with the best particle put first, as in Algorithm 3: particle 1 is the best, the others are drawn."""
+    """The scheme with the best particle first, as in Algorithm 3; the others are drawn."""
 
     def kept(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
         best = np.argmax(np.asarray(log_weights, float))
@@ -92,7 +92,7 @@ SCHEMES: dict[str, Scheme] = {
 
 
 def make_scheme(name: str, survival: float) -> Scheme:
-    """A scheme by name, that returns the best particle first. Raises `SettingsError` with the names there are."""
+    """The scheme of this name, with the best particle first. Raises `SettingsError` with the valid names."""
     if name not in SCHEMES:
         raise SettingsError(f"unknown resampling {name!r}; there are: {choices(SCHEMES)}")
     if name == "deterministic":

@@ -1,4 +1,4 @@
-"""How well poses explain a picture: the silhouette cost of Liu 2011 (eq. 2), for whole arrays of poses."""
+"""The silhouette cost of Liu 2011 (eq. 2), for whole arrays of poses."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from shadowpuppet.camera.rasterize import Bits, Picture, count, pack
 from shadowpuppet.geometry import Array
 
 Cost = Callable[[Array], Array]
-"""Poses (N, D) to costs (N,), the lower the better."""
+"""Poses (N, D) to costs (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """A silhouette, where it says nothing, and what else is known of the moment."""
+    """A silhouette, its ignored pixels, and an additional cost."""
 
     silhouette: Bits
     ignore: Bits
-    """Pixels that do not count, whatever is drawn there. They are set in the silhouette too, so that they never differ."""
+    """Pixels that do not count. They are set in the silhouette and in drawn poses, so that they never differ."""
     also: Cost | None = None
-    """A cost of your own, in pixels, which is added to eq. 2 wherever poses are weighed."""
+    """A cost of your own, in pixels, added to eq. 2 wherever poses are weighed."""
 
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:
-        """From a mask (H, W), and a mask of the pixels that do not count."""
+        """From a mask (H, W) and a mask of the ignored pixels."""
         silhouette = pack(mask)
         skipped = np.zeros_like(silhouette) if ignore is None else pack(ignore)
         return cls(silhouette | skipped, skipped, also)
 
     @classmethod
     def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array, also: Cost | None = None) -> Observation:
-        """From a mask (H, W), less what it has where the legs of `pose` (D,) may be: the model ends at the waist.
+        """From a mask (H, W), with its pixels where the legs of `pose` (D,) may be ignored: the model ends at the waist.
 
         Empty pixels there still count, so that the waist does not grow over them.
         """
@@ -53,16 +53,16 @@ class Observation:
 
 
 class PartialCost:
-    """Eq. 2 for poses that differ in some DOF only: what these move is drawn over all else, which is drawn once."""
+    """Eq. 2 for poses that differ in some DOF only: the parts that these move are drawn over the others, which are drawn once."""
 
     def __init__(self, picture: Picture, dofs: NDArray[np.int64], hidden: Iterable[str] = ()) -> None:
-        """`dofs`: indices of the DOF that vary; `hidden`: parts that are not drawn at all."""
+        """`dofs`: indices of the DOF that vary; `hidden`: names of parts that are not drawn."""
         body, skeleton, hidden = picture.body, picture.body.skeleton, set(hidden)
         names = {skeleton.dofs[d].name for d in dofs}
         owners = {dof.joint for dof in skeleton.dofs if dof.name in names}
         owners |= {coupling.joint for coupling in skeleton.couplings if coupling.dof in names}
         moved: set[str] = set()
-        for joint in skeleton.joints:  # parents come first, so that one pass finds all that hangs on a moved joint
+        for joint in skeleton.joints:  # parents come first: one pass finds all descendants
             if joint.name in owners or joint.parent in moved:
                 moved.add(joint.name)
         self.picture, self.dofs = picture, dofs
@@ -72,7 +72,7 @@ class PartialCost:
         self.moving, self.still = np.flatnonzero(moves & drawn), np.flatnonzero(~moves & drawn)
 
     def costs(self, observation: Observation, around: Array) -> Cost:
-        """Eq. 2 as a function of whole poses (N, D), all like `around` (D,) but for the DOF that vary: pixels (N,)."""
+        """Eq. 2, pixels (N,), as a function of whole poses (N, D) that equal `around` (D,) but for the DOF that vary."""
         fixed = self.picture.draw(around, self.still) | observation.ignore
         base = count(fixed ^ observation.silhouette)
 
@@ -83,7 +83,7 @@ class PartialCost:
 
 
 def silhouette_costs(picture: Picture, observation: Observation, poses: ArrayLike) -> Array:
-    """Eq. 2: pixels (N,) in which the drawn body and the silhouette differ, of whole poses (N, D)."""
+    """Eq. 2 for whole poses (N, D): pixels (N,) in which the drawn body and the silhouette differ."""
     every, fixed = np.arange(len(picture.body.parts)), observation.ignore
     added = picture.added(np.ascontiguousarray(poses, float), every, observation.silhouette, fixed)
     return count(fixed ^ observation.silhouette) + added.astype(float)

@@ -1,16 +1,13 @@
-"""Status of an estimate from the overlap of model and silhouette."""
+"""Status of an estimate, from the overlap of the drawn model and the silhouettes."""
 
 from __future__ import annotations
 
-ABSENT, LOST, UNCERTAIN = 0.2, 0.5, 0.7
-"""A silhouette under this share of the drawn body's area is nobody; an overlap (intersection over union) under these is lost or
-uncertain. A cardbox that fits overlaps by 0.8 to 0.9."""
+ABSENT_AREA = 0.2
+"""A silhouette smaller than this share of the drawn body's area is no person."""
+LOST_OVERLAP, UNCERTAIN_OVERLAP = 0.5, 0.7
+"""An overlap (intersection over union) below these is `lost` or `uncertain`; a cardbox model that fits overlaps by 0.8 to 0.9."""
 
 
 def status_of(overlap: float) -> str:
-    """What an overlap says of an estimate."""
-    return "lost" if overlap < LOST else "uncertain" if overlap < UNCERTAIN else "tracked"
-
-
-SETTLE_CYCLES = 10
-"""Frames' worth of cycles on the first frame, after the search."""
+    """`lost`, `uncertain` or `tracked`."""
+    return "lost" if overlap < LOST_OVERLAP else "uncertain" if overlap < UNCERTAIN_OVERLAP else "tracked"

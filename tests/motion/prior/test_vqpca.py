@@ -13,12 +13,12 @@ from scipy.special import xlogy
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.motion.prior.vqpca import Fit, _fill, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
+from shadowpuppet.motion.prior.vqpca import PriorFit, _fill, choose_regions, fit_prior, likeliest_rows, log_likelihood, reconstruction_error
 
 seeds = st.integers(0, 2**32 - 1)
 
 
-def same(one: Fit, other: Fit) -> bool:
+def same(one: PriorFit, other: PriorFit) -> bool:
     arrays = [[f.prior.transitions, f.prior.initial, f.prior.subspaces.centres, f.prior.subspaces.bases, f.prior.subspaces.variances,
                f.prior.subspaces.noise, np.array(f.errors), np.array(f.log_likelihoods)] for f in (one, other)]
     return all(np.array_equal(a, b) for a, b in zip(*arrays, strict=True))

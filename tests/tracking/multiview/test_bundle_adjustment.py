@@ -43,18 +43,19 @@ def test_what_points_say_about_a_pose_is_what_the_plain_version_says(seed, epsil
 
 def test_what_sizes_do_to_distances_is_their_derivative(rng):
     """Of a longer loin: what hangs on the chest rises, so that the points there are less far out along their normals."""
-    body, settings, step = actor.body(), SurfaceSettings(), bundle_adjustment.NUDGE
+    body, settings, step = actor.body(), SurfaceSettings(), bundle_adjustment.SIZE_STEP
     pose, k = actor.stance(body.skeleton), NAMES.index("lumbar_height")
     seen = actor.surface(body, pose, rng, 20)
     cloud = make_cloud(seen.points + 0.005 * seen.normals, seen.normals, seen.weights)
     nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, MEAN.to_array(), np.array([k]))
     frame = bundle_adjustment._equations(bundle_adjustment._model(body), nudged, pose, cloud, settings)
-    near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
+    near = np.zeros((len(cloud.rows), 3 * LANES), np.float32)
     _, here = bundle_adjustment._measured(bundle_adjustment._model(body), pose, cloud, settings, near, True)
     taller = anatomical(MEAN.with_values(lumbar_height=MEAN.lumbar_height + step))
     grows = (here[0] - bundle_adjustment._measured(bundle_adjustment._model(taller), pose, cloud, settings, near, False)[1][0]) / step
-    arms = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("arm", "hand"))])
-    legs = np.isin(near[:, LANES:].ravel(), [s for s, part in enumerate(body.parts) if part.endswith(("thigh", "shank", "foot"))])
+    nearest = near[:, LANES : 2 * LANES].ravel()
+    arms = np.isin(nearest, [s for s, part in enumerate(body.parts) if part.endswith(("arm", "hand"))])
+    legs = np.isin(nearest, [s for s, part in enumerate(body.parts) if part.endswith(("thigh", "shank", "foot"))])
     assert np.quantile(np.abs(grows - here[7])[arms], 0.75) < 0.05  # all but points of edges
     np.testing.assert_allclose(grows[legs], 0, atol=1e-6)
     assert frame.rows[-1, -1] == pytest.approx((here[1] * grows**2).sum() / cloud.total, rel=1e-3)
@@ -171,7 +172,7 @@ def test_nothing_is_ever_made_worse_and_more_rounds_do_more():
         of = bundle_adjustment._model(anatomical(found.sizes))
         frames = [bundle_adjustment._equations(of, [], pose, cloud, SurfaceSettings()) for pose, cloud in zip(found.poses, clouds)]
         strain = (found.sizes.to_array() - MEAN.to_array()) / SPREAD
-        worth = bundle_adjustment.WORTH / bundle_adjustment.NOISE**2
+        worth = bundle_adjustment.INDEPENDENT_POINTS / bundle_adjustment.POINT_NOISE**2
         return worth * (sum(f.cost for f in frames) + 1e-6 * ((found.poses - near) ** 2).sum()) + (strain**2).sum()
 
     costs = [cost(found) for found in residuals]
@@ -220,4 +221,24 @@ def test_sizes_stay_possible_whatever_the_points_say(rng):
         found = solve_bundle(anatomical, MEAN, 20 * SPREAD, near, nobody)
     except ShadowPuppetError as error:
         pytest.fail(f"a size went out of range: {error}")
-    assert np.isfinite(found.poses).all()
+    assert np.abs(found.sizes.to_array() - MEAN.to_array()).max() <= bundle_adjustment.ROUNDS * bundle_adjustment.MAX_SIZE_STEP + 1e-9
+    np.testing.assert_array_equal(found.poses, anatomical(found.sizes).skeleton.clamp(found.poses))
+
+
+def test_no_step_is_longer_than_it_may_be(monkeypatch):
+    """However far off the points are."""
+    _, _, near, clouds = shown()
+    far = [cloud._replace(origin=np.add(cloud.origin, (0.15, 0.0, 0.1))) for cloud in clouds]
+    seen, kept = [], bundle_adjustment._moved
+
+    def watched(best, *rest):
+        sizes, poses = kept(best, *rest)
+        seen.append((np.abs(sizes - best.at[0]).max(), np.abs(poses - best.at[1]).max()))
+        return sizes, poses
+
+    monkeypatch.setattr(bundle_adjustment, "_moved", watched)
+    monkeypatch.setattr(bundle_adjustment, "MAX_SIZE_STEP", 0.002)
+    monkeypatch.setattr(bundle_adjustment, "MAX_POSE_STEP", 0.02)
+    solve_bundle(anatomical, MEAN, SPREAD, near, far, rounds=2)
+    longest = np.max(seen, 0)
+    np.testing.assert_allclose(longest, [0.002, 0.02], rtol=1e-6)

@@ -8,7 +8,7 @@ import pytest
 from solids import looking
 
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.tracking.multiview.observation import Evidence, Stage, _thinned
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, _half_size
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 NOTHING = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
@@ -16,11 +16,11 @@ NOTHING = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zero
 
 @pytest.fixture(scope="module")
 def stage():
-    return Stage(actor.body(), actor.cameras())
+    return BodyInViews(actor.body(), actor.cameras())
 
 
-def seen(stage, frame: int = 0) -> Evidence:
-    return Evidence(stage, *actor.filmed()[1][frame])
+def seen(stage, frame: int = 0) -> MultiviewObservation:
+    return MultiviewObservation(stage, *actor.filmed()[1][frame])
 
 
 def poses_beside(rng, number: int = 5) -> np.ndarray:
@@ -30,7 +30,7 @@ def poses_beside(rng, number: int = 5) -> np.ndarray:
 
 def plain(stage, masks, pose) -> tuple[int, int, list[float]]:
     """Pixels that differ and pixels of silhouettes, of every second row and column, and each picture's overlap."""
-    drawn = [Picture(actor.body(), _thinned(camera), camera.T_camera_world).mask(pose) for camera in actor.cameras()]
+    drawn = [Picture(actor.body(), _half_size(camera), camera.T_camera_world).mask(pose) for camera in actor.cameras()]
     pairs = [(d, m[::2, ::2]) for d, m in zip(drawn, masks) if m is not None and m.any()]
     differing, area = sum(int((d ^ m).sum()) for d, m in pairs), sum(int(m.sum()) for _, m in pairs)
     return differing, area, [(d & m).sum() / (d | m).sum() for d, m in pairs]
@@ -39,7 +39,7 @@ def plain(stage, masks, pose) -> tuple[int, int, list[float]]:
 @pytest.mark.parametrize("size", [(160, 120), (161, 121), (7, 6)])
 def test_a_thinned_camera_has_every_second_pixel(size, rng):
     camera = looking((3, 1, 0.5), size=size, focal=200.0, distortion=(-0.1, 0.02, 0.001, 0.0))
-    half, points = _thinned(camera), rng.uniform(-0.5, 0.5, (20, 3)) @ np.eye(3)
+    half, points = _half_size(camera), rng.uniform(-0.5, 0.5, (20, 3)) @ np.eye(3)
     there = points @ camera.T_camera_world[:3, :3].T + camera.T_camera_world[:3, 3]
     assert half.size == np.zeros(size[::-1])[::2, ::2].shape[::-1]
     np.testing.assert_allclose(2 * half.project(there), camera.project(there), atol=1e-6)
@@ -49,49 +49,49 @@ def test_a_thinned_camera_has_every_second_pixel(size, rng):
 def test_differing_pixels_and_overlap_are_those_counted_one_by_one(stage, which, rng):
     surface, masks = actor.filmed()[1][0]
     given = [mask if n in which else None for n, mask in enumerate(masks)]
-    evidence = Evidence(stage, surface, given)
+    observation = MultiviewObservation(stage, surface, given)
     poses = poses_beside(rng)
-    assert len(evidence.seen) == len(tuple(which))
-    found = evidence.differing(poses)
+    assert len(observation.silhouettes) == len(tuple(which))
+    found = observation.mismatch(poses)
     assert found.shape == (len(poses),)
     for pose, share in zip(poses, found):
         differing, area, overlaps = plain(stage, given, pose)
         assert share == pytest.approx(differing / max(area, 1))
-        assert evidence.overlap(pose) == pytest.approx(np.mean(overlaps) if overlaps else 0.0)
-        assert evidence.area == area
+        assert observation.overlap(pose) == pytest.approx(np.mean(overlaps) if overlaps else 0.0)
+        assert observation.area == area
 
 
 def test_the_true_pose_differs_least(stage, rng):
-    evidence, pose = seen(stage), actor.filmed()[0][0]
-    assert evidence.differing(pose[None])[0] < 0.1 < evidence.differing(poses_beside(rng)).min()
-    assert evidence.overlap(pose) > 0.9
+    observation, pose = seen(stage), actor.filmed()[0][0]
+    assert observation.mismatch(pose[None])[0] < 0.1 < observation.mismatch(poses_beside(rng)).min()
+    assert observation.overlap(pose) > 0.9
 
 
 def test_empty_and_full_masks_say_nothing(stage):
     surface, masks = actor.filmed()[1][0]
     some = [np.zeros_like(masks[0]), np.ones_like(masks[1]), None, masks[3], masks[4]]
-    evidence, pose = Evidence(stage, surface, some), actor.filmed()[0][0]
-    assert len(evidence.seen) == 2
-    assert evidence.area == sum(int(mask[::2, ::2].sum()) for mask in masks[3:])
-    nobody = Evidence(stage, NOTHING, [None] * 5)
+    observation, pose = MultiviewObservation(stage, surface, some), actor.filmed()[0][0]
+    assert len(observation.silhouettes) == 2
+    assert observation.area == sum(int(mask[::2, ::2].sum()) for mask in masks[3:])
+    nobody = MultiviewObservation(stage, NOTHING, [None] * 5)
     assert (nobody.area, nobody.overlap(pose)) == (0, 0.0)
-    np.testing.assert_array_equal(nobody.differing(pose[None]), [0.0])
+    np.testing.assert_array_equal(nobody.mismatch(pose[None]), [0.0])
 
 
 @pytest.mark.parametrize("share", [1, 2, 3, 7])
 def test_a_share_of_the_points_is_every_so_many_th_of_them(stage, share):
-    evidence = seen(stage)
-    surface, cloud = evidence.surface, evidence.cloud(share)
+    observation = seen(stage)
+    surface, cloud = observation.surface, observation.cloud(share)
     assert cloud.total == pytest.approx(surface.weights[::share].sum(), rel=1e-5)
-    np.testing.assert_array_equal(cloud.origin, evidence.full.origin)
+    np.testing.assert_array_equal(cloud.origin, observation.full.origin)
     places = cloud.rows.reshape(len(cloud.rows), 7, -1)[:, :3].transpose(0, 2, 1).reshape(-1, 3)[: len(surface.points[::share])]
     places = places + cloud.origin
     wanted = surface.points[::share]
     np.testing.assert_allclose(places[np.lexsort(places.T)].sum(0), wanted.sum(0), atol=1e-3)
-    assert evidence.full is evidence.full
+    assert observation.full is observation.full
 
 
 def test_no_points_make_an_empty_cloud(stage):
-    cloud = Evidence(stage, NOTHING, [None] * 5).full
+    cloud = MultiviewObservation(stage, NOTHING, [None] * 5).full
     assert (len(cloud.rows), cloud.total) == (0, 0.0)
     assert np.isfinite(cloud.origin).all()

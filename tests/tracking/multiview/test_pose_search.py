@@ -8,8 +8,8 @@ import pytest
 
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.tracking.multiview import pose_search
-from shadowpuppet.tracking.multiview.observation import Evidence, Stage
-from shadowpuppet.tracking.multiview.pose_search import HEADINGS, placed, search
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
+from shadowpuppet.tracking.multiview.pose_search import HEADINGS, place_postures, search
 from shadowpuppet.tracking.multiview.posture_prior import usual_postures
 from shadowpuppet.tracking.multiview.proposals import GLOBAL_DOFS
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
@@ -19,7 +19,7 @@ from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 def test_postures_are_placed_where_the_points_are_in_all_directions(name):
     of, middle = actor.body(name), np.array([1.0, -2.0, 0.9])
     base = usual_postures(of.skeleton)[:3]
-    found = placed(of, base, middle)
+    found = place_postures(of, base, middle)
     assert found.shape == (3 * HEADINGS, len(of.skeleton.dofs))
     root = of.skeleton.dof_indices(GLOBAL_DOFS)
     turns = found[:, root[3]].reshape(3, HEADINGS)
@@ -36,14 +36,14 @@ def test_postures_are_placed_where_the_points_are_in_all_directions(name):
 
 def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None):
     of = actor.body(name)
-    evidence = Evidence(Stage(of, ()), actor.surface(of, pose, np.random.default_rng(1), 25, 0.004), ())
+    observation = MultiviewObservation(BodyInViews(of, ()), actor.surface(of, pose, np.random.default_rng(1), 25, 0.004), ())
     refiner = Refiner(of)
 
     def weigh(poses):
-        costs = refiner.costs(poses, evidence.full)
+        costs = refiner.costs(poses, observation.full)
         return costs, -costs / 1e-6
 
-    return of, search(rng, of, refiner, evidence, library, weigh, number)
+    return of, search(rng, of, refiner, observation, library, weigh, number)
 
 
 @pytest.mark.parametrize("heading", [0.1, 1.3, 3.1, -2.0])
@@ -76,8 +76,8 @@ def test_a_library_s_postures_are_tried_in_any_place_and_direction(rng):
 
 def test_of_a_long_library_some_are_tried(monkeypatch, rng):
     tried = []
-    monkeypatch.setattr(pose_search, "placed", lambda of, some, middle: tried.append(some) or placed(of, some, middle))
-    monkeypatch.setattr(pose_search, "MOST", 7)
+    monkeypatch.setattr(pose_search, "place_postures", lambda of, some, middle: tried.append(some) or place_postures(of, some, middle))
+    monkeypatch.setattr(pose_search, "MAX_LIBRARY_POSES", 7)
     poses = actor.walk(actor.body().skeleton, 30)
     found_in(poses[3], rng, library=poses)
     usual = usual_postures(actor.body().skeleton)

@@ -9,8 +9,18 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.models import WHOLE
-from shadowpuppet.tracking.multiview.posture_prior import ARMS, BOUND, LEAST, LEGS, SEEN, WIDER, Usual, usual_arms, usual_postures
-from shadowpuppet.tracking.multiview.proposals import GLOBAL_DOFS
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.tracking.multiview.posture_prior import (
+    ARMS,
+    INFLATION,
+    LEGS,
+    MAX_PENALTY,
+    MIN_DEVIATION,
+    OBSERVED_JOINTS,
+    PosturePrior,
+    usual_arms,
+    usual_postures,
+)
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -57,25 +67,26 @@ def test_an_arm_s_postures_are_those_of_the_whole(name):
 def test_what_the_surface_shows_is_never_unusual(name, rng):
     """Arms and legs; nor are place and heading."""
     skeleton = actor.body(name).skeleton
-    usual, pose = Usual.of(skeleton), np.clip(skeleton.rest_and_spread[0], *skeleton.limits)
-    moved = pose + rng.normal(0, 1, len(pose)) * np.array([dof.joint.startswith(SEEN) or dof.name in GLOBAL_DOFS for dof in skeleton.dofs])
-    np.testing.assert_allclose(usual.strain(np.stack([pose, moved])), 0, atol=1e-12)
+    usual, pose = PosturePrior.of(skeleton), np.clip(skeleton.rest_and_spread[0], *skeleton.limits)
+    free = np.array([dof.joint.startswith(OBSERVED_JOINTS) or dof.name in GLOBAL_DOFS for dof in skeleton.dofs])
+    moved = pose + rng.normal(0, 1, len(pose)) * free
+    np.testing.assert_allclose(usual.penalty(np.stack([pose, moved])), 0, atol=1e-12)
     for d, dof in enumerate(skeleton.dofs):
         if np.isfinite(usual.below[d]):
             off = np.tile(pose, (3, 1))
             off[:, d] += np.array([1.0, 2.0, 1e3]) * usual.above[d]
-            strain = usual.strain(off)
-            np.testing.assert_allclose(strain[:2], [1 / (1 + 1 / BOUND), 4 / (1 + 4 / BOUND)], err_msg=dof.name)
-            assert strain[2] == pytest.approx(BOUND, rel=1e-3)
+            strain = usual.penalty(off)
+            np.testing.assert_allclose(strain[:2], [1 / (1 + 1 / MAX_PENALTY), 4 / (1 + 4 / MAX_PENALTY)], err_msg=dof.name)
+            assert strain[2] == pytest.approx(MAX_PENALTY, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_a_pull_is_what_makes_the_strain(name, rng):
     """Its weights times squared distances from rest: near rest the strain itself, and never more than without the bound."""
     skeleton = actor.body(name).skeleton
-    usual = Usual.of(skeleton)
+    usual = PosturePrior.of(skeleton)
     near = usual.rest + 0.01 * rng.normal(size=len(usual.rest))
-    assert usual.pull(near) @ (near - usual.rest) ** 2 == pytest.approx(usual.strain(near[None])[0], rel=1e-2)
+    assert usual.pull(near) @ (near - usual.rest) ** 2 == pytest.approx(usual.penalty(near[None])[0], rel=1e-2)
     assert (usual.pull(near + 3) <= usual.pull(near + 1e-9) + 1e-9).all()
 
 
@@ -85,11 +96,11 @@ def test_training_motion_says_what_is_usual_of_the_trunk(rng):
     library = actor.walk(skeleton, 200)
     library[:, chest] = 0.3 + 0.2 * rng.normal(size=200)
     library[:, bow] = 0.5
-    usual = Usual.of(skeleton, library)
+    usual = PosturePrior.of(skeleton, library)
     assert usual.rest[chest] == pytest.approx(0.3, abs=0.05)
-    assert usual.below[chest] == usual.above[chest] == pytest.approx(WIDER * library[:, chest].std())
-    assert (usual.rest[bow], usual.below[bow]) == (pytest.approx(0.5), LEAST)
-    assert usual.strain(library).max() < Usual.of(skeleton).strain(library).max()
+    assert usual.below[chest] == usual.above[chest] == pytest.approx(INFLATION * library[:, chest].std())
+    assert (usual.rest[bow], usual.below[bow]) == (pytest.approx(0.5), MIN_DEVIATION)
+    assert usual.penalty(library).max() < PosturePrior.of(skeleton).penalty(library).max()
     assert np.isinf(usual.below[skeleton.dof_indices(["root_heading", "left_knee_flexion", "root_x"])]).all()
-    lone = Usual.of(skeleton, library[:1])
-    np.testing.assert_array_equal(lone.rest, Usual.of(skeleton).rest)  # one pose says nothing of deviations
+    lone = PosturePrior.of(skeleton, library[:1])
+    np.testing.assert_array_equal(lone.rest, PosturePrior.of(skeleton).rest)  # one pose says nothing of deviations

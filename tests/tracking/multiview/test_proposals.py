@@ -8,12 +8,15 @@ import actor
 import numpy as np
 import pytest
 
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.local_pca import Subspaces
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.tracking.multiview.exploration import ARM_NOISE, JOINT_CHANCE, NOISE_SCALES
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
-from shadowpuppet.tracking.multiview.proposals import EXPLORED, GLOBAL_DOFS, MOVED, REACH, Proposals
+from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.particle_filter import NO_REGION, Particles
 
 SKELETON = actor.body().skeleton
 PLAIN = MultiviewSettings(method="particle_filter", velocity=0.0, defensive=0.25, keep=0.0)
@@ -31,9 +34,15 @@ def prior_of(names, *, at=0.2, wide: float = 1e-3) -> MotionPrior:
     return MotionPrior(line, np.ones((1, 1)), np.ones(1), tuple(names))
 
 
-def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, unlike=lambda poses: np.zeros(len(poses))) -> np.ndarray:
-    velocity = np.zeros(D) if velocity is None else velocity
-    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, unlike, scale)
+def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, mismatch=lambda poses: np.zeros(len(poses))) -> np.ndarray:
+    return proposed(settings, poses, prior, velocity, scale, seed, mismatch)[0]
+
+
+def proposed(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, mismatch=lambda poses: np.zeros(len(poses)), regions=None):
+    """Poses and regions, of particles in `regions`, or in none."""
+    velocity, nothing = np.zeros(D) if velocity is None else velocity, np.zeros(len(poses))
+    particles = Particles(poses, nothing, nothing, np.zeros(0, int) if regions is None else regions)
+    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), particles, POSE, velocity, mismatch, scale)
 
 
 def many(number: int = 4000) -> np.ndarray:
@@ -57,12 +66,12 @@ def test_what_is_refined_afterwards_is_moved_joint_by_joint_near_and_far():
     for joint in SKELETON.joints:
         own = [d for d, dof in enumerate(SKELETON.dofs) if dof.joint == joint.name]
         if own:
-            assert moved[:, own].any(1).mean() == pytest.approx(MOVED, abs=0.04)
+            assert moved[:, own].any(1).mean() == pytest.approx(JOINT_CHANCE, abs=0.04)
     chest, knee = SKELETON.dof_indices(["chest_x", "left_knee_flexion"])
     assert np.corrcoef(moved[:, chest], moved[:, knee])[0, 1] == pytest.approx(0, abs=0.1)  # while one joint stays another is moved
     far = np.abs((drawn(settings, many()) - POSE)[1:, chest])
-    assert far.max() > 2.5 * 0.01 * REACH[1]
-    assert far.std() == pytest.approx(0.01 * np.sqrt(MOVED * np.mean(np.square(REACH))), rel=0.15)
+    assert far.max() > 2.5 * 0.01 * NOISE_SCALES[1]
+    assert far.std() == pytest.approx(0.01 * np.sqrt(JOINT_CHANCE * np.mean(np.square(NOISE_SCALES))), rel=0.15)
 
 
 def test_a_share_tries_an_arm_in_a_usual_posture():
@@ -79,7 +88,7 @@ def test_a_share_tries_an_arm_in_a_usual_posture():
     usual = np.stack(list(usual_arms(SKELETON, "left").values()), 1)
     arms = found[300:][left][:, sides["left"]]
     off = arms[:, None] - usual
-    assert np.median(np.sqrt((off**2).mean(2)).min(1)) < 1.5 * EXPLORED
+    assert np.median(np.sqrt((off**2).mean(2)).min(1)) < 1.5 * ARM_NOISE
     assert not (np.abs(drawn(replace(still, method="particle_filter"), many(400)) - POSE) > 1e-3).any()
 
 
@@ -91,7 +100,7 @@ def test_of_the_arms_that_are_tried_the_one_most_like_what_is_seen_is_taken():
         bent = drawn(still, many(200), **seen)[1:, elbow]
         return float(np.median(np.abs(bent[np.abs(bent - POSE[elbow]) > 1e-3] - 2.0)))  # in the others it is the right arm
 
-    assert off(unlike=lambda poses: np.abs(poses[:, elbow] - 2.0)) < 0.5 * off()
+    assert off(mismatch=lambda poses: np.abs(poses[:, elbow] - 2.0)) < 0.5 * off()
 
 
 @pytest.mark.parametrize("settings", [PLAIN, HYBRID], ids=["particle_filter", "hybrid"])
@@ -103,7 +112,7 @@ def test_the_first_is_the_last_pose_moved_on(settings, speed):
     wanted[ROOT] += speed * velocity[ROOT]
     np.testing.assert_allclose(found[0], SKELETON.clamp(wanted))
     shift = found[1:, ROOT] - (POSE[ROOT] + 0.01 + speed * velocity[ROOT])
-    assert np.abs(shift).max() < 6 * max(REACH) * settings.sigma_heading
+    assert np.abs(shift).max() < 6 * max(NOISE_SCALES) * settings.sigma_heading
 
 
 @pytest.mark.parametrize("settings", [PLAIN, HYBRID], ids=["particle_filter", "hybrid"])
@@ -140,6 +149,26 @@ def test_what_the_prior_cannot_hold_may_stay():
     for keep in (0.0, 0.5, 1.0):
         found = drawn(replace(HYBRID, defensive=0.0, keep=keep), many(5), prior_of(names))[:, knee]
         np.testing.assert_allclose(found, 0.2 + keep * (POSE[knee] - 0.2), atol=1e-9)
+
+
+def two_regions(names) -> MotionPrior:
+    """Two regions, at 0.2 and 0.8, of which each is followed by the other."""
+    one = prior_of(names)
+    centres = np.stack([np.full(len(names), 0.2), np.full(len(names), 0.8)])
+    regions = Subspaces(centres, np.repeat(one.subspaces.bases, 2, 0), np.repeat(one.subspaces.variances, 2, 0), np.full(2, 1e-8))
+    return MotionPrior(regions, np.array([[0.0, 1.0], [1.0, 0.0]]), np.full(2, 0.5), tuple(names))
+
+
+def test_the_next_region_follows_the_one_that_was_drawn_not_the_nearest():
+    """A particle carries its state s (Ni 2008, V-A): its refined pose may lie nearer to another region."""
+    names = ["left_knee_flexion", "right_knee_flexion", "chest_y"]
+    prior, poses = two_regions(names), many(6)
+    poses[:, SKELETON.dof_indices(names)] = 0.25  # nearest to region 0
+    found, regions = proposed(replace(HYBRID, defensive=0.0), poses, prior, regions=np.array([0, 1, 0, 1, NO_REGION, NO_REGION]))
+    np.testing.assert_array_equal(regions, [1, 0, 1, 0, 1, 1])
+    np.testing.assert_allclose(found[:, SKELETON.dof_indices(names[1:])][:, 0], [0.8, 0.2, 0.8, 0.2, 0.8, 0.8])
+    _, regions = proposed(replace(HYBRID, defensive=0.5), poses, prior)
+    np.testing.assert_array_equal(regions, [NO_REGION] * 3 + [1] * 3)
 
 
 def test_a_prior_of_all_moves_the_place_too():

@@ -14,7 +14,13 @@ from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
-from shadowpuppet.tracking.multiview.size_estimation import EXACT, SHOWN, measure, seen_height, spread_of
+from shadowpuppet.tracking.multiview.size_estimation import (
+    JOINT_DEVIATION,
+    SIZES_FROM_JOINTS,
+    estimate_sizes,
+    observed_height,
+    size_deviations,
+)
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 SETTINGS = MultiviewSettings(particles=8)
@@ -40,20 +46,20 @@ def measured(spread, first=None, expected=MEAN, seed: int = 0, library=None):
     first = stout()[2] if first is None else first
     library = actor.walk(actor.body().skeleton, 12) if library is None else library
     make = partial(make_body, "anatomical")
-    return measure(np.random.default_rng(seed), make, expected, spread, actor.cameras(), first, SETTINGS, library)
+    return estimate_sizes(np.random.default_rng(seed), make, expected, spread, actor.cameras(), first, SETTINGS, library)
 
 
 def test_girths_are_found_where_the_bones_are_known():
     true, poses, _ = stout()
-    spread = spread_of(MEAN, shown=True)
-    found = measured(np.where(spread > EXACT, 4 * spread, spread))  # more than people differ, so that a few frames decide
+    spread = size_deviations(MEAN, shown=True)
+    found = measured(np.where(spread > JOINT_DEVIATION, 4 * spread, spread))  # more than people differ, so that a few frames decide
     before, after = (np.array([abs(getattr(sizes, name) - getattr(true, name)) for name in GIRTHS]) for sizes in (MEAN, found.sizes))
     assert after.sum() < 0.5 * before.sum()
     assert found.frames >= 5
     assert found.overlap > 0.85
     assert found.residual < 0.01
-    for name in set(NAMES) & set(SHOWN):
-        assert getattr(found.sizes, name) == pytest.approx(getattr(MEAN, name), abs=5 * EXACT)
+    for name in set(NAMES) & set(SIZES_FROM_JOINTS):
+        assert getattr(found.sizes, name) == pytest.approx(getattr(MEAN, name), abs=5 * JOINT_DEVIATION)
     np.testing.assert_array_equal(found.body.points(poses), anatomical(found.sizes).points(poses))
 
 
@@ -61,7 +67,7 @@ def test_a_height_is_enough_to_begin_with():
     """Somebody of 1.75 m, taken to be of 1.62 m."""
     short = average_sizes("anatomical", 1.62)
     assert isinstance(short, AnatomicalSizes)
-    found = measured(spread_of(short, shown=False), expected=short)
+    found = measured(size_deviations(short, shown=False), expected=short)
     long = ("thigh_length", "shank_length", "upper_arm_length", "forearm_length", "lumbar_height", "thorax_height")
     before, after = (sum(getattr(sizes, name) for name in long) for sizes in (short, found.sizes))
     true = sum(getattr(stout()[0], name) for name in long)
@@ -77,7 +83,7 @@ def test_known_sizes_are_kept_and_the_person_is_looked_for_all_the_same():
 
 
 def test_the_same_seed_measures_the_same():
-    spread = spread_of(MEAN, shown=True)
+    spread = size_deviations(MEAN, shown=True)
     one, other = (measured(spread) for _ in range(2))
     assert (one.sizes, one.residual, one.overlap, one.frames) == (other.sizes, other.residual, other.overlap, other.frames)
 
@@ -85,7 +91,7 @@ def test_the_same_seed_measures_the_same():
 def test_nobody_is_said():
     nobody = [np.zeros_like(mask) for mask in stout()[2][0][1]]
     with pytest.raises(TrackingError, match=r"nobody is found in the first 3 frames' silhouettes: .*`shadowpuppet info` tells"):
-        measured(spread_of(MEAN, shown=True), [(actor.hull().points(nobody), nobody)] * 3)
+        measured(size_deviations(MEAN, shown=True), [(actor.hull().points(nobody), nobody)] * 3)
 
 
 def test_somebody_in_a_few_frames_only_is_taken_as_expected():
@@ -93,7 +99,7 @@ def test_somebody_in_a_few_frames_only_is_taken_as_expected():
     first = stout()[2]
     nobody = [np.zeros_like(mask) for mask in first[0][1]]
     gone = actor.hull().points(nobody), nobody
-    found = measured(spread_of(MEAN, shown=False), [gone, gone, *first[:2], gone])
+    found = measured(size_deviations(MEAN, shown=False), [gone, gone, *first[:2], gone])
     assert found.sizes == MEAN
     assert found.frames == 2
     assert np.isnan(found.residual)
@@ -105,13 +111,13 @@ def test_somebody_in_a_few_frames_only_is_taken_as_expected():
 @pytest.mark.parametrize("name", WHOLE)
 def test_bones_that_joints_show_are_sharp_and_all_else_as_people_differ(name):
     sizes = average_sizes(name, 1.7)
-    shown, guessed = (spread_of(sizes, shown=choice) for choice in (True, False))
+    shown, guessed = (size_deviations(sizes, shown=choice) for choice in (True, False))
     shares = shares_of(type(sizes))
     for size, one, other in zip(sizes.names(), shown, guessed):
-        assert one == (EXACT if size in SHOWN else other), size
+        assert one == (JOINT_DEVIATION if size in SIZES_FROM_JOINTS else other), size
         assert other == pytest.approx(shares[size][1] * 1.7, rel=0.05)
-    np.testing.assert_allclose(spread_of(average_sizes(name, 0.9), shown=False) / guessed, 0.9 / 1.7, rtol=0.03)
-    assert set(SHOWN) >= {"thigh_length", "forearm_length", "hip_distance"}
+    np.testing.assert_allclose(size_deviations(average_sizes(name, 0.9), shown=False) / guessed, 0.9 / 1.7, rtol=0.03)
+    assert set(SIZES_FROM_JOINTS) >= {"thigh_length", "forearm_length", "hip_distance"}
 
 
 def points(z) -> SurfacePoints:
@@ -121,8 +127,8 @@ def points(z) -> SurfacePoints:
 
 def test_who_stands_tallest_is_as_tall_as_seen():
     standing, bowed, nobody = points(np.linspace(0.02, 1.75, 400)), points(np.linspace(0, 1.1, 400)), points([])
-    assert seen_height([(standing, ())] * 3 + [(bowed, ())] * 7 + [(nobody, ())] * 20) == pytest.approx(1.72, abs=0.03)
+    assert observed_height([(standing, ())] * 3 + [(bowed, ())] * 7 + [(nobody, ())] * 20) == pytest.approx(1.72, abs=0.03)
     stray = points([*np.linspace(0.0, 1.7, 400), -3.0, 9.0])
-    assert seen_height([(stray, ())]) == pytest.approx(1.7, abs=0.03)
-    assert seen_height([(nobody, ()), (points(np.arange(40)), ())]) is None
-    assert seen_height([]) is None
+    assert observed_height([(stray, ())]) == pytest.approx(1.7, abs=0.03)
+    assert observed_height([(nobody, ()), (points(np.arange(40)), ())]) is None
+    assert observed_height([]) is None

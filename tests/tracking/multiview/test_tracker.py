@@ -15,11 +15,11 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
-from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.particle_filter import evaluate
+from shadowpuppet.tracking.particle_filter import NO_REGION, evaluate
 from shadowpuppet.tracking.resampling import normalise
 
 FEW = {"particles": 8}
@@ -42,7 +42,7 @@ def followed(of: MultiviewTracker, seen) -> list[MultiviewState]:
     rng = np.random.default_rng(0)
     states = [of.start(rng, *seen[0])]
     for points, masks in seen[1:]:
-        states.append(of.cycle(rng, states[-1], Evidence(of.stage, points, masks)))
+        states.append(of.cycle(rng, states[-1], MultiviewObservation(of.views, points, masks)))
     return states
 
 
@@ -145,16 +145,64 @@ def test_one_particle_is_all_that_image_forces_have():
     assert all(same(a, b) for a, b in zip(by_default, forced))
 
 
+@pytest.mark.parametrize("method", ["hybrid", "particle_filter"])
+def test_ten_cycles_of_the_paper_s_preset_stay_where_the_person_is(method):
+    """The motion since the last frame is added to proposals once a frame: once a cycle, it would grow exponentially."""
+    poses, seen = actor.filmed("cylinders")
+    of = tracker("ni2008", "cylinders", method=method, particles=12, cycles=10, forces={"iterations": 6})
+    states = followed(of, seen[:7])
+    assert all(np.isfinite([*state.pose, *state.velocity, state.cost]).all() for state in states)
+    assert errors(of, states, poses[:7]).max() < 0.4
+
+
+def test_each_cycle_has_less_noise_than_the_last():
+    """Annealing: the spread of the proposals goes with `cooling` to the power of the cycle."""
+    _, seen = actor.filmed()
+    of = tracker(method="particle_filter", particles=200, cycles=3, cooling=0.25, estimate="mean")
+    state, scales = of.start(np.random.default_rng(0), *seen[0]), []
+    proposals = of.proposals
+
+    def recorded(rng, particles, last, velocity, mismatch, scale=1.0):
+        scales.append((scale, velocity.any()))
+        return proposals(rng, particles, last, velocity, mismatch, scale)
+
+    of.__dict__["proposals"] = recorded
+    of.cycle(np.random.default_rng(0), state._replace(velocity=np.ones_like(state.pose)), MultiviewObservation(of.views, *seen[1]))
+    assert scales == [(1.0, True), (0.25, False), (0.0625, False)]
+
+
+@pytest.mark.parametrize(("cameras", "particles", "free_space"), [(5, 40, True), (6, 16, False), (7, 16, False)])
+def test_from_six_cameras_on_there_are_fewer_particles_and_no_free_space(cameras, particles, free_space, monkeypatch):
+    views = (actor.cameras() * 2)[:cameras]
+    of = MultiviewTracker(actor.body(), views, MultiviewSettings())
+    assert of.number == particles
+    points, masks = actor.filmed()[1][0]
+    asked = []
+    monkeypatch.setattr(MultiviewObservation, "space", property(lambda _: asked.append(True)))
+    of.refine(MultiviewObservation(of.views, points, (masks * 2)[:cameras]), np.zeros(len(NAMES)))
+    assert bool(asked) == free_space
+
+
+@pytest.mark.parametrize("iterations", [1, 5])
+def test_an_odd_number_of_force_iterations_is_done_in_full(iterations, monkeypatch):
+    done, of, (points, masks) = [], tracker("ni2008", "cylinders", forces={"iterations": iterations}), actor.filmed("cylinders")[1][0]
+    monkeypatch.setattr(type(of.refiner), "forces", lambda _, poses, cloud, settings: done.append(settings.iterations) or poses)
+    refine = of.refine(MultiviewObservation(of.views, points, masks), np.zeros(len(of.body.skeleton.dofs)))
+    assert refine is not None
+    refine(np.zeros((1, len(of.body.skeleton.dofs))))
+    assert sum(done) == iterations
+
+
 def test_a_state_says_what_its_pose_costs_and_how_it_moved():
     of = tracker()
     _, seen = actor.filmed()
     states = track(of, seen[:3])
     for before, state, (points, masks) in zip(states, states[1:], seen[1:]):
-        evidence = Evidence(of.stage, points, masks)
+        observation = MultiviewObservation(of.views, points, masks)
         pose = state.pose[None]
-        costs = of.refiner.costs(pose, evidence.full) + of.settings.silhouettes * evidence.differing(pose)
-        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.usual.strain(pose)[0])
-        assert state.overlap == evidence.overlap(state.pose)
+        costs = of.refiner.costs(pose, observation.full) + of.settings.silhouettes * observation.mismatch(pose)
+        assert state.cost == pytest.approx(costs[0] + of.settings.posture * of.posture_prior.penalty(pose)[0])
+        assert state.overlap == observation.overlap(state.pose)
         np.testing.assert_array_equal(state.velocity, state.pose - before.pose)
         np.testing.assert_array_equal(state.pose, state.particles.best)
         np.testing.assert_allclose(state.particles.log_weights, -state.particles.costs / of.settings.sigma_cost**2)
@@ -264,12 +312,12 @@ def test_a_camera_may_fall_out():
 
 @pytest.mark.parametrize(("overlap", "status"), [(0.49, "lost"), (0.51, "uncertain"), (0.69, "uncertain"), (0.71, "tracked")])
 def test_overlap_decides(overlap, status, monkeypatch):
-    monkeypatch.setattr(Evidence, "overlap", lambda *_: overlap)
+    monkeypatch.setattr(MultiviewObservation, "overlap", lambda *_: overlap)
     of, (points, masks) = tracker(), actor.filmed()[1][0]
-    evidence = Evidence(of.stage, points, masks)
+    observation = MultiviewObservation(of.views, points, masks)
     pose = actor.filmed()[0][0]
-    particles = evaluate(pose[None], of.weigh(evidence))
-    assert of.judge(pose, 0 * pose, particles, evidence, of.weigh(evidence)).status == status
+    particles = evaluate(pose[None], of.weigh(observation))
+    assert of.judge(pose, 0 * pose, particles, observation, of.weigh(observation)).status == status
 
 
 # Priors ---------------------------------------------------------------------------------------------------------------
@@ -292,6 +340,19 @@ def test_a_prior_of_the_motion_helps_where_there_are_few_particles(defensive):
     alone = [errors(one, followed(one, seen), poses).mean() for one in (
         tracker(method="particle_filter", prior=prior, defensive=0.0, particles=20, silhouettes=0.0) for prior in (learnt(), None))]
     assert alone[0] < alone[1]
+
+
+def test_particles_carry_the_regions_that_were_drawn_for_them():
+    _, seen = actor.filmed()
+    of = tracker(prior=learnt(), particles=8, defensive=0.5)
+    first, *after = followed(of, seen[:3])
+    assert (first.particles.regions[4:] >= 0).all()  # the cycles after the search draw from the prior
+    for state in after:
+        np.testing.assert_array_equal(state.particles.regions[:4], NO_REGION)
+        assert set(state.particles.regions[4:]) <= set(range(8))
+    selected = after[0].particles.select(np.array([7, 4, 4]))
+    np.testing.assert_array_equal(selected.regions, after[0].particles.regions[[7, 4, 4]])
+    np.testing.assert_array_equal(selected.poses, after[0].particles.poses[[7, 4, 4]])
 
 
 def test_a_prior_of_another_body_is_refused():

@@ -141,17 +141,20 @@ def _to_disc(found: Surface, p: Array, sign: float, depth: Array, middle: Array,
                    np.where(taken[:, None], feet, found.feet), np.where(taken[:, None], normals, found.normals))
 
 
-def nearest(limbs: Limbs, T: Array, points: Array, normals: Array, epsilon: float) -> tuple[NDArray[np.int64], Array, Surface]:
-    """The part (P,) nearest to each point by d (1 - eps cos) (eq. 31), that distance (P,), and the closest points."""
+def nearest(limbs: Limbs, T: Array, points: Array, normals: Array, epsilon: float, choice: str = "modulated",
+            ) -> tuple[NDArray[np.int64], Array, Surface]:  # fmt: skip
+    """The part (P,) nearest to each point, its distance d (1 - eps cos) (P,) (eq. 31), and the closest point; chosen by that distance, or
+    by d (`euclidean`)."""
     parts = [closest(limbs, s, T[joint], points) for s, joint in enumerate(limbs.joints)]
     apart = np.array([np.abs(part.distance) * (1 - epsilon * (part.normals * normals).sum(1)) for part in parts])
-    which, every = apart.argmin(0), np.arange(len(points))
+    chosen = apart if choice == "modulated" else np.array([np.abs(part.distance) for part in parts])
+    which, every = chosen.argmin(0), np.arange(len(points))
     return which, apart[which, every], Surface(*(np.stack(values)[which, every] for values in zip(*parts)))
 
 
 def cost(body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings) -> float:
     """D of eqs. 30 and 31 for a pose (D,): the mean over the points of min(d^2, tau^2), m^2."""
-    _, apart, _ = nearest(_limbs(body), place(body.skeleton, pose)[0], points, normals, surface.epsilon)
+    _, apart, _ = nearest(_limbs(body), place(body.skeleton, pose)[0], points, normals, surface.epsilon, surface.nearest)
     return float((weights * np.minimum(apart, surface.tau) ** 2).sum() / weights.sum())
 
 
@@ -172,7 +175,7 @@ def move_by_forces(
     number, which the paper leaves to its weights lambda and rho.
     """
     limbs, (T, motions) = _limbs(body), place(body.skeleton, pose)
-    which, _, found = nearest(limbs, T, points, normals, surface.epsilon)
+    which, _, found = nearest(limbs, T, points, normals, surface.epsilon, surface.nearest)
     pull = points - found.feet
     apart = np.linalg.norm(pull, axis=1) + 1e-9
     size = apart * (np.maximum((found.normals * normals).sum(1), 0) if settings.modulated else 1)  # m_F
@@ -201,7 +204,7 @@ def normal_equations(
     A point's weight falls with its distance (Geman & McClure 1987), to zero where the normals are opposed; both are means over the points.
     """
     limbs, (T, motions) = _limbs(body), place(body.skeleton, pose)
-    which, apart, found = nearest(limbs, T, points, normals, surface.epsilon)
+    which, apart, found = nearest(limbs, T, points, normals, surface.epsilon, surface.nearest)
     residual = ((points - found.feet) * normals).sum(1)
     fade = 1 / (1 + (apart / surface.tau) ** 2)
     share = weights * fade**2 * np.maximum((found.normals * normals).sum(1), 0) / weights.sum()

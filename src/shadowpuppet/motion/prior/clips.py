@@ -1,4 +1,4 @@
-"""Clips of motion made ready to learn from: mirrored, at another frame rate, without gaps."""
+"""Clips of motion prepared for learning: mirrored, and without gaps."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import true_runs
 from shadowpuppet.motion.motion import JointTable
 
-SIDES = {"left_": "right_", "right_": "left_"}
+OTHER_SIDE = {"left_": "right_", "right_": "left_"}
 
 
 def mirrored(table: JointTable) -> JointTable:
-    """The motion as a mirror shows it that stands along the world's X axis: left is right, and y has the other sign.
+    """The motion mirrored at the world's X axis: left and right change places, y changes its sign.
 
-    Raises `ShadowPuppetError` where a joint has a side and its counterpart is missing.
+    Raises `ShadowPuppetError` if a joint of one side has no counterpart.
     """
     names = tuple(_other_side(name) for name in table.names)
     alone = [name for name, other in zip(table.names, names, strict=True) if other not in table.names]
@@ -27,13 +27,13 @@ def mirrored(table: JointTable) -> JointTable:
 
 
 def without_gaps(values: ArrayLike, shortest: int = 2) -> list[Array]:
-    """The parts of a clip (T, D) in which every number is known, those of `shortest` frames or more."""
+    """The runs of frames of a clip (T, D) without missing numbers, each of `shortest` frames or more."""
     values = np.asarray(values, float)
     return [values[start:end] for start, end in true_runs(np.isfinite(values).reshape(len(values), -1).all(1)) if end - start >= shortest]
 
 
 def _other_side(name: str) -> str:
-    for side, other in SIDES.items():
+    for side, other in OTHER_SIDE.items():
         if name.startswith(side):
             return other + name.removeprefix(side)
     return name

@@ -1,7 +1,6 @@
-"""Hidden Markov models: which state was when, given a whole sequence and how well every state explains every frame of it.
+"""Hidden Markov models: the posterior of the states, given the log density of every frame in every state.
 
-Knows no densities: their logarithms come in as an array. All sums are of logarithms, so that neither long sequences nor densities that
-differ by a factor of e^10000 underflow, and a transition of probability zero is one.
+All sums are in log space, so that long sequences and extreme densities do not underflow; transitions may have probability zero.
 """
 
 from __future__ import annotations
@@ -15,22 +14,22 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.jit import inline_kernel, kernel
 
 NEGLIGIBLE = -40.0
-"""A term of a sum that is less than e^NEGLIGIBLE of its greatest changes no digit of it."""
+"""Terms below e^NEGLIGIBLE of a sum's largest change none of its digits."""
 
 
 class Posterior(NamedTuple):
-    """What a whole sequence says of its states."""
+    """Posterior of the states of a sequence."""
 
     states: Array
     """Probability of each state in each frame, gamma of eq. 7, of shape (T, M)."""
     pairs: Array
     """Expected number of transitions from state i to state j, the sum of xi over time (eqs. 15 and 16), of shape (M, M)."""
     log_likelihood: float
-    """Of the sequence; -inf where the model cannot make it, and then the arrays are zero."""
+    """Of the sequence; -inf if the model cannot produce it, and then the arrays are zero."""
 
 
 def posterior(log_densities: ArrayLike, initial: ArrayLike, transitions: ArrayLike) -> Posterior:
-    """The forward-backward algorithm (Ni 2008, eqs. 1 to 7, 15, 16; Rabiner 1989).
+    """The forward-backward algorithm (Ni 2008, eqs. 1-7, 15, 16; Rabiner 1989).
 
     `log_densities` (T, M): log b_j(x_t). `initial` (M,) and `transitions` (M, M), rows summing to one: probabilities.
     """

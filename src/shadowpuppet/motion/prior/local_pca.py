@@ -1,7 +1,7 @@
-"""Local principal subspaces: regions of a space of poses, each a centre and the few directions in which poses vary there.
+"""Local principal subspaces: regions of the space of poses, each with a centre and the few directions in which poses vary there.
 
-The local model of VQPCA (Kambhatla & Leen 1997; Ni 2008, IV). Its density has the same variance in all directions but the leading
-ones (Tipping & Bishop 1999): with fewer poses in a region than numbers in a pose, a covariance is singular and no density at all.
+The local model of VQPCA (Kambhatla & Leen 1997; Ni 2008, IV). Its density has one variance in all but the leading directions (Tipping &
+Bishop 1999), because the covariance of a region with fewer poses than numbers in a pose is singular.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 
 Regions = NDArray[np.int64]
-ORTHONORMAL = 1e-6
-"""How far products of basis vectors may be from one and zero."""
+ORTHONORMAL_TOLERANCE = 1e-6
+"""Largest difference of the basis vectors' products from one and zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class Subspaces:
-    """M regions of poses of D numbers, each with a subspace of m dimensions. Raises `ShadowPuppetError` for arrays that are none."""
+    """M regions of poses of D numbers, each with a subspace of m dimensions. Raises `ShadowPuppetError` for invalid arrays."""
 
     centres: Array
     """r_i, of shape (M, D), in the poses' own units."""
@@ -50,7 +50,7 @@ class Subspaces:
         for name in ("variances", "noise"):
             if getattr(self, name).min() <= 0:
                 raise ShadowPuppetError(f"{name}: found {getattr(self, name).min()}, expected variances, which are more than zero")
-        if np.abs(self.bases.transpose(0, 2, 1) @ self.bases - np.eye(m)).max() > ORTHONORMAL:
+        if np.abs(self.bases.transpose(0, 2, 1) @ self.bases - np.eye(m)).max() > ORTHONORMAL_TOLERANCE:
             raise ShadowPuppetError("bases: found vectors that are not orthonormal, expected an orthonormal basis of each region")
 
     def __len__(self) -> int:
@@ -69,8 +69,8 @@ class Subspaces:
 
     @cached_property
     def _flat(self) -> tuple[Array, Array, Array, Array]:
-        """For all regions at once: middle (D,), centres from there (M, D), bases (D, M m), the centres' coordinates (M m,)."""
-        middle = self.centres.mean(0)  # squares of what lies far from zero would drown the distances
+        """For all regions at once: mean of the centres (D,), centres from there (M, D), bases (D, M m), the centres' coordinates (M m,)."""
+        middle = self.centres.mean(0)  # offsets keep the distances' digits for poses far from zero
         centres, flat = self.centres - middle, np.ascontiguousarray(self.bases.transpose(1, 0, 2)).reshape(self.width, -1)
         return middle, centres, flat, np.einsum("id,idk->ik", centres, self.bases).ravel()
 
@@ -114,10 +114,7 @@ class Subspaces:
 
 
 def principal_subspaces(poses: Array, partition: Regions, regions: int, dimensions: int, floor: float) -> Subspaces:
-    """Subspaces of poses (T, D) that a partition (T,) gives to so many regions, none empty (eqs. 12 to 14).
-
-    No variance is less than `floor`: a region of few poses has none in most directions.
-    """
+    """Subspaces of poses (T, D) under a partition (T,) into `regions`, none empty (eqs. 12-14), with variances of at least `floor`."""
     width = poses.shape[1]
     centres, spread = np.empty((regions, width)), np.empty((regions, width, width))
     order, ends = np.argsort(partition, kind="stable"), np.cumsum(np.bincount(partition, minlength=regions))
@@ -132,6 +129,6 @@ def principal_subspaces(poses: Array, partition: Regions, regions: int, dimensio
 
 
 def _signs(bases: Array) -> Array:
-    """Signs (M, 1, m) that make the greatest number of each basis vector positive: eigenvectors have none of their own."""
+    """Signs (M, 1, m) that make the largest entry of each basis vector positive: an eigenvector's sign is arbitrary."""
     greatest = np.abs(bases).argmax(1, keepdims=True)
     return np.where(np.take_along_axis(bases, greatest, 1) < 0, -1.0, 1.0)

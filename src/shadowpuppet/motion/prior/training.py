@@ -1,4 +1,4 @@
-"""From joints over time to a motion prior of a body: poses fitted, one frame rate, gaps cut, regions learnt (Ni 2008, IV)."""
+"""A motion prior from joints over time (Ni 2008, IV): fit poses, resample to one frame rate, cut gaps, learn."""
 
 from __future__ import annotations
 
@@ -21,52 +21,52 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.clips import mirrored, without_gaps
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.motion.prior.vqpca import Choice, Fit, choose_regions, fit_prior
+from shadowpuppet.motion.prior.vqpca import PriorFit, RegionChoice, choose_regions, fit_prior
 
 RATE = 60.0
-"""Frames/s that are learnt where nothing else is wanted: HumanEva's, and the recordings' of the paper."""
-DOUBTFUL, WRONG = 0.03, 0.1
-"""Residuals of joints, metres, from which on a motion is doubted, and refused: it is no person's, or its joints are others than ours."""
-STILL = np.radians(0.5)
-"""Root mean square deviation of the angles, rad, below which nobody moves."""
+"""Default frame rate of a prior, frames/s: that of HumanEva."""
+DOUBTFUL_RESIDUAL, WRONG_RESIDUAL = 0.03, 0.1
+"""Residuals of the joints, metres, from which a motion gives a warning, and an error: no person, or joints that are defined otherwise."""
+MIN_MOTION = np.radians(0.5)
+"""Root mean square deviation of the angles, rad, below which there is no motion."""
 
 
 @dataclass(frozen=True, eq=False)
-class Clip:
-    """Joints of one file as poses."""
+class TrainingClip:
+    """Poses fitted to the joints of one file."""
 
     name: str
     fitted: FittedPoses
-    """At the rate it was measured at, or at the prior's where that is less."""
+    """At the file's frame rate or the prior's, whichever is lower."""
     parts: list[Array]
     """Poses (T, D) of all DOF at the prior's rate, without gaps."""
 
     @property
     def frames(self) -> int:
-        """Frames that were learnt from."""
+        """Number of frames that are learnt from."""
         return sum(map(len, self.parts))
 
 
-class Trained(NamedTuple):
-    """A prior, and what it was learnt from."""
+class TrainedPrior(NamedTuple):
+    """A prior, its training clips and errors."""
 
     prior: MotionPrior
-    fit: Fit
-    clips: tuple[Clip, ...]
-    choice: Choice | None
-    """How the number of regions was chosen, where it was."""
+    fit: PriorFit
+    clips: tuple[TrainingClip, ...]
+    choice: RegionChoice | None
+    """How the number of regions was chosen; None if it was given."""
     error: float
-    """Root mean square of what encoding and reconstructing loses of a pose, rad (and metres, where there are places among the DOF)."""
+    """Root mean square error of encoding and reconstructing a pose, rad (and metres, of translations)."""
     joint_error: float
-    """The same of the joints' places, metres, the pelvis held where it is."""
+    """The same of the joint positions, metres, with the root held."""
 
 
 def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], settings: PriorSettings | None = None, *,
-                body: str = "anatomical", rate: float = RATE, candidates: Sequence[int] = ()) -> Trained:
-    """Learn a motion from joints (metres, Z up) of one or several clips, by their names, of any frame rates and people.
+                body: str = "anatomical", rate: float = RATE, candidates: Sequence[int] = ()) -> TrainedPrior:
+    """Learn a motion prior of a body, at `rate` frames/s, from joints (metres, Z up) of clips by name, of any frame rate and person.
 
-    `candidates`: numbers of regions to choose among, instead of that in `settings`. Raises `ShadowPuppetError` naming the clip, where
-    joints are not a whole person's, or too few frames are left for the regions; warns where they fit badly, or nobody moves.
+    `candidates`: numbers of regions to choose from, instead of that in `settings`. Raises `ShadowPuppetError`, naming the clip, if joints
+    are not a whole person's or too few frames are left for the regions; warns of a bad fit and of clips without motion.
     """
     settings = settings or PriorSettings()
     if not tables:
@@ -84,18 +84,17 @@ def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], sett
     choice = choose_regions(rng, chosen, candidates, settings) if candidates else None
     fit = fit_prior(rng, chosen, settings if choice is None else replace(settings, regions=choice.regions), names=names, rate=rate)
     error, joint_error = reconstruction_errors(fit.prior, clips)
-    return Trained(fit.prior, fit, clips, choice, error, joint_error)
+    return TrainedPrior(fit.prior, fit, clips, choice, error, joint_error)
 
 
 def modelled(skeleton: Skeleton, dofs: str = "articulation") -> tuple[str, ...]:
-    """DOF that a prior of a whole body models: `articulation` is all but place and heading, `all` is all, as in the paper."""
+    """Names of the DOF that a prior models: `articulation`: all but position and heading; `all`: all, as in the paper."""
     return tuple(name for name in skeleton.dof_names if dofs == "all" or name not in GLOBAL_DOFS)
 
 
 def matched(prior: MotionPrior, skeleton: Skeleton, rate: float) -> MotionPrior:
-    """The prior for a skeleton and frames a second: transitions of more or fewer steps than it has learnt.
-
-    Of a step that is a share f of the learnt one, (1 - f) stays. Raises `ShadowPuppetError` where the prior is of another body.
+    """The prior with transitions for another frame rate (frames/s): powers of the transition matrix A, and for a part f of a step
+    (1 - f) I + f A. Raises `ShadowPuppetError` if the prior is of another body than the skeleton.
     """
     other = [name for name in prior.names if name not in skeleton.dof_names]
     if other or not prior.names:
@@ -108,8 +107,8 @@ def matched(prior: MotionPrior, skeleton: Skeleton, rate: float) -> MotionPrior:
     return replace(prior, transitions=rows / rows.sum(1, keepdims=True), rate=rate)
 
 
-def reconstruction_errors(prior: MotionPrior, clips: Sequence[Clip]) -> tuple[float, float]:
-    """Root mean square of what encoding and reconstructing the clips' poses loses: of the DOF, and of the joints' places (metres)."""
+def reconstruction_errors(prior: MotionPrior, clips: Sequence[TrainingClip]) -> tuple[float, float]:
+    """Root mean square errors of encoding and reconstructing the clips' poses: of the DOF, and of the joint positions (metres)."""
     squares, places = list[Array](), list[Array]()
     for clip in clips:
         body = clip.fitted.body
@@ -124,15 +123,15 @@ def reconstruction_errors(prior: MotionPrior, clips: Sequence[Clip]) -> tuple[fl
 
 
 def _sides(tables: Mapping[str, JointTable], both: bool) -> Iterator[tuple[str, JointTable]]:
-    """Tables by name, and their mirror images."""
+    """Tables by name, and with `both` their mirror images."""
     for name, table in tables.items():
         yield name, table
         if both:
             yield f"{name}, mirrored", mirrored(table)
 
 
-def _clip(name: str, table: JointTable, body: str, rate: float) -> Clip:
-    """Poses of a table: slower ones are fitted first and then resampled, which leaves bones their length, faster ones the other way."""
+def _clip(name: str, table: JointTable, body: str, rate: float) -> TrainingClip:
+    """Poses of a table. A lower frame rate is fitted before it is resampled, which keeps the bones' lengths; a higher one after."""
     known = np.flatnonzero(np.isfinite(table.positions).all(2).any(0))
     table = table.select([table.names[n] for n in known])
     slower = len(table.times) < 2 or np.median(np.diff(table.times)) >= 1 / rate
@@ -141,22 +140,22 @@ def _clip(name: str, table: JointTable, body: str, rate: float) -> Clip:
     _check_fit(name, fitted)
     complete = np.asarray(np.isfinite(table.positions).all((1, 2)))
     poses = resample(fitted.times, np.where(complete[:, None], fitted.poses, np.nan), rate)[1]
-    return Clip(name, fitted, without_gaps(poses))
+    return TrainingClip(name, fitted, without_gaps(poses))
 
 
 def _check_fit(name: str, fitted: FittedPoses) -> None:
     residual = fitted.residual
-    if residual < DOUBTFUL:
+    if residual < DOUBTFUL_RESIDUAL:
         return
     worst = max(fitted.by_joint, key=fitted.by_joint.__getitem__)
     said = f"{name}: joints lie {1000 * residual:.0f} mm off the body on average, {worst} {1000 * fitted.by_joint[worst]:.0f} mm"
-    if residual >= WRONG:
+    if residual >= WRONG_RESIDUAL:
         raise ShadowPuppetError(f"{said}, expected a person with the body's joints, whose bones keep their lengths")
     warn(f"{said}: are its joints those of the body?", ShadowPuppetWarning, stacklevel=4)
 
 
 def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
-    """Headings without whole turns between the parts."""
+    """Poses of the parts, with headings that differ by no whole turns."""
     column = skeleton.dof_names.index("root_heading")
     base, out = float(np.median(parts[0][:, column])), []
     for part in parts:
@@ -167,6 +166,6 @@ def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
 
 
 def _check_moves(clips: Sequence[Array], names: str) -> None:
-    if float(np.sqrt(np.concatenate(clips).var(0).mean())) < STILL:
+    if float(np.sqrt(np.concatenate(clips).var(0).mean())) < MIN_MOTION:
         warn(f"{names}: nobody moves there, so that the prior knows one posture only", ShadowPuppetWarning, stacklevel=3)
 

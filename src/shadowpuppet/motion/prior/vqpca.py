@@ -1,8 +1,7 @@
-"""Learning a motion prior: vector quantisation by local principal components, in a hidden Markov model (Ni 2008, IV).
+"""Learning a motion prior (Ni 2008, IV): vector quantisation by local principal components (VQPCA), in a hidden Markov model.
 
-In the paper's iteration the regions depend on nothing but the frames (eqs. 8 to 14), and the transitions on the regions (eqs. 1 to 7,
-15 to 17). So the regions are learnt first, where each round lowers the error of reconstruction or leaves it; then the transitions, where
-each iteration of expectation-maximisation raises the likelihood or leaves it. Both come to rest, as the paper's one loop does.
+In the paper's loop the regions depend only on the frames (eqs. 8-14), and the transitions on the regions (eqs. 1-7, 15-17). So the regions
+are learnt first, with an error that never rises, and then the transitions, with a likelihood that never falls: the same fixed point.
 """
 
 from __future__ import annotations
@@ -22,58 +21,57 @@ from shadowpuppet.motion.prior.local_pca import Regions, Subspaces, principal_su
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 
-GREATEST = 1e9
-"""Numbers of poses are less than this: squares of greater ones have too few digits."""
-LEAST_VARIANCE = 1e-150
-"""Where the poses hardly vary, so that densities stay finite."""
+MAX_VALUE = 1e9
+"""Bound of a pose's numbers: squares of larger ones lose their digits."""
+MIN_VARIANCE = 1e-150
+"""Smallest variance, for poses that hardly vary: densities stay finite."""
 
 
-class Fit(NamedTuple):
-    """A prior, and how it was learnt."""
+class PriorFit(NamedTuple):
+    """A prior and the course of its learning."""
 
     prior: MotionPrior
     errors: tuple[float, ...]
-    """Root mean square error of reconstruction, in the units of the poses' numbers, in each round of the regions; never rises."""
+    """Root mean square reconstruction error, in the poses' units, after each round of the regions; never rises."""
     log_likelihoods: tuple[float, ...]
-    """Of the training clips, before each iteration of expectation-maximisation, and after the last; never falls."""
+    """Of the training clips, before each EM iteration and after the last; never falls."""
 
 
-class Choice(NamedTuple):
-    """How well numbers of regions do, and the one to take."""
+class RegionChoice(NamedTuple):
+    """Errors of several numbers of regions, and the number chosen."""
 
     regions: int
     """The number chosen, M."""
     candidates: tuple[int, ...]
-    """The numbers tried, K of them, rising."""
+    """The K numbers tried, rising."""
     training_errors: tuple[float, ...]
-    """Root mean square error of reconstruction of the clips that were learnt from, by candidate."""
+    """Root mean square reconstruction errors (K) on the training folds."""
     held_out_errors: tuple[float, ...]
-    """The same of those that were not."""
+    """The same on the held-out folds."""
 
 
 def fit_prior(rng: np.random.Generator, clips: Sequence[ArrayLike], settings: PriorSettings | None = None, *, names: Sequence[str] = (),
-        rate: float | None = None) -> Fit:
-    """Learn a motion from clips (T, D), one or several, of poses in the order of time, all at one frame rate.
+        rate: float | None = None) -> PriorFit:
+    """Learn a motion prior from clips of poses (T, D) in the order of time, all at one frame rate.
 
-    `names` (D of them) and `rate` (frames/s) are kept in the prior. Raises `ShadowPuppetError` for clips that do not fit together, have
-    gaps, or hold too few poses for the number of regions; `SettingsError` for settings that do not suit them.
+    `names` (D) and `rate` (frames/s) are stored in the prior. Raises `ShadowPuppetError` for clips that differ in width, have gaps, or have
+    too few poses for the number of regions; `SettingsError` for settings that do not suit them.
     """
     settings = settings or PriorSettings()
     arrays = check_clips(clips)
     subspaces, errors = learn_subspaces(rng, np.concatenate(arrays), settings)
-    initial = np.full(len(subspaces), 1 / len(subspaces))  # equal, as the paper has it, and kept: a film may start anywhere in the motion
+    initial = np.full(len(subspaces), 1 / len(subspaces))  # equal, as in the paper: a film may start anywhere in the motion
     densities = [subspaces.log_densities(clip) for clip in arrays]
     transitions, log_likelihoods = _maximise(densities, initial, settings)
-    return Fit(MotionPrior(subspaces, transitions, initial, tuple(names), rate), tuple(errors), tuple(log_likelihoods))
+    return PriorFit(MotionPrior(subspaces, transitions, initial, tuple(names), rate), tuple(errors), tuple(log_likelihoods))
 
 
 def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candidates: Sequence[int] = (5, 10, 15, 20, 30, 40, 60, 80),
-                   settings: PriorSettings | None = None, *, folds: int = 5, margin: float = 0.05) -> Choice:
-    """The least number of regions that reconstructs unseen motion as well as any, but for a share `margin`.
+                   settings: PriorSettings | None = None, *, folds: int = 5, margin: float = 0.05) -> RegionChoice:
+    """The smallest number of regions whose held-out error is within a share `margin` of the best.
 
-    Each clip, poses (T, D), is cut into `folds` pieces; each piece in turn is left out and reconstructed from what was learnt without.
-    (The paper takes the number by eye, from the training error, which always falls.) Candidates for which there are too few poses are
-    left out. Raises as `fit_prior` does, where there is none left.
+    Each clip of poses (T, D) is cut into `folds` pieces; each piece in turn is left out of learning and reconstructed. (The paper picks the
+    number from the training error, which always falls.) Candidates with too few poses are skipped. Raises as `fit_prior`.
     """
     settings, arrays = settings or PriorSettings(), check_clips(clips)
     if folds < 2:
@@ -91,22 +89,22 @@ def choose_regions(rng: np.random.Generator, clips: Sequence[ArrayLike], candida
                        for number in tried])
     training, held_out = np.sqrt((errors**2).mean(1)).T
     chosen = tried[int(np.flatnonzero(held_out <= (1 + margin) * held_out.min())[0])]
-    return Choice(chosen, tuple(tried), tuple(training.tolist()), tuple(held_out.tolist()))
+    return RegionChoice(chosen, tuple(tried), tuple(training.tolist()), tuple(held_out.tolist()))
 
 
 def reconstruction_error(prior: MotionPrior, clips: Sequence[ArrayLike]) -> float:
-    """Root mean square, in the units of the poses' numbers, of what encoding clips (T, D) and reconstructing them loses."""
+    """Root mean square error, in the poses' units, of encoding and reconstructing clips (T, D)."""
     return _error(prior.subspaces, np.concatenate(check_clips(clips)))
 
 
 def log_likelihood(prior: MotionPrior, clips: Sequence[ArrayLike]) -> float:
-    """Log likelihood of clips (T, D), each from its start, summed."""
+    """Sum of the log likelihoods of clips (T, D)."""
     densities = map(prior.subspaces.log_densities, check_clips(clips))
     return float(sum(posterior(each, prior.initial, prior.transitions).log_likelihood for each in densities))
 
 
 def check_clips(clips: Sequence[ArrayLike]) -> list[Array]:
-    """Clips as arrays (T, D). Raises `ShadowPuppetError` where one is none, has a gap, or another width than the first."""
+    """Clips as arrays (T, D). Raises `ShadowPuppetError` for an empty clip, a gap, or a width that differs from the first's."""
     arrays: list[Array] = []
     for c, clip in enumerate(clips):
         poses = np.asarray(clip, float)
@@ -114,10 +112,10 @@ def check_clips(clips: Sequence[ArrayLike]) -> list[Array]:
             raise ShadowPuppetError(f"clip {c}: found shape {poses.shape}, expected (frames, numbers of a pose)")
         if arrays and poses.shape[1] != arrays[0].shape[1]:
             raise ShadowPuppetError(f"clip {c}: found poses of {poses.shape[1]} numbers, expected {arrays[0].shape[1]}, as in clip 0")
-        bad = np.argwhere(~(np.abs(poses) < GREATEST))
+        bad = np.argwhere(~(np.abs(poses) < MAX_VALUE))
         if len(bad):
             raise ShadowPuppetError(f"clip {c}: found {poses[*bad[0]]} in frame {bad[0, 0]}, the first of {len(np.unique(bad[:, 0]))} such "
-                                    f"frames, expected numbers less than {GREATEST:g}; cut clips with gaps by clips.without_gaps")
+                                    f"frames, expected numbers less than {MAX_VALUE:g}; cut clips with gaps by clips.without_gaps")
         arrays.append(poses)
     if not arrays:
         raise ShadowPuppetError("clips: found none, expected one or more")
@@ -135,7 +133,7 @@ def _check_settings(settings: PriorSettings, poses: Array) -> None:
 
 
 def _split(clips: list[Array], fold: int, folds: int) -> tuple[list[Array], list[Array]]:
-    """Clips without their piece `fold` of `folds`, and those pieces."""
+    """The clips without piece `fold` of `folds`, and those pieces."""
     kept, out = [], []
     for clip in clips:
         start, end = (len(clip) * k // folds for k in (fold, fold + 1))
@@ -145,13 +143,13 @@ def _split(clips: list[Array], fold: int, folds: int) -> tuple[list[Array], list
 
 
 def _errors(rng: np.random.Generator, kept: list[Array], out: list[Array], settings: PriorSettings, regions: int) -> tuple[float, float]:
-    """Errors of reconstruction of what was learnt from, and of what was not."""
+    """Reconstruction errors of the training and the held-out poses."""
     subspaces, _ = learn_subspaces(rng, np.concatenate(kept), replace(settings, regions=regions))
     return _error(subspaces, np.concatenate(kept)), _error(subspaces, np.concatenate(out))
 
 
 def _error(subspaces: Subspaces, poses: Array) -> float:
-    """Root mean square error of reconstruction of poses (T, D)."""
+    """Root mean square reconstruction error of poses (T, D)."""
     return float(np.sqrt(subspaces.distances(poses).min(1).mean() / subspaces.width))
 
 
@@ -159,20 +157,20 @@ def _error(subspaces: Subspaces, poses: Array) -> float:
 
 
 def learn_subspaces(rng: np.random.Generator, poses: Array, settings: PriorSettings) -> tuple[Subspaces, list[float]]:
-    """Regions of poses (T, D), in order of time, and the errors of the rounds in which they were learnt. Raises as `fit_prior` does."""
+    """Regions of poses (T, D), numbered in order of time, and the errors of their rounds. Raises as `fit_prior`."""
     _check_settings(settings, poses)
-    floor = max(settings.noise * float(poses.var(0).mean()), LEAST_VARIANCE)
+    floor = max(settings.noise * float(poses.var(0).mean()), MIN_VARIANCE)
     learnt = [_quantise(rng, poses, settings, floor) for _ in range(settings.starts)]
     partition, errors = min(learnt, key=lambda each: each[1][-1])
     return principal_subspaces(poses, _in_order_of_time(partition), settings.regions, settings.dimensions, floor), errors
 
 
 def _quantise(rng: np.random.Generator, poses: Array, settings: PriorSettings, floor: float) -> tuple[Regions, list[float]]:
-    """A partition (T,) of poses (T, D) into regions, none empty, and the errors of its rounds."""
+    """A partition (T,) of poses (T, D) into regions, none empty, and the errors of the rounds."""
     M, every, errors = settings.regions, np.arange(len(poses)), list[float]()
     different = np.unique(poses, axis=0, return_index=True)[1]
     centres = poses[rng.choice(different, M, replace=False)]
-    # With S = I the paper's first subspaces are any through the centres: so the first partition is by the centres alone.
+    # The paper starts with S = I, whose eigenvectors are arbitrary: the first partition is by the centres alone.
     following = _fill(cdist(poses, centres, "sqeuclidean").argmin(1), np.zeros(len(poses)), M)
     while True:
         partition = following
@@ -187,7 +185,7 @@ def _quantise(rng: np.random.Generator, poses: Array, settings: PriorSettings, f
 
 
 def _fill(partition: Regions, scores: Array, regions: int) -> Regions:
-    """The partition (T,) with no region empty: each empty one gets the frame of greatest score (T,) of a region that keeps another."""
+    """The partition (T,) with no empty region: each gets the frame of greatest score (T,) among regions with more than one frame."""
     partition = partition.copy()
     counts = np.bincount(partition, minlength=regions)
     for region in np.flatnonzero(counts == 0):
@@ -198,7 +196,7 @@ def _fill(partition: Regions, scores: Array, regions: int) -> Regions:
 
 
 def _in_order_of_time(partition: Regions) -> Regions:
-    """The same regions, numbered as they first come."""
+    """The same regions, numbered by their first frame."""
     _, first, number = np.unique(partition, return_index=True, return_inverse=True)
     return first.argsort().argsort()[number]
 
@@ -207,7 +205,7 @@ def _in_order_of_time(partition: Regions) -> Regions:
 
 
 def _maximise(densities: list[Array], initial: Array, settings: PriorSettings) -> tuple[Array, list[float]]:
-    """The likeliest transitions (M, M) for log densities (T, M) of every clip, and the log likelihoods on the way there."""
+    """The likeliest transitions (M, M) for log densities (T, M) of every clip, and the log likelihoods of the iterations."""
     M, frames, values = len(initial), sum(map(len, densities)), list[float]()
     transitions = np.full((M, M), 1 / M)
     while True:
@@ -220,9 +218,9 @@ def _maximise(densities: list[Array], initial: Array, settings: PriorSettings) -
 
 
 def likeliest_rows(counts: Array, least: float) -> Array:
-    """Rows of probabilities (M, M), none less than `least`, that make counts (M, M) of transitions likeliest (eq. 17 if `least` is 0).
+    """Maximum-likelihood rows of probabilities (M, M), none below `least`, for counts (M, M) of transitions (eq. 17 if `least` is 0).
 
-    Every entry is its count by a common measure, or `least` where that is more. A row without counts says nothing: all are equal.
+    Entries are proportional to their counts, or `least` where that is more; equal in a row without counts.
     """
     counts = np.where(counts.sum(1, keepdims=True) > 0, counts, 1.0)
     low = np.zeros(counts.shape, bool)

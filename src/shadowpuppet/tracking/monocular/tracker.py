@@ -17,9 +17,10 @@ from shadowpuppet.tracking.monocular.extended_stage import make_stage
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
+from shadowpuppet.tracking.recovery import settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
-from shadowpuppet.tracking.status import ABSENT, SETTLE_CYCLES, status_of
+from shadowpuppet.tracking.status import ABSENT_AREA, status_of
 
 
 class State(NamedTuple):
@@ -48,20 +49,13 @@ class MonocularTracker:
     """A resampling scheme of your own, in place of the settings'."""
 
     def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
-        """A new mask (H, W). Someone who is not there is waited for; who was lost, or comes back, is searched for afresh (`recover`).
-        `also`: a cost of your own, poses (N, D) to pixels (N,), which is added to eq. 2. Raises `TrackingError` for a mask that has not
-        the camera's size."""
+        """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
+        `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2. Raises `TrackingError` for a mask of another size than the
+        camera's."""
         mask = check_mask(mask, self.picture.camera.size)
-        if self.is_absent(mask, state.pose):
-            return self.absent(state)
-        recover = self.settings.recover
-        if state.status == "absent" and recover:
-            return self.start(rng, mask, also)
-        after = self.cycle(rng, state, mask, also)
-        if after.status == "lost" and recover:
-            found = self.start(rng, mask, also)
-            return found if found.overlap > after.overlap else after
-        return after
+        return track_or_recover(
+            state, is_absent=self.is_absent(mask, state.pose), recover=self.settings.recover, hold=self.absent,
+            cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, mask, also))  # fmt: skip
 
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
@@ -93,9 +87,7 @@ class MonocularTracker:
         state = self.judge(found.pose, particles, observation)
         if self.is_absent(mask, found.pose):
             return self.absent(state)
-        for _ in range(SETTLE_CYCLES):
-            state = self.cycle(rng, state, mask, also)
-        return state
+        return settle(state, lambda state: self.cycle(rng, state, mask, also))
 
     def observe(self, mask: Mask, pose: Array, also: Cost | None = None) -> Observation:
         """The observation of a mask (H, W); with `ignore_legs` less the region where the legs of `pose` (D,) may be."""
@@ -107,8 +99,8 @@ class MonocularTracker:
         return State(pose, tuple(particles), cost, overlap, status_of(overlap))
 
     def is_absent(self, mask: Mask, pose: Array) -> bool:
-        """Whether a mask (H, W) is too small to show a person in `pose` (D,)."""
-        return int(np.count_nonzero(mask)) < max(ABSENT * count(self.picture.draw(pose)), 1)
+        """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
+        return int(np.count_nonzero(mask)) < max(ABSENT_AREA * count(self.picture.draw(pose)), 1)
 
     @staticmethod
     def absent(state: State) -> State:

@@ -1,6 +1,6 @@
-"""A person's sizes and poses solved together over some frames (bundle adjustment), so that the body fits the hulls of all.
+"""Bundle adjustment: body sizes and the poses of several frames, solved together for the surface points of all.
 
-Bodies are linear in their sizes: offsets of joints, and what limbs are made of, are sums of what every size adds.
+A body's joint offsets and limb shapes are linear in its sizes.
 """
 
 from __future__ import annotations
@@ -17,43 +17,51 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, Single, constants, foot, measure, nearest, place_parts
+from shadowpuppet.tracking.multiview.refinement.correspondence import (
+    LANES,
+    Cloud,
+    Single,
+    closest_on_part,
+    closest_point,
+    nearest,
+    normal_weights,
+    part_constants,
+    place_parts,
+)
 from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 Measured = TypeVar("Measured", bound=Sizes)
-NUDGE = 1e-3
-"""Step (m) by which what a size does to the points is found."""
-NOISE, WORTH = 0.01, 30.0
-"""Deviation (m) of a surface point from its body, and how many points of a frame tell something of their own: neighbours err alike, and
-all points of a body of simple shape."""
+SIZE_STEP = 1e-3
+"""Step (m) of the finite differences with respect to the sizes."""
+POINT_NOISE, INDEPENDENT_POINTS = 0.01, 30.0
+"""Standard deviation (m) of a surface point from its body, and effective number of independent points per frame: neighbours err alike."""
 ROUNDS = 10
-FARTHEST, FARTHEST_TURN = 0.03, 0.3
-"""No size (m) and no DOF (rad or m) goes farther in a round."""
+MAX_SIZE_STEP, MAX_POSE_STEP = 0.03, 0.3
+"""Largest step of a size (m) and of a DOF (rad or m) in a round."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bundle(Generic[Measured]):
-    """What was solved for."""
+    """The solution."""
 
     sizes: Measured
     poses: Array
-    """Of the frames, of shape (F, D)."""
+    """Poses of the frames, of shape (F, D)."""
     residual: float
-    """Root mean square distance of the points to the tangent planes, metres, those that count."""
+    """Weighted root mean square distance of the points to the tangent planes, metres."""
 
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
-                 first: Measured | None = None, worth: float = WORTH) -> Bundle[Measured]:
-    """Sizes of a body that `make` makes, and poses (F, D), for the surface points of F frames, by damped Gauss-Newton.
+                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS) -> Bundle[Measured]:
+    """Sizes and poses for the surface points of F frames, by damped Gauss-Newton from poses (F, D) and the sizes `first` or `expected`.
 
-    Sizes are expected with deviations `spread` (K,), metres; those without any stay as they are. `pull`, one or (F, D), holds poses to
-    `centre` (F, D), or to where they begin, and points count less the farther off they are, both as in `Refiner.gauss_newton`. `first`:
-    sizes to begin with, if not those expected.
+    `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `pull`, one or (F, D): weight of the squared distance
+    from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
-    free, scale = np.flatnonzero(spread > 0), worth / NOISE**2
+    free, scale = np.flatnonzero(spread > 0), worth / POINT_NOISE**2
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
@@ -73,7 +81,7 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
 
 
 class _Model(NamedTuple):
-    """What kernels know of a body."""
+    """A body as the kernels' arrays."""
 
     chain: Chain
     joints: NDArray[np.int64]
@@ -93,25 +101,25 @@ def _model(body: Body) -> _Model:
         if parent >= 0:
             above[:, j] |= above[:, parent]
     chain = make_chain(skeleton)
-    return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), constants(limbs),
+    return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), part_constants(limbs),
                   above[chain.owners])
 
 
 class _Frame(NamedTuple):
-    """A frame's normal equations, divided by the weight of its points."""
+    """A frame's normal equations, divided by the total weight of its points."""
 
     cost: float
-    """Bounded, as in eq. 31."""
+    """Bounded, as in eq. 30."""
     squared: float
-    """Mean square distance to the tangent planes of the points that count, m^2."""
+    """Weighted mean square distance to the tangent planes, m^2."""
     rows: Array
-    """What poses and sizes do to the distances, of shape (D + K, D + K), summed over the points."""
+    """Normal matrix of pose and sizes, of shape (D + K, D + K)."""
     gradient: Array
-    """Of shape (D + K,)."""
+    """Right side, of shape (D + K,)."""
 
 
 class _Solution(NamedTuple):
-    """Sizes and poses, what they cost, and how they would be better."""
+    """Sizes and poses, their cost and normal equations."""
 
     at: tuple[Array, Array]
     cost: float
@@ -121,13 +129,13 @@ class _Solution(NamedTuple):
 
 
 def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[_Model]:
-    """Bodies of which one size each is larger."""
-    return [_model(make(kind.from_array(at + NUDGE * (np.arange(len(at)) == k)))) for k in free]
+    """Bodies with one size each larger by `SIZE_STEP`."""
+    return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k)))) for k in free]
 
 
 def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: Array,
            damping: float) -> tuple[Array, Array]:
-    """Sizes and poses after a step: the frames' poses are eliminated, the sizes solved for, the poses found from them."""
+    """Sizes and poses after a step: the poses are eliminated (Schur complement), the sizes solved for, the poses substituted back."""
     D, K = start.shape[1], len(free)
     total, right, parts = np.diag(tight * (1 + damping)), -best.strain / scale, []
     for frame, pose, first, held in zip(best.frames, best.at[1], start, pull, strict=True):
@@ -142,20 +150,20 @@ def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float,
         parts.append(solved)
     step = np.linalg.solve(total, right)
     sizes = best.at[0].copy()
-    step = np.clip(step, -FARTHEST, FARTHEST)
+    step = np.clip(step, -MAX_SIZE_STEP, MAX_SIZE_STEP)
     sizes[free] += step
     moves = np.array([solved[:, K] - solved[:, :K] @ step for solved in parts])
-    return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -FARTHEST_TURN, FARTHEST_TURN))
+    return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -MAX_POSE_STEP, MAX_POSE_STEP))
 
 
 def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
-    """What a frame's points say about its pose and the sizes."""
-    near = np.zeros((len(cloud.rows), 2 * LANES), np.float32)
+    """A frame's normal equations in its pose and the sizes."""
+    near = np.zeros((len(cloud.rows), 3 * LANES), np.float32)
     screws, out = _measured(model, pose, cloud, settings, near, True)
     distances, weights, levers = out[0], out[1] / max(cloud.total, 1e-9), out[2:8].T
     screws[:, 3:] -= np.cross(cloud.origin, screws[:, :3])
-    moves = (levers @ screws.T) * model.reach[:, model.joints[near[:, LANES:].ravel().astype(int)]].T
-    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / NUDGE for other in nudged]
+    moves = (levers @ screws.T) * model.reach[:, model.joints[near[:, LANES : 2 * LANES].ravel().astype(int)]].T
+    grows = [(distances - _measured(other, pose, cloud, settings, near, False)[1][0]) / SIZE_STEP for other in nudged]
     rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), len(nudged))], 1)
     weighed = rows * weights[:, None]
     squared = float(weights @ distances**2 / max(weights.sum(), 1e-9))
@@ -163,23 +171,24 @@ def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, s
 
 
 def _measured(model: _Model, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array]:
-    """Screws, and of every point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
+    """Screws (D, 6), and of each point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
     T, screws, out = np.zeros((len(model.chain.parents), 3, 4)), np.zeros((len(pose), 6)), np.zeros((9, len(cloud.rows) * LANES))
     place_one(pose, model.chain, T, screws, np.zeros((3, 3, 3)))
     _tangents(T, model.joints, model.rotations, model.starts, model.parts, cloud.rows, cloud.spheres, cloud.origin,
-              np.float32(settings.epsilon), np.float32(settings.tau), associate, near, np.zeros(8 * LANES, np.float32), out)
+              *normal_weights(settings), np.float32(settings.tau), associate, near, np.zeros(8 * LANES, np.float32), out)
     return screws, out
 
 
 @kernel
-def _tangents(T, joints, rotations, starts, parts, rows, spheres, origin, epsilon, tau, associate, near, room, out):  # pragma: no cover
-    """See `_measured`; with `associate`, nearest parts are found, else those in `near` (G, 2 LANES) are kept."""
+def _tangents(T, joints, rotations, starts, parts, rows, spheres, origin, epsilon, choice, tau, associate, near, room,
+              out):  # pragma: no cover
+    """See `_measured`. With `associate` the nearest parts are found, else those in `near` (G, 3 LANES) are kept."""
     one, nil = np.float32(1), np.float32(0)
     place_parts(T, origin, joints, rotations, starts, parts)
     for group in range(spheres.shape[0]):
         points, own = rows[group], near[group]
         if associate:
-            nearest(parts, points, spheres[group], epsilon, own)
+            nearest(parts, points, spheres[group], epsilon, choice, own)
         for s in range(joints.size):
             used = False
             for i in range(LANES):
@@ -187,12 +196,12 @@ def _tangents(T, joints, rotations, starts, parts, rows, spheres, origin, epsilo
             if not used:
                 continue
             q = parts[s]
-            measure(q, points, room)
+            closest_on_part(q, points, room)
             for i in range(LANES):
                 if own[LANES + i] != s:
                     continue
                 at = group * LANES + i
-                x, y, z = foot(q, room, i)
+                x, y, z = closest_point(q, room, i)
                 nx, ny, nz = points[3 * LANES + i], points[4 * LANES + i], points[5 * LANES + i]
                 share = own[i] / tau
                 fade = one / (one + share * share)

@@ -1,4 +1,4 @@
-"""What several cameras say about a pose at one time: surface points to lie on, and silhouettes to be drawn over."""
+"""The observation of one frame by several cameras: surface points and silhouettes."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation, silhouette_costs
 
 
-class Stage:
-    """A body among cameras: what is needed to draw it in their pictures, at half their size."""
+class BodyInViews:
+    """A body to be drawn in the cameras' pictures, at half their size."""
 
     def __init__(self, body: Body, cameras: Sequence[Camera]) -> None:
-        """`cameras`: calibrated, with their places in the world."""
+        """`cameras`: calibrated, with known poses in the world."""
         self.body = body
-        self.pictures = tuple(Picture(body, _thinned(camera), camera.T_camera_world) for camera in cameras)
+        self.pictures = tuple(Picture(body, _half_size(camera), camera.T_camera_world) for camera in cameras)
 
 
-class Evidence:
-    """One frame: surface points, and the masks (H, W) that they were made from, None for a camera without any."""
+class MultiviewObservation:
+    """One frame: surface points, and the masks (H, W) that they were made from, one per camera, None where there is none."""
 
-    def __init__(self, stage: Stage, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
-        """Nothing is computed until it is asked for. `also`: a cost of your own (m^2), which is added to that of the surface."""
-        self.stage, self.surface, self.masks, self.also = stage, surface, masks, also
+    def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
+        """Everything is computed on first use. `also`: a cost of your own (m^2), added to that of the surface."""
+        self.views, self.surface, self.masks, self.also = views, surface, masks, also
 
     def cloud(self, share: int = 1) -> Cloud:
         """Every `share`-th of the surface points."""
@@ -51,37 +51,37 @@ class Evidence:
 
     @cached_property
     def people(self) -> tuple[tuple[Picture, Mask], ...]:
-        """The silhouettes of people, thinned, and the pictures to be drawn in their place."""
-        return tuple((picture, mask[::2, ::2]) for picture, mask in zip(self.stage.pictures, self.masks, strict=True)
+        """Each picture in which a person is visible, and its mask at half size."""
+        return tuple((picture, mask[::2, ::2]) for picture, mask in zip(self.views.pictures, self.masks, strict=True)
                      if mask is not None and may_be_person(mask))
 
     @cached_property
-    def seen(self) -> tuple[tuple[Picture, Observation], ...]:
-        """The same for drawing over them."""
+    def silhouettes(self) -> tuple[tuple[Picture, Observation], ...]:
+        """The same as observations of the silhouette cost."""
         return tuple((picture, Observation.of(mask)) for picture, mask in self.people)
 
     @cached_property
     def space(self) -> FreeSpace:
-        """What the silhouettes rule out."""
+        """Distances to the silhouettes, which say where no body is."""
         return free_space([(picture.camera, mask) for picture, mask in self.people])
 
     @cached_property
     def area(self) -> int:
-        """Pixels of all silhouettes."""
-        return sum(observation.area for _, observation in self.seen)
+        """Pixels of all silhouettes together."""
+        return sum(observation.area for _, observation in self.silhouettes)
 
-    def differing(self, poses: Array) -> Array:
-        """Pixels in which drawn bodies (N, D) and silhouettes differ, as a share of the silhouettes', of shape (N,) (Liu 2011, eq. 2)."""
-        differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.seen]
+    def mismatch(self, poses: Array) -> Array:
+        """Pixels in which drawn poses (N, D) and silhouettes differ (Liu 2011, eq. 2), as shares (N,) of the silhouettes' area."""
+        differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.silhouettes]
         return sum(differing, np.zeros(len(poses))) / max(self.area, 1)
 
     def overlap(self, pose: Array) -> float:
-        """Intersection over union of a drawn pose (D,) and the silhouettes, the mean of all pictures; 0 where there are none."""
-        overlaps = [observation.cost_and_overlap(picture.draw(pose))[1] for picture, observation in self.seen]
+        """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
+        overlaps = [observation.cost_and_overlap(picture.draw(pose))[1] for picture, observation in self.silhouettes]
         return float(np.mean(overlaps)) if overlaps else 0.0
 
 
-def _thinned(camera: Camera) -> Camera:
-    """The camera of which the pictures are every second pixel of every second row."""
+def _half_size(camera: Camera) -> Camera:
+    """The camera whose pictures are every second pixel of every second row."""
     width, height = camera.size
     return replace(camera, size=((width + 1) // 2, (height + 1) // 2), matrix=np.diag([0.5, 0.5, 1.0]) @ camera.matrix)

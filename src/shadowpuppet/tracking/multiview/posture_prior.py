@@ -1,5 +1,4 @@
-"""What postures are usual: to begin with, to try beside others, and as a weak prior on what surface points do not tell, such as how a bend
-is shared by pelvis and chest."""
+"""Usual postures: starts of a search, and a weak prior on what surface points hardly show (how pelvis and chest share a bend)."""
 
 from __future__ import annotations
 
@@ -11,50 +10,50 @@ import numpy as np
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 
-WIDER, LEAST = 1.5, 0.15
-"""What training poses' deviations are multiplied by, and what they are at least (rad): others than those come."""
-SEEN = ("left_", "right_")
-"""Joints whose angles the surface shows well enough."""
-BOUND = 9.0
-"""No DOF counts for more than this, three deviations' worth (see `Skeleton.strain`)."""
+INFLATION, MIN_DEVIATION = 1.5, 0.15
+"""Factor and minimum (rad) of the training poses' standard deviations; test poses vary more."""
+OBSERVED_JOINTS = ("left_", "right_")
+"""Prefixes of joints whose angles the surface shows well enough; they have no prior."""
+MAX_PENALTY = 9.0
+"""Bound of each DOF's penalty: that of three standard deviations (see `Skeleton.strain`)."""
 
 ARMS = ((8, 5, 10), (0, 90, 0), (90, 10, 5), (170, 10, 10), (20, 20, 95), (-30, 20, 60))
-"""An arm: flexion and abduction of the shoulder, flexion of the elbow, degrees."""
+"""Usual arms: shoulder flexion and abduction, elbow flexion, degrees."""
 LEGS = (((3, 5), (3, 5), 0), ((25, 10), (-15, 20), 0), ((-15, 20), (25, 10), 0), ((85, 90), (85, 90), 25), ((70, 10), (70, 10), 60))
-"""Flexion of the left hip and knee, of the right ones, and the pelvis' bow, degrees: standing, two strides, a squat, a bow."""
+"""Usual legs: flexion of left hip and knee, of right hip and knee, bow of the pelvis, degrees: standing, two strides, a squat, a bow."""
 
 
 @dataclass(frozen=True, eq=False)
-class Usual:
-    """Rest and deviations of every DOF; infinite where nothing is usual."""
+class PosturePrior:
+    """Rest values of the DOF, and deviations below and above them, each of shape (D,); infinite for DOF without a prior."""
 
     rest: Array
     below: Array
     above: Array
 
     @classmethod
-    def of(cls, skeleton: Skeleton, library: Array | None = None) -> Usual:
-        """As the skeleton has it; angles but the heading as the poses of a `library` (L, D), such as training motion, have it."""
+    def of(cls, skeleton: Skeleton, library: Array | None = None) -> PosturePrior:
+        """The skeleton's own prior; with a `library` of poses (L, D), such as training motion, that of its angles (not the heading)."""
         rest, below, above = (np.array(each) for each in skeleton.rest_and_spread)
         if library is not None and len(library) > 1:
             known = np.isfinite(below)
-            spread = np.maximum(WIDER * library.std(0), LEAST)
+            spread = np.maximum(INFLATION * library.std(0), MIN_DEVIATION)
             rest, below, above = (np.where(known, new, old) for new, old in ((library.mean(0), rest), (spread, below), (spread, above)))
-        seen = np.array([not dof.joint.startswith(SEEN) for dof in skeleton.dofs])
-        return cls(rest, np.where(seen, below, np.inf), np.where(seen, above, np.inf))
+        constrained = np.array([not dof.joint.startswith(OBSERVED_JOINTS) for dof in skeleton.dofs])
+        return cls(rest, np.where(constrained, below, np.inf), np.where(constrained, above, np.inf))
 
-    def strain(self, poses: Array) -> Array:
-        """Squared deviations of poses (N, D), summed (N,), each DOF bounded."""
+    def penalty(self, poses: Array) -> Array:
+        """Sum over the DOF of squared, bounded deviations from rest, of shape (N,), of poses (N, D)."""
         squared = self._squared(poses)
-        return (squared / (1 + squared / BOUND)).sum(1)
+        return (squared / (1 + squared / MAX_PENALTY)).sum(1)
 
     def pull(self, pose: Array) -> Array:
-        """Weights (D,) of squared distances from rest that make up the strain near a pose (D,), 1 / rad^2."""
-        fade = 1 + self._squared(pose[None])[0] / BOUND
+        """Weights (D,), 1 / rad^2, of the squared distances from rest that approximate the penalty near a pose (D,)."""
+        fade = 1 + self._squared(pose[None])[0] / MAX_PENALTY
         return 1 / (np.where(pose < self.rest, self.below, self.above) * fade) ** 2
 
-    def held(self, pose: Array, pull: float, weight: float) -> tuple[Array, Array]:
-        """Where a pose (D,) is held that is pulled to itself, and by the `weight` of its strain to rest: centre and pull, each (D,)."""
+    def quadratic(self, pose: Array, pull: float, weight: float) -> tuple[Array, Array]:
+        """Centre and weights, each (D,), of the quadratic that pulls to a pose (D,) by `pull` and to rest by `weight` times the penalty."""
         rest = weight * self.pull(pose)
         return (pull * pose + rest * self.rest) / (pull + rest + 1e-30), pull + rest
 
@@ -64,12 +63,12 @@ class Usual:
 
 
 def usual_postures(skeleton: Skeleton) -> Array:
-    """Poses (L, D) to begin with where no other are known: each arm and the legs in every way."""
+    """Poses (L, D) to begin a search with: all combinations of `ARMS`, left and right, and `LEGS`."""
     return np.array([_posture(skeleton, both, legs) for both, legs in product(product(ARMS, ARMS), LEGS)])
 
 
 def usual_arms(skeleton: Skeleton, side: str) -> dict[str, Array]:
-    """An arm's degrees of freedom by name, and what each is in the usual postures, of shape (A,)."""
+    """Values (A,) of each of an arm's DOF, by name, in the usual postures."""
     poses = np.array([skeleton.clamp(skeleton.pose(**_arm(skeleton, side, arm))) for arm in ARMS])
     names = [dof.name for dof in skeleton.dofs if dof.joint in (f"{side}_shoulder", f"{side}_elbow")]
     return {name: poses[:, d] for name, d in zip(names, skeleton.dof_indices(names))}
@@ -88,7 +87,7 @@ def _arm(skeleton: Skeleton, side: str, arm: tuple[float, float, float]) -> dict
 
 
 def _swing(skeleton: Skeleton, side: str, joint: str, flexion: float, abduction: float) -> dict[str, float]:
-    """A limb's direction, in the angles that the skeleton has."""
+    """Flexion and abduction of a limb (rad) as the skeleton's own angles."""
     name = f"{side}_{joint}"
     if f"{name}_flexion" in skeleton.dof_names:
         return {f"{name}_flexion": flexion, f"{name}_abduction": abduction}

@@ -1,4 +1,4 @@
-"""Settings and presets of the tracker of several cameras (Ni 2008)."""
+"""Settings and presets of the tracker for several cameras (Ni 2008)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class HullSettings:
     """How surface points are taken from the silhouettes of several cameras (Ni 2008, III). The paper gives no values."""
 
     rays: Annotated[int, Field(ge=1, le=1_000_000)] = 2000
-    """Viewing rays, spread evenly along the contours of all cameras (at most one for two pixels' sides): points are about as many however
-    large the pictures are."""
+    """Viewing rays, spread evenly along the contours of all cameras (at most one for two pixels' sides). It sets the number of points,
+    whatever the pictures' size."""
     longest: Positive = 0.25
-    """Viewing edges longer than this (m) are left out: few cameras look there."""
+    """Viewing edges longer than this (m) are left out: few cameras see that place."""
     falloff: Positive = 0.1
     """A viewing edge this long (m) has half the weight of a short one."""
     pitch: Positive = 0.25
     """Points on a viewing edge are at most this far apart (m)."""
     tolerated: Annotated[int, Field(ge=0, le=100)] = 1
-    """So many cameras may say empty where at least three times as many others see the person, as one does whose silhouette has a hole;
-    asked only along rays on which nothing is left otherwise. With 0, each camera carves."""
+    """Number of cameras that may be outvoted where at least three times as many others see the person, as by a hole in one silhouette.
+    Used only on rays with no viewing edge otherwise. 0: every camera carves."""
 
 
 @checked
@@ -35,31 +35,33 @@ class SurfaceSettings:
     """How far surface points are from a body (Ni 2008, eqs. 29-31). The paper gives no values."""
 
     epsilon: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    """How much less a distance counts where the normals agree: by the factor 1 - epsilon cos."""
+    """Weight of the normals: a distance is multiplied by 1 - epsilon cos of the angle between them."""
     tau: Positive = 0.05
-    """Distance (m) beyond which a point counts no more."""
+    """Bound (m) of a point's distance."""
+    nearest: Literal["euclidean", "modulated"] = "modulated"
+    """How a point's nearest body part is chosen: by the plain distance, as in the paper, or by the one that the normals have multiplied."""
 
 
 @checked
 class GaussNewtonSettings:
-    """Refinement by damped Gauss-Newton on the distances to tangent planes."""
+    """Refinement by damped Gauss-Newton on distances to tangent planes."""
 
     coarse: Annotated[int, Field(ge=0, le=100)] = 4
-    """Iterations on some of the points."""
+    """Iterations on a share of the points."""
     fine: Annotated[int, Field(ge=0, le=100)] = 3
-    """Iterations on all of them, after that."""
+    """Iterations on all points, after that."""
     share: Annotated[int, Field(ge=1, le=100)] = 3
-    """Every so many-th point is one of the some."""
+    """Coarse iterations use every `share`-th surface point."""
     coarse_tau: Positive = 0.06
-    """Distance (m) at which a point counts a quarter, in the coarse iterations."""
+    """Distance (m) at which a point's weight is a quarter, in the coarse iterations."""
     fine_tau: Positive = 0.04
     """The same in the fine ones."""
     emptiness: NonNegative = 2.0
     """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras."""
     damping: Positive = 0.03
-    """Share of its own curvature by which each DOF is held back at first."""
+    """Initial damping, as a share of each DOF's curvature."""
     pull: NonNegative = 1e-5
-    """Pull to the last pose (m^2 of mean square distance for each rad^2 or m^2): it decides what the points do not tell."""
+    """Pull to the last pose (m^2 per rad^2 or m^2): it decides what the points do not show."""
 
 
 @checked
@@ -69,60 +71,60 @@ class ForceSettings:
     iterations: Annotated[int, Field(ge=0, le=1000)] = 20
     """Iterations."""
     translation: Positive = 1.0
-    """Weight of the forces on the root, as a share of what their mean distance would take."""
+    """Gain of the root's translation; 1 moves it by the mean force (m)."""
     rotation: Positive = 0.5
-    """Weight of the moments, likewise: limbs and what they hang on move at once."""
+    """Gain of the rotations, likewise; less than 1 because a joint and those below it turn at the same time."""
     modulated: bool = True
-    """Whether a force goes by how well the normals agree, and is none where they disagree."""
+    """Whether forces are multiplied by the cosine between the normals, and zero where it is negative."""
     robust: bool = True
-    """Whether a force is bounded."""
+    """Whether forces are bounded."""
     hierarchical: bool = True
-    """Whether a joint feels all that hangs on it, or only its own part."""
+    """Whether a joint feels the moments on all parts below it, or only on its own."""
 
 
 @checked
 class MultiviewSettings:
-    """The tracker of several cameras (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
+    """The tracker for several cameras (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
 
     body: WholeBodyName = "anatomical"
-    """The body's model."""
+    """Body model."""
     method: Literal["hybrid", "image_force", "particle_filter"] = "hybrid"
-    """Particles that are refined, one that is refined from the last pose, or particles alone (Table II)."""
+    """Refined particles; one particle, refined from the last pose; or particles without refinement (Table II)."""
     refinement: Literal["gauss_newton", "forces"] = "gauss_newton"
     """How poses are refined."""
     particles: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """Particles, N. Left out: 16 with six cameras or more, 40 with fewer, which see less and are drawn sooner."""
+    """Number of particles, N. Default: 16 with six cameras or more, 40 with fewer, which show less and are faster to draw."""
     resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
     """How particles are selected by their weights."""
     defensive: Share = 0.5
-    """Share of proposals that are the last poses with noise, beside those of the motion prior: what that does not know is found by them."""
+    """Share of proposals that are the last poses with noise instead of the motion prior's: they find what the prior does not know."""
     keep: Share = 0.5
-    """Share of what the prior's subspace cannot hold that a proposal keeps."""
+    """Share of a pose's offset from the prior's subspace that a proposal keeps."""
     sigma_rotation: Positive = 0.15
     """Noise of angles in defensive proposals (rad)."""
     sigma_translation: Positive = 0.01
-    """Noise of the place (m)."""
+    """Noise of the root's position (m)."""
     sigma_heading: Positive = 0.05
     """Noise of the heading (rad)."""
     explore: Share = 0.3
-    """Share of the defensive proposals in which an arm is tried in a usual posture: an arm that was lost is found again."""
+    """Share of the defensive proposals that get an arm of another posture: an arm that was lost is found again."""
     velocity: Share = 0.0
-    """Share of the last frame's motion of place and heading with which proposals move on."""
+    """Share of the last frame's motion of position and heading that is added to proposals, once a frame."""
     sigma_cost: Positive = 0.003
-    """A pose worse than the best by its square (m^2) weighs 1/e (eq. 29)."""
+    """sigma of eq. 29 (m): a pose that costs sigma^2 more than the best weighs 1/e."""
     silhouettes: NonNegative = 0.1
-    """Weight of the share of pixels in which drawn body and silhouettes differ (m^2), beside the distance of the surface points."""
+    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ, beside the distance of the surface points."""
     posture: NonNegative = 2e-6
-    """Pull to usual postures, those of the training motion where there is any (m^2 for each squared deviation): it decides what the
-    surface does not show, such as how pelvis and chest share a bend."""
+    """Pull to usual postures, or those of the training motion (m^2 per squared deviation): it decides what the surface does not show,
+    such as how pelvis and chest share a bend."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
-    """Estimation cycles a frame, each with `cooling` times the noise of the last (annealing)."""
+    """Estimation cycles per frame (annealing)."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
-    """See `cycles`."""
+    """Factor of the noise from one cycle to the next."""
     estimate: Literal["best", "mean"] = "best"
     """The particle of greatest weight, or the weighted mean."""
     recover: bool = True
-    """Search afresh for who was lost, jumps, or comes back. The paper's filter goes on from where it is."""
+    """Search for the person again after a loss, a jump or an absence. The paper's filter goes on from where it is."""
     surface: SurfaceSettings = SurfaceSettings()
     """How poses are weighed by surface points."""
     gauss_newton: GaussNewtonSettings = GaussNewtonSettings()
@@ -130,7 +132,7 @@ class MultiviewSettings:
     forces: ForceSettings = ForceSettings()
     """Refinement by simulated forces."""
     hull: HullSettings = HullSettings()
-    """How surface points are found."""
+    """How surface points are made."""
 
 
 MULTIVIEW_PRESETS: dict[str, dict] = {
@@ -145,10 +147,10 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "velocity": 1.0,
         "silhouettes": 0.0,
         "posture": 0.0,
-        "surface": {"epsilon": 0.3, "tau": 0.06},
+        "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
     },
 }
-"""Named settings of the tracker of several cameras, as `PRESETS`."""
+"""Named settings of the tracker for several cameras, as `PRESETS`."""
 
 
 def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None,

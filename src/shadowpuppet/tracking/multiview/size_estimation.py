@@ -1,7 +1,7 @@
-"""Who is in the first frames of several cameras: sizes and poses of a whole body, solved together.
+"""The person's body sizes from the first frames of several cameras, solved together with the poses.
 
-Ni 2008 takes the sizes as known. Here bones come from training motion where there is some, else from the height, and all sizes are then
-refined on the hulls of the first frames.
+Ni 2008 takes the sizes as known. Here bones come from training motion if there is any, else from the height; then all sizes are refined on
+the hulls of the first frames.
 """
 
 from __future__ import annotations
@@ -21,37 +21,39 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
-from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 
-SHOWN = ("hip_distance", "hip_drop", "hip_forward", "shoulder_distance", "shoulder_drop", "shoulder_forward", "upper_arm_length",
-         "forearm_length", "hand_point", "thigh_length", "shank_length", "trunk_height", "lumbar_height", "thorax_height")  # fmt: skip
-"""Sizes that joints of training motion show."""
-EXACT = 0.001
-"""Deviation of those (m)."""
+SIZES_FROM_JOINTS = (
+    "hip_distance", "hip_drop", "hip_forward", "shoulder_distance", "shoulder_drop", "shoulder_forward", "upper_arm_length",
+    "forearm_length", "hand_point", "thigh_length", "shank_length", "trunk_height", "lumbar_height", "thorax_height",
+)  # fmt: skip
+"""Sizes that follow from the joints of training motion."""
+JOINT_DEVIATION = 0.001
+"""Their standard deviation (m)."""
 ROUNDS = 2
-"""How often the first frames are tracked and the sizes solved for."""
-FRAMES, SHARE = 24, 4
-"""Frames that are solved for together, at most, and every which of their points is taken."""
-WORTH = {"anatomical": 10.0, "cylinders": 0.2}
-"""What a frame's points are worth for the sizes (see `bundle.WORTH`): cylinders fit nobody, and would pay for it with wrong bones."""
+"""Times that the first frames are tracked and the sizes solved for."""
+MAX_FRAMES, POINT_STRIDE = 24, 4
+"""Most frames that are solved together, and the stride of their points."""
+INDEPENDENT_POINTS = {"anatomical": 10.0, "cylinders": 0.2}
+"""By body (see `bundle_adjustment`): cylinders fit no person well, and with more weight would make up for it by wrong bones."""
 SIZE_PULL = 1e-5
-"""Pull of the poses to where the tracker had them."""
-WORSE = 0.06
-"""A frame whose overlap is less than the best one's by this was misunderstood."""
-SHARES, TRIED = (0.8, 0.86, 0.93, 1.0, 1.08, 1.2), 5
-"""Heights that are tried, as shares of the extent, and frames in which they are."""
-UNUSUAL, DEVIATION = 0.02, 0.1
-"""What a height costs more for each squared deviation (m) from the average."""
-ENOUGH = 4
-"""Frames in which the person must be found."""
+"""Pull of the poses to the tracked ones."""
+OVERLAP_LOSS = 0.06
+"""A frame whose overlap is lower than the best by more than this is left out: its pose is wrong."""
+HEIGHT_SHARES, HEIGHT_FRAMES = (0.8, 0.86, 0.93, 1.0, 1.08, 1.2), 5
+"""Heights tried, as shares of the hull's extent, and the number of frames they are tried on."""
+HEIGHT_PENALTY, HEIGHT_DEVIATION = 0.02, 0.1
+"""Relative cost of a height that deviates from the average by `HEIGHT_DEVIATION` (m); it grows with the square."""
+MIN_FRAMES = 4
+"""Fewest frames with a person for solving."""
 
 
 @dataclass(frozen=True, eq=False)
-class Person(Generic[Measured]):
-    """A person measured in the first frames."""
+class SizeEstimate(Generic[Measured]):
+    """Sizes measured on the first frames."""
 
     sizes: Measured
     body: Body
@@ -60,76 +62,77 @@ class Person(Generic[Measured]):
     overlap: float
     """Mean intersection over union of body and silhouettes."""
     frames: int
-    """In which the person was found."""
+    """Frames in which the person was found."""
 
 
-def spread_of(sizes: BoneSizes, shown: bool) -> Array:
-    """Deviations (K,), metres, of sizes that are those of an average person; where bones are `shown` by joints, these are exact."""
+def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
+    """Standard deviations (K,), metres, of the sizes among people; nearly none of bones if joints have `shown` them."""
     shares = shares_of(type(sizes))
     stature = stature_of({name: getattr(sizes, name) for name in ("thigh_length", "shank_length", "upper_arm_length", "forearm_length")})
-    return np.array([EXACT if shown and name in SHOWN else shares[name][1] * stature for name in sizes.names()])
+    return np.array([JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()])
 
 
-def measure(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
+def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
             first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings,
-            library: Array | None = None) -> Person[Measured]:
-    """Sizes of whoever the `first` frames (surface points and masks, in order of time) show, near `expected` with deviations `spread` (K,).
-
-    Raises `TrackingError` where nobody is found in them.
-    """
+            library: Array | None = None) -> SizeEstimate[Measured]:
+    """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
+    (K,). Raises `TrackingError` if no person is found."""
     plain, sizes, residual = replace(settings, method="hybrid", refinement="gauss_newton"), expected, np.nan
     for _ in range(ROUNDS if (spread > 0).any() else 0):
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library)
         found = _followed(rng, tracker, first)
-        if len(found) < ENOUGH:
+        if len(found) < MIN_FRAMES:
             break
-        chosen = np.unique(np.linspace(0, len(found) - 1, FRAMES).astype(int))
+        chosen = np.unique(np.linspace(0, len(found) - 1, MAX_FRAMES).astype(int))
         poses = np.array([found[i][1].pose for i in chosen])
-        clouds = [Evidence(tracker.stage, *first[found[i][0]]).cloud(SHARE) for i in chosen]
-        centre, pull = map(np.array, zip(*(tracker.usual.held(pose, SIZE_PULL, settings.posture) for pose in poses), strict=True))
+        clouds = [MultiviewObservation(tracker.views, *first[found[i][0]]).cloud(POINT_STRIDE) for i in chosen]
+        pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
+        centre, pull = map(np.array, zip(*pulls, strict=True))
         bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
-                              worth=WORTH[settings.body])
+                              worth=INDEPENDENT_POINTS[settings.body])
         sizes, residual = bundle.sizes, bundle.residual
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library)
     found = _followed(rng, tracker, first)
     if not found:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
-    return Person(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found))
+    return SizeEstimate(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found))
 
 
-def likely_height(rng: np.random.Generator, make: Callable[[float], Body], cameras: Sequence[Camera],
+def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cameras: Sequence[Camera],
                   first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings) -> float | None:
-    """How tall (m) whoever the `first` frames show may be: of bodies of several heights, `make` makes them, the one that is found best in
-    some frames. None where nobody is. Arms overhead look tall and who crouches looks small, so that the extent alone does not tell."""
-    seen = seen_height(first)
-    if seen is None:
+    """Height (m) of the person in the `first` frames: of bodies of several heights, that which fits some frames best; None if no person is
+    visible. The hull's extent alone is no height: arms may be overhead, or the person crouches."""
+    extent = observed_height(first)
+    if extent is None:
         return None
-    plain, chosen = replace(settings, method="hybrid", refinement="gauss_newton"), first[:: max(1, len(first) // TRIED)][:TRIED]
+    plain = replace(settings, method="hybrid", refinement="gauss_newton")
+    chosen = first[:: max(1, len(first) // HEIGHT_FRAMES)][:HEIGHT_FRAMES]
     costs = []
-    for height in (heights := [seen * share for share in SHARES if HEIGHTS[0] <= seen * share <= HEIGHTS[1]]):
+    heights = [extent * share for share in HEIGHT_SHARES if HEIGHTS[0] <= extent * share <= HEIGHTS[1]]
+    for height in heights:
         tracker = MultiviewTracker(make(height), tuple(cameras), plain)
         found = [tracker.start(rng, points, masks) for points, masks in chosen]
-        unusual = 1 + UNUSUAL * ((height - AVERAGE_HEIGHT) / DEVIATION) ** 2
+        unusual = 1 + HEIGHT_PENALTY * ((height - AVERAGE_HEIGHT) / HEIGHT_DEVIATION) ** 2
         costs.append(unusual * np.mean([state.cost for state in found if state.status != "absent"] or [np.inf]))
     return heights[int(np.argmin(costs))] if heights else None
 
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
               first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> list[tuple[int, MultiviewState]]:
-    """Frames in which the person is found, and the tracker's states: followed, or, where that goes badly, found anew if that is better."""
+    """Indices and states of the frames in which the person is found: tracked, or searched for again where the overlap falls."""
     state, found, best = None, [], 0.0
     for n, (points, masks) in enumerate(first):
         state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
-        if state.overlap < best - WORSE and state.status != "absent":
+        if state.overlap < best - OVERLAP_LOSS and state.status != "absent":
             state = min(state, tracker.start(rng, points, masks), key=lambda each: each.cost)
         best = max(best, state.overlap)
         if state.status in ("tracked", "uncertain"):
             found.append((n, state))
-    return [(n, state) for n, state in found if state.overlap > best - WORSE]
+    return [(n, state) for n, state in found if state.overlap > best - OVERLAP_LOSS]
 
 
-def seen_height(first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> float | None:
-    """How tall whoever the frames show is when they stand tallest, metres; None where there are no points."""
+def observed_height(first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> float | None:
+    """The hull's vertical extent, metres, when the person stands tallest; None without points."""
     extents = [float(np.ptp(np.sort(points.points[:, 2])[2:-2])) for points, _ in first if len(points.points) > 50]
     return float(np.percentile(extents, 90)) if extents else None

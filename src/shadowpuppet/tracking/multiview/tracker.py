@@ -1,10 +1,10 @@
-"""Ni 2008, section V: the tracker of several cameras."""
+"""The tracker for several cameras (Ni 2008, V): a particle filter whose proposals come from a motion prior and are refined."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,171 +15,185 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import pose_search
-from shadowpuppet.tracking.multiview.observation import Evidence, Stage
-from shadowpuppet.tracking.multiview.posture_prior import Usual
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
+from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
-from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
+from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
-from shadowpuppet.tracking.particle_filter import Particles, Refine, Weigh, step
+from shadowpuppet.tracking.particle_filter import Particles, Weigh
+from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
-from shadowpuppet.tracking.status import SETTLE_CYCLES, status_of
+from shadowpuppet.tracking.status import status_of
 
-FEW, SMALLEST = 50, 0.5
-"""Surface points, and their extent (m), from which on somebody may be there."""
-MANY, FEWER, ENOUGH = 40, 16, 6
-"""Particles with few cameras, with many, and how many are that."""
-SUDDEN = 0.2
-"""An overlap that is less than the last one by this is as good as lost: limbs that are drawn to somebody who is elsewhere may overlap."""
+MIN_POINTS, MIN_EXTENT = 50, 0.5
+"""Fewer surface points, or a smaller extent of them (m), are no person."""
+MANY_CAMERAS = 6
+PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
+"""Default particle numbers below and from `MANY_CAMERAS` cameras."""
 
 
 class MultiviewState(NamedTuple):
-    """What a tracker of several cameras knows after a frame; all that the next one needs."""
+    """What the tracker knows after a frame: all that the next frame needs."""
 
     pose: Array
     """The estimate, of shape (D,)."""
     velocity: Array
-    """How it moved since the last frame, of shape (D,)."""
+    """Change of the estimate since the last frame, of shape (D,)."""
     particles: Particles
     cost: float
-    """Of the estimate, m^2."""
+    """Cost of the estimate, m^2."""
     overlap: float
-    """Intersection over union of the drawn estimate and the silhouettes, the mean of all cameras."""
+    """Intersection over union of the drawn estimate and the silhouettes, mean of all cameras."""
     status: str
     """`tracked`, `uncertain`, `lost` or `absent`."""
 
 
 @dataclass(frozen=True, eq=False)
 class MultiviewTracker:
-    """Ni 2008: the posture of a whole body from surface points of its visual hull, by a particle filter whose proposals come from a motion
-    prior and are refined (V). Causal, and repeatable, as `MonocularTracker`."""
+    """Ni 2008: poses of a whole body from surface points of its visual hull.
+
+    Causal: a frame's pose uses no later frame. The same generator state and observations give the same poses.
+    """
 
     body: Body
     cameras: tuple[Camera, ...]
     settings: MultiviewSettings = field(default_factory=MultiviewSettings)
     prior: MotionPrior | None = None
-    """Of poses at the film's rate; None: Gaussian proposals only."""
+    """Motion prior of poses at the film's rate; None: proposals by noise only."""
     library: Array | None = None
-    """Poses (L, D) that the person may begin in, such as those of the training motion; None: a few usual ones."""
+    """Poses (L, D) to begin a search with, such as those of the training motion; None: usual postures only."""
     scheme: Scheme | None = None
     """A resampling scheme of your own, in place of the settings'."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:
-        """A new frame's surface points, and the masks (H, W) that they come from. Who was lost, jumps, or comes back, is searched for
-        afresh (`recover`). `also`: a cost of your own, poses (N, D) to m^2 (N,), which is added to that of the surface."""
-        evidence = Evidence(self.stage, points, masks, also)
-        if not self.is_present(evidence):
-            return state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose))
-        recover = self.settings.recover
-        if state.status == "absent" and recover:
-            return self.search(rng, evidence)
-        after = self.cycle(rng, state, evidence)
-        if recover and (after.status == "lost" or after.overlap < state.overlap - SUDDEN):
-            found = self.search(rng, evidence)
-            return found if found.overlap > after.overlap else after
-        return after
+        """The state after a new frame's surface points, and the masks (H, W) that they were made from, one per camera.
+
+        If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
+        (N, D) to m^2 (N,), added to that of the surface.
+        """
+        observation = MultiviewObservation(self.views, points, masks, also)
+        return track_or_recover(
+            state, is_absent=not self.is_present(observation), recover=self.settings.recover, drop=OVERLAP_DROP,
+            hold=lambda state: state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose)),
+            cycle=lambda state: self.cycle(rng, state, observation), search=lambda: self.search(rng, observation))  # fmt: skip
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
               also: Cost | None = None) -> MultiviewState:
-        """A state from one frame's points and masks (H, W): the best of many poses in all directions, refined; or `absent`."""
-        evidence = Evidence(self.stage, points, masks, also)
-        if not self.is_present(evidence):
-            rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
-            return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
-        return self.search(rng, evidence)
+        """A state from one frame, as `search` finds it, or `absent`. Arguments as in `step`."""
+        observation = MultiviewObservation(self.views, points, masks, also)
+        if self.is_present(observation):
+            return self.search(rng, observation)
+        rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
+        return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
 
-    def cycle(self, rng: np.random.Generator, state: MultiviewState, evidence: Evidence) -> MultiviewState:
-        """The loop body of V-A: select by weight, propose, refine, weigh."""
-        s, particles, pose = self.settings, state.particles, state.pose
-        weigh, refine = self.weigh(evidence), self.refine(evidence, state.pose)
+    def cycle(self, rng: np.random.Generator, state: MultiviewState, observation: MultiviewObservation) -> MultiviewState:
+        """The filter's loop body (V-A), `cycles` times; the steps are numbered as in the paper."""
+        s, pose = self.settings, state.pose
+        weigh, refine = self.weigh(observation), self.refine(observation, state.pose)
+        particles = state.particles  # step 1: the last frame's particles (s, x, w)
         for cycle in range(s.cycles):
-            propose = partial(self.proposals, last=pose, velocity=state.velocity, unlike=evidence.differing, scale=s.cooling**cycle)
-            particles = step(rng, particles, resample=self.resample, weigh=weigh, refine=refine, number=self.number, propose=propose)
-            weights = normalise(particles.log_weights)
-            pose = particles.best if s.estimate == "best" else weights @ particles.poses
-        return self.judge(pose, pose - state.pose, particles, evidence, weigh)
+            # Step 2, selection: draw particles by their weights.
+            selected = particles.select(self.resample(rng, particles.log_weights, self.number))
+            # Step 3, sampling: draw each particle's next state and pose (eqs. 24-28).
+            velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
+            poses, regions = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
+            # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
+            poses = poses if refine is None else refine(poses)
+            # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
+            particles = Particles(poses, *weigh(poses), regions)
+            pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
+        return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
-    def search(self, rng: np.random.Generator, evidence: Evidence) -> MultiviewState:
-        """A state from nothing but this frame."""
-        weigh = self.weigh(evidence)
-        found = pose_search.search(rng, self.body, self.refiner, evidence, self.library, weigh, self.number)
-        state = self.judge(found.best, np.zeros_like(found.best), found, evidence, weigh)
-        for _ in range(SETTLE_CYCLES):
-            state = self.cycle(rng, state._replace(velocity=np.zeros_like(state.pose)), evidence)
-        return state._replace(velocity=np.zeros_like(state.pose))
+    def search(self, rng: np.random.Generator, observation: MultiviewObservation) -> MultiviewState:
+        """A state from this frame alone: the best of many poses in all directions, refined."""
+        weigh = self.weigh(observation)
+        found = pose_search.search(rng, self.body, self.refiner, observation, self.library, weigh, self.number)
+        still = np.zeros_like(found.best)
+        state = self.judge(found.best, still, found, observation, weigh)
+        return settle(state, lambda state: self.cycle(rng, state, observation)._replace(velocity=still))
 
-    def weigh(self, evidence: Evidence) -> Weigh:
-        """Costs (N,), m^2, and log weights (eq. 29) of poses (N, D)."""
-        s = self.settings
+    def weigh(self, observation: MultiviewObservation) -> Weigh:
+        """The function from poses (N, D) to costs (N,), m^2, and log weights (N,)."""
+        extras = self.extra_costs(observation)
 
         def weigh(poses: Array) -> tuple[Array, Array]:
-            costs = self.refiner.costs(poses, evidence.full)
-            if s.silhouettes:
-                costs = costs + s.silhouettes * evidence.differing(poses)
-            if s.posture:
-                costs = costs + s.posture * self.usual.strain(poses)
-            if evidence.also is not None:
-                costs = costs + evidence.also(poses)
-            return costs, -costs / s.sigma_cost**2
+            costs = self.refiner.costs(poses, observation.full)  # D of eqs. 30, 31
+            for extra in extras:
+                costs = costs + extra(poses)
+            return costs, -costs / self.settings.sigma_cost**2  # eq. 29
 
         return weigh
 
-    def refine(self, evidence: Evidence, last: Array) -> Refine | None:
-        """What makes poses (N, D) better; they are pulled a little to the last pose (D,)."""
-        s, g = self.settings, self.settings.gauss_newton
+    def extra_costs(self, observation: MultiviewObservation) -> list[Cost]:
+        """Costs beside the paper's; none with `ni2008`."""
+        s, extras = self.settings, list[Cost]()
+        if s.silhouettes:
+            extras.append(lambda poses: s.silhouettes * observation.mismatch(poses))
+        if s.posture:
+            extras.append(lambda poses: s.posture * self.posture_prior.penalty(poses))
+        return extras if observation.also is None else [*extras, observation.also]
+
+    def refine(self, observation: MultiviewObservation, last: Array) -> Refine | None:
+        """The function that refines poses (N, D); `last`: the last estimate (D,)."""
+        s = self.settings
         if s.method == "particle_filter":
             return None
         if s.refinement == "forces" or s.method == "image_force":
-            some, half = evidence.cloud(g.share), s.forces.iterations // 2  # far from the goal, some of the points are enough
-            coarse, fine = (replace(s.forces, iterations=n) for n in (half, s.forces.iterations - half))
-            return lambda poses: self.refiner.forces(self.refiner.forces(poses, some, coarse), evidence.full, fine)
-        # many cameras' surface tells enough, and costs more time already
-        space = evidence.space if g.emptiness and len(self.cameras) < ENOUGH else None
-        coarse = Pass(evidence.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
-        fine = Pass(evidence.full, g.fine, g.fine_tau, space, g.emptiness)
-        centre, pull = self.usual.held(last, g.pull, s.posture)
+            return lambda poses: self.refiner.forces(poses, observation.full, s.forces)  # eqs. 32-41, on all points
+        return self._gauss_newton(observation, last)
+
+    def _gauss_newton(self, observation: MultiviewObservation, last: Array) -> Refine:
+        """The default preset's refinement (not in the paper)."""
+        s, g = self.settings, self.settings.gauss_newton
+        # the surface from many cameras is precise enough without free space, which costs time
+        space = observation.space if g.emptiness and len(self.cameras) < MANY_CAMERAS else None
+        coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
+        fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness)
+        centre, pull = self.posture_prior.quadratic(last, g.pull, s.posture)
         return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
 
-    def judge(self, pose: Array, velocity: Array, particles: Particles, evidence: Evidence, weigh: Weigh) -> MultiviewState:
+    def judge(self, pose: Array, velocity: Array, particles: Particles, observation: MultiviewObservation,
+              weigh: Weigh) -> MultiviewState:
         """The state of a pose (D,), with its cost, overlap and status."""
-        overlap = evidence.overlap(pose)
+        overlap = observation.overlap(pose)
         return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, status_of(overlap))
 
-    def is_present(self, evidence: Evidence) -> bool:
-        """Whether there is enough of a person: points on a hull of a size that a person has."""
-        points = evidence.surface.points
-        return len(points) >= FEW and float(np.linalg.norm(np.ptp(points, axis=0))) > SMALLEST
+    def is_present(self, observation: MultiviewObservation) -> bool:
+        """Whether the surface points are enough, and extended enough, for a person."""
+        points = observation.surface.points
+        return len(points) >= MIN_POINTS and float(np.linalg.norm(np.ptp(points, axis=0))) > MIN_EXTENT
 
     @cached_property
     def number(self) -> int:
-        """Particles."""
+        """Number of particles, N."""
         if self.settings.method == "image_force":
             return 1
-        return self.settings.particles or (MANY if len(self.cameras) < ENOUGH else FEWER)
+        return self.settings.particles or (PARTICLES_FEW_CAMERAS if len(self.cameras) < MANY_CAMERAS else PARTICLES_MANY_CAMERAS)
 
     @cached_property
-    def stage(self) -> Stage:
-        """The body among the cameras."""
-        return Stage(self.body, self.cameras)
+    def views(self) -> BodyInViews:
+        """The body in the cameras' pictures."""
+        return BodyInViews(self.body, self.cameras)
 
     @cached_property
     def refiner(self) -> Refiner:
-        """The body's half of refinement."""
+        """Costs and refinement of this body's poses."""
         return Refiner(self.body, self.settings.surface)
 
     @cached_property
-    def usual(self) -> Usual:
-        """What postures are usual."""
-        return Usual.of(self.body.skeleton, self.library)
+    def posture_prior(self) -> PosturePrior:
+        """Prior on postures, of the library where there is one."""
+        return PosturePrior.of(self.body.skeleton, self.library)
 
     @cached_property
     def proposals(self) -> Proposals:
-        """Where poses may be next."""
+        """Draws the poses of step 3."""
         return Proposals(self.body.skeleton, self.settings, self.prior)
 
     @cached_property
     def resample(self) -> Scheme:
-        """How particles are selected."""
+        """The resampling scheme of step 2."""
         return make_scheme(self.settings.resampling, 0.0) if self.scheme is None else with_best(self.scheme)

@@ -15,7 +15,7 @@ from shadowpuppet.geometry import Array, align
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
-from shadowpuppet.tracking.multiview.observation import Evidence
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate
@@ -73,12 +73,12 @@ class ParticleRerun:
 
     def _several(self, rng: np.random.Generator, time: float, before: Array) -> tuple[Array, Array] | None:
         tracker, masks = self._rig_tracker, [each.images.mask(time) if each.images else None for each in self.cameras]
-        evidence = Evidence(tracker.stage, self._hull.points(masks), masks)
-        if not tracker.is_present(evidence):
+        observation = MultiviewObservation(tracker.views, self._hull.points(masks), masks)
+        if not tracker.is_present(observation):
             return None
         still = np.zeros_like(before)
         start = Particles(np.repeat(before[None], tracker.number, axis=0), np.zeros(tracker.number), np.zeros(tracker.number))
-        found = tracker.cycle(rng, MultiviewState(before, still, start, np.nan, 1.0, "tracked"), evidence).particles
+        found = tracker.cycle(rng, MultiviewState(before, still, start, np.nan, 1.0, "tracked"), observation).particles
         weights = normalise(found.log_weights)
         return found.poses, weights / weights.max()
 

@@ -10,8 +10,8 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
-from shadowpuppet.tracking.multiview.refinement.free_space import OTHERS, TAU, Spheres, free_space, push_inside, spheres_in
-from shadowpuppet.tracking.multiview.refinement.normal_equations import SUMS
+from shadowpuppet.tracking.multiview.refinement.free_space import OUTVOTING_CAMERAS, TAU, Spheres, free_space, push_inside, spheres_in
+from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 
 BENT = (-0.09, 0.05, 0.0, 0.0)
@@ -49,7 +49,7 @@ def plain_cost(of, pose, views) -> float:
             if (pixel >= 0).all() and (pixel < camera.size).all() and depth > 0:
                 middle[c, k] = map_coordinates(field, pixel[::-1, None], order=1, mode="nearest")[0] * depth / camera.matrix[0, 0]
                 out[c, k] = middle[c, k] + radius
-    wrong = (middle > 0) & ((middle > 0).sum(0) == 1) & ((np.isfinite(middle) & (middle <= 0)).sum(0) >= OTHERS)
+    wrong = (middle > 0) & ((middle > 0).sum(0) == 1) & ((np.isfinite(middle) & (middle <= 0)).sum(0) >= OUTVOTING_CAMERAS)
     r = np.where(wrong, 0, np.maximum(out, 0))
     return float(np.where(r < TAU, r**2, TAU * (2 * r - TAU)).mean())
 

@@ -28,10 +28,11 @@ def seen(request):
     return body, pose, points, normals / np.linalg.norm(normals, axis=1, keepdims=True), weights
 
 
+@pytest.mark.parametrize("choice", ["euclidean", "modulated"])
 @pytest.mark.parametrize("epsilon", [0.0, 0.3])
-def test_costs_are_those_of_the_plain_version(seen, epsilon, rng):
+def test_costs_are_those_of_the_plain_version(seen, epsilon, choice, rng):
     body, pose, *cloud = seen
-    surface = replace(SURFACE, epsilon=epsilon)
+    surface = replace(SURFACE, epsilon=epsilon, nearest=choice)
     poses = body.skeleton.clamp(pose + rng.normal(0, 0.1, (3, len(pose))))
     plain = [naive.cost(body, one, *cloud, surface) for one in poses]
     np.testing.assert_allclose(Refiner(body, surface).costs(poses, make_cloud(*cloud)), plain, rtol=2e-4)
@@ -39,14 +40,16 @@ def test_costs_are_those_of_the_plain_version(seen, epsilon, rng):
 
 @pytest.mark.parametrize("chosen", [{}, {"modulated": False}, {"robust": False}, {"hierarchical": False},
                                     {"modulated": False, "robust": False, "hierarchical": False}, {"translation": 0.5, "rotation": 0.9}])
-def test_forces_move_a_pose_as_in_the_plain_version(seen, chosen):
+@pytest.mark.parametrize("choice", ["euclidean", "modulated"])
+def test_forces_move_a_pose_as_in_the_plain_version(seen, choice, chosen):
     body, pose, *cloud = seen
+    surface = replace(SURFACE, nearest=choice)
     forces = ForceSettings(iterations=2, **chosen)
     plain = pose
     for _ in range(2):
-        plain = naive.move_by_forces(body, plain, *cloud, SURFACE, forces)
+        plain = naive.move_by_forces(body, plain, *cloud, surface, forces)
     assert np.abs(plain - pose).max() > 1e-3
-    np.testing.assert_allclose(Refiner(body, SURFACE).forces(pose[None], make_cloud(*cloud), forces)[0], plain, atol=2e-5)
+    np.testing.assert_allclose(Refiner(body, surface).forces(pose[None], make_cloud(*cloud), forces)[0], plain, atol=2e-5)
 
 
 def test_gauss_newton_moves_a_pose_as_in_the_plain_version(seen):

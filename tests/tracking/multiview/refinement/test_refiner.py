@@ -20,9 +20,9 @@ from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import rotation_about
-from shadowpuppet.tracking.multiview.refinement import refiner
+from shadowpuppet.tracking.multiview.refinement import gauss_newton
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
-from shadowpuppet.tracking.multiview.refinement.normal_equations import EQUATIONS, gather_down, sweep
+from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
@@ -48,13 +48,12 @@ def test_normal_equations_are_those_of_the_plain_version(seen):
     made, of = make_cloud(*cloud), Refiner(body, SURFACE)
     D = len(pose)
     H, g = np.zeros((D, D)), np.zeros(D)
-    numbers = np.float32(SURFACE.epsilon), np.float32(SURFACE.tau)
     room = of._room()
     place_one(pose, of._chain, room[1], room[2], room[3])
     points = made.rows, made.spheres, made.origin
-    sweep(EQUATIONS, room[1], of._limbs, *points, numbers, of._which(made), room)
-    gather_down(of._chain, room[6])
-    refiner._normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
+    gauss_newton.sum_equations(room[1], of._limbs, *points, of._numbers(), of._which(made), room)
+    add_descendants(of._chain, room[6])
+    gauss_newton.normal_equations(of._chain, room[2], made.origin, room[6], made.total, H, g)
     plain = naive.normal_equations(body, pose, *cloud, SURFACE)
     np.testing.assert_allclose(H, plain[0], atol=2e-4 * np.abs(plain[0]).max())
     np.testing.assert_allclose(g, plain[1], atol=2e-4 * np.abs(plain[1]).max())
@@ -70,7 +69,7 @@ def test_equations_are_solved(seed, size):
     root, b = rng.normal(size=(size, size)), rng.normal(size=size)
     A = root @ root.T + np.eye(size)
     x = b.copy()
-    refiner._solve(A.copy(), x)
+    gauss_newton.solve_cholesky(A.copy(), x)
     np.testing.assert_allclose(A @ x, b, atol=1e-8)
 
 

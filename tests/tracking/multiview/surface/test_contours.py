@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from shadowpuppet.tracking.multiview.surface.contours import FIRM, INSIDE, UNKNOWN, _cells, _follow, trace
+from shadowpuppet.tracking.multiview.surface.contours import INSIDE, SAFE_DISTANCE, UNKNOWN, _cells, _follow, trace_contours
 
 shapes = array_shapes(min_dims=2, max_dims=2, max_side=20)
 masks = arrays(bool, shapes)
@@ -75,8 +75,8 @@ def test_pixels_that_touch_at_a_corner_hang_together():
 
 
 def test_the_whole_and_nothing():
-    assert len(trace(np.ones((9, 13), bool)).points) == 0
-    empty = trace(np.zeros((9, 13), bool))
+    assert len(trace_contours(np.ones((9, 13), bool)).points) == 0
+    empty = trace_contours(np.zeros((9, 13), bool))
     assert not empty.person.any()
     assert {(-0.5, 0.0), (0.0, -0.5), (12.5, 8.0), (12.0, 8.5)} <= {tuple(p) for p in empty.points}  # corners are kept
 
@@ -92,7 +92,7 @@ def test_pictures_of_any_width(width):
 def test_a_circle_keeps_its_radius(radius, rng):
     for centre in rng.uniform(70, 72, (5, 2)):
         y, x = np.mgrid[:140, :140]
-        contours = trace(np.hypot(x - centre[0], y - centre[1]) < radius)
+        contours = trace_contours(np.hypot(x - centre[0], y - centre[1]) < radius)
         found = np.linalg.norm(contours.points[contours.person] - centre, axis=1)
         assert abs(found.mean() - radius) < 1 / radius + 0.05  # smoothing draws in what is bent
         assert found.std() < 0.25  # pixels' sides alone: 0.29, and stairs
@@ -101,7 +101,7 @@ def test_a_circle_keeps_its_radius(radius, rng):
 @pytest.mark.parametrize("slope", [0.0, 0.1, 0.5, 1.0])
 def test_a_straight_outline_stays_where_it_is(slope):
     y, x = np.mgrid[:100, :100]
-    contours = trace(y - 40 - slope * (x - 50) > 0)
+    contours = trace_contours(y - 40 - slope * (x - 50) > 0)
     p = contours.points[contours.person]
     off = (p[:, 1] - 40 - slope * (p[:, 0] - 50)) / np.hypot(1, slope)
     # Centres on the line itself are outside: where the slope is a whole number, half a pixel's side is lost.
@@ -113,10 +113,10 @@ def test_a_straight_outline_stays_where_it_is(slope):
 def test_the_pictures_border_is_nobodys_outline():
     mask = np.zeros((60, 80), bool)
     mask[20:, 30:50] = True  # cut by the lower border
-    contours = trace(mask)
+    contours = trace_contours(mask)
     own = contours.points[contours.person]
     assert len(own) > 20
-    assert own[:, 1].max() < 60 - FIRM / 2
+    assert own[:, 1].max() < 60 - SAFE_DISTANCE / 2
     assert {29.5, 49.5} <= set(own[:, 0])  # straight, and not drawn to anywhere
 
 
@@ -124,7 +124,7 @@ def test_the_pictures_border_is_nobodys_outline():
 @given(masks)
 @settings(max_examples=60, deadline=None)
 def test_smoothing_moves_nothing_by_more_than_a_pixel_and_a_half(mask):
-    raw, smooth = followed(mask)[0], trace(mask)
+    raw, smooth = followed(mask)[0], trace_contours(mask)
     for p in smooth.points:
         assert np.linalg.norm(raw - p, axis=1).min() < 1.5
     assert smooth.starts[-1] == len(smooth.points) == len(smooth.person)
@@ -133,6 +133,6 @@ def test_smoothing_moves_nothing_by_more_than_a_pixel_and_a_half(mask):
 def test_tracing_changes_no_mask():
     mask = np.eye(9, dtype=bool)
     before = mask.copy()
-    trace(mask)
+    trace_contours(mask)
     np.testing.assert_array_equal(mask, before)
     assert INSIDE != UNKNOWN

@@ -1,9 +1,9 @@
-"""Which part of a body is nearest to each of many surface points, and where on it: what surface costs and refinements are made of.
+"""Correspondence of surface points and body: each point's nearest part, and the closest point on it.
 
-Distances are of first order: the level of the part's own function over the length of its gradient. They are exact for circles and
-right for ellipses near the surface. A distance counts more where the normals disagree: d = (1 - eps cos) |pp'| (Ni 2008, eqs. 29-31).
+Distances are of first order: the level of the part's implicit function over the length of its gradient; exact for circles, and right for
+ellipses near the surface. The normals modulate a distance: d = (1 - epsilon cos(n, n')) |pp'| (Ni 2008, eq. 31).
 
-Points come in groups of `LANES` that lie close together, so that most parts are ruled out for a whole group by a bounding sphere.
+Points come in groups of `LANES` that lie close together, so that a bounding sphere rules most parts out for a whole group.
 """
 
 from __future__ import annotations
@@ -16,32 +16,39 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import device, reduction_kernel
+from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 Single = NDArray[np.float32]
 LANES = 16
-"""Points of a group: what one AVX-512 instruction works on."""
+"""Points of a group: as many as one AVX-512 instruction takes."""
 FAR = np.float32(1e6)
-LEAST = np.float32(1e-12)
-NUMBERS = 25
-"""Numbers of a part: 9 of its frame's axes, 3 of its origin, 3 of its middle, bounding radius, length, shear (2), radii (4), caps (2)."""
+TINY = np.float32(1e-12)
+PART_NUMBERS = 25
+"""Numbers of a part: axes (9), origin (3), centre and radius of the bounding sphere (4), length, shear (2), radii (4), caps (2)."""
 
 
 class Cloud(NamedTuple):
-    """Surface points as kernels take them."""
+    """Surface points as the kernels take them."""
 
     rows: Single
-    """x, y, z, normal (3), weight of the groups' points, of shape (G, 7 LANES), the x of all in a group first; metres from `origin`.
-    What fills up the last group has no weight."""
+    """Of each group its points' x, y, z, normal (3) and weight, `LANES` of each in turn, of shape (G, 7 LANES); metres from `origin`.
+    Points that fill up the last group have weight 0."""
     spheres: Single
-    """Middle and radius of every group, of shape (G, 4)."""
+    """Centre and radius of each group's bounding sphere, of shape (G, 4)."""
     origin: Array
     """World, metres, of shape (3,)."""
     total: float
     """Sum of the weights."""
 
 
+def normal_weights(settings: SurfaceSettings) -> tuple[np.float32, np.float32]:
+    """Weights of the normals in a point's distance (epsilon, eq. 31), and in the distance by which its nearest part is chosen."""
+    epsilon = np.float32(settings.epsilon)
+    return epsilon, epsilon if settings.nearest == "modulated" else np.float32(0)
+
+
 def make_cloud(points: Array, normals: Array, weights: Array, origin: Array | None = None) -> Cloud:
-    """Points (P, 3) with normals (P, 3) and weights (P,), ordered so that groups lie close together."""
+    """Surface points (P, 3) with normals (P, 3) and weights (P,), in compact groups. `origin`: default the points' mean."""
     if origin is None:
         origin = np.asarray(points.mean(0) if len(points) else np.zeros(3), float)
     order = _along_a_curve(points - origin)
@@ -61,7 +68,7 @@ def make_cloud(points: Array, normals: Array, weights: Array, origin: Array | No
 
 
 def _along_a_curve(points: Array, bits: int = 6, reach: float = 1.5) -> NDArray[np.int64]:
-    """Order of points (P, 3) along Morton's curve."""
+    """Order of points (P, 3) along a Morton curve."""
     cells = np.clip((points / (2 * reach) + 0.5) * (1 << bits), 0, (1 << bits) - 1).astype(np.int64)
     key = np.zeros(len(points), np.int64)
     for bit in range(bits):
@@ -70,9 +77,9 @@ def _along_a_curve(points: Array, bits: int = 6, reach: float = 1.5) -> NDArray[
     return key.argsort(kind="stable")
 
 
-def constants(limbs: Limbs) -> Single:
-    """Numbers of the parts that do not change with the pose, of shape (S, NUMBERS); the rest is filled in by `place_parts`."""
-    out = np.zeros((len(limbs.joints), NUMBERS), np.float32)
+def part_constants(limbs: Limbs) -> Single:
+    """Numbers of the parts, of shape (S, PART_NUMBERS); those that change with the pose are filled in by `place_parts`."""
+    out = np.zeros((len(limbs.joints), PART_NUMBERS), np.float32)
     out[:, 16], out[:, 17:19] = limbs.lengths, limbs.shears
     out[:, 19:23], out[:, 23:25] = limbs.radii.reshape(-1, 4), limbs.caps
     high = limbs.lengths + limbs.caps.sum(1)
@@ -83,7 +90,7 @@ def constants(limbs: Limbs) -> Single:
 
 @device
 def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cover
-    """Fill in frames, origins and middles of parts (S, NUMBERS) under transforms T (J, 3, 4), metres from `origin` (3,)."""
+    """Fill in the axes, origins and centres of parts (S, PART_NUMBERS) under transforms T (J, 3, 4), metres from `origin` (3,)."""
     for s in range(joints.size):
         joint, numbers = T[joints[s]], parts[s]
         middle = 0.5 * (numbers[16] + numbers[24] - numbers[23])
@@ -99,9 +106,9 @@ def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cove
 
 
 @reduction_kernel
-def measure(q, rows, out):  # pragma: no cover
-    """Of a group of points (7 LANES,) to one part q (NUMBERS,): out (8 LANES,) gets the signed distance, the cosine between the normals,
-    the closest point (3) and its outward normal (3), all but the first two in the part's frame."""
+def closest_on_part(q, rows, out):  # pragma: no cover
+    """Fill out (8 LANES,) for a group of points (7 LANES,) and one part q (PART_NUMBERS,): signed distance, cosine between the normals,
+    closest point (3) and its outward normal (3), the last two in the part's frame."""
     for i in range(LANES):
         x, y, z, nx, ny, nz = _load(rows, i)
         d, cosine, fx, fy, fz, ux, uy, uz = _closest(q, x, y, z, nx, ny, nz)
@@ -111,41 +118,44 @@ def measure(q, rows, out):  # pragma: no cover
 
 
 @reduction_kernel
-def _compete(q, number, rows, epsilon, near):  # pragma: no cover
-    """Where part q is nearer to points of a group than `near` (2 LANES,) has it, put down its distance and its number."""
+def _compete(q, number, rows, epsilon, choice, near):  # pragma: no cover
+    """Enter part q into `near` (3 LANES,), as `nearest` has it, for those points of a group that are closer to it."""
     one = np.float32(1)
     for i in range(LANES):
         x, y, z, nx, ny, nz = _load(rows, i)
         d, cosine, _, _, _, _, _, _ = _closest(q, x, y, z, nx, ny, nz)
-        d = abs(d) * (one - epsilon * cosine)
-        closer = d < near[i]
+        d = abs(d)
+        apart = d * (one - choice * cosine)
+        closer = apart < near[2 * LANES + i]
+        near[i] = d * (one - epsilon * cosine) if closer else near[i]  # eq. 31
         near[LANES + i] = number if closer else near[LANES + i]
-        near[i] = d if closer else near[i]
+        near[2 * LANES + i] = apart if closer else near[2 * LANES + i]
 
 
 @reduction_kernel
-def nearest(parts, rows, sphere, epsilon, near):  # pragma: no cover
-    """The distance d (1 - epsilon cos) of each point of a group to its nearest part, and the part's number: near (2 LANES,).
+def nearest(parts, rows, sphere, epsilon, choice, near):  # pragma: no cover
+    """Find the nearest part of each point of a group. Fills near (3 LANES,): the distance d (1 - epsilon cos) of eq. 31, the part's number,
+    and the distance d (1 - choice cos) by which the part is chosen.
 
-    The number that stands at near[LANES] is tried first.
+    The part whose number is at near[LANES] is tried first.
     """
     x, y, z, radius = sphere[0], sphere[1], sphere[2], sphere[3]
     first, worst = np.int64(near[LANES]), FAR
     for i in range(LANES):
-        near[i] = FAR
+        near[i] = near[2 * LANES + i] = FAR
     for turn in range(parts.shape[0]):
         s = first if turn == 0 else (turn - 1 if turn <= first else turn)
         q = parts[s]
         dx, dy, dz = q[12] - x, q[13] - y, q[14] - z
         gap = np.sqrt(dx * dx + dy * dy + dz * dz) - radius - q[15]
-        if gap * (np.float32(1) - epsilon) <= worst:
-            _compete(q, np.float32(s), rows, epsilon, near)
-            worst = _greatest(near)
+        if gap * (np.float32(1) - choice) <= worst:
+            _compete(q, np.float32(s), rows, epsilon, choice, near)
+            worst = _greatest(near[2 * LANES :])
 
 
 @reduction_kernel
 def _greatest(near):  # pragma: no cover
-    """The greatest of near (LANES,)."""
+    """The greatest of the first `LANES` numbers."""
     worst = near[0]
     for i in range(LANES):
         worst = max(worst, near[i])
@@ -153,15 +163,15 @@ def _greatest(near):  # pragma: no cover
 
 
 @device
-def foot(q, out, i):  # pragma: no cover
-    """The closest point that `measure` found for point number i, metres from the cloud's origin."""
+def closest_point(q, out, i):  # pragma: no cover
+    """The closest point p' to point i, as `closest_on_part` found it, metres from the cloud's origin."""
     u, v, w = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
     return (q[0] * u + q[3] * v + q[6] * w + q[9], q[1] * u + q[4] * v + q[7] * w + q[10], q[2] * u + q[5] * v + q[8] * w + q[11])
 
 
 @device
 def _load(rows, i):  # pragma: no cover
-    """Point and normal number i of a group."""
+    """Position and normal of point i of a group."""
     return rows[i], rows[LANES + i], rows[2 * LANES + i], rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
 
 
@@ -185,12 +195,12 @@ def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
     ih = one / height if domed else nil
     side = over == nil
     w = over * ih
-    rho2 = square + w * w + LEAST
+    rho2 = square + w * w + TINY
     # the gradient of rho, times rho
     gx, gy = su * ia, sv * ib
     along = -(su * su * slope_a * ia + sv * sv * slope_b * ib + gx * slope_x + gy * slope_y)
     gz = along if side else w * ih
-    irho, steep = one / np.sqrt(rho2), one / np.sqrt(gx * gx + gy * gy + gz * gz + LEAST)
+    irho, steep = one / np.sqrt(rho2), one / np.sqrt(gx * gx + gy * gy + gz * gz + TINY)
     d = (rho2 - np.sqrt(rho2)) * steep
     ux, uy, uz = gx * steep, gy * steep, gz * steep
     fx, fy, fz = px - d * ux, py - d * uy, pz - d * uz
@@ -204,7 +214,7 @@ def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
     shrink = irho if rho2 > one else one
     ex, ey = px - u + u * shrink, py - v + v * shrink
     dx, dy, dz = px - ex, py - ey, pz - level
-    reach = np.sqrt(dx * dx + dy * dy + dz * dz) + LEAST
+    reach = np.sqrt(dx * dx + dy * dy + dz * dz) + TINY
     outside = not side
     end = one if up else -one
     edge = outside & (rho2 > one)

@@ -1,7 +1,7 @@
-"""Where nobody is: what silhouettes rule out, which surface points do not tell.
+"""Free space: silhouettes penalise limbs that reach outside them, which surface points do not (not in Ni 2008).
 
-A limb that reaches out of a silhouette has nothing there to be drawn to, and what draws the body to surface points looks the other way.
-Here spheres along the limbs' axes are pushed into the silhouettes, of every camera, along the way that is shortest in its picture.
+No surface point draws back a limb that reaches out of a silhouette. Here spheres along the limbs' axes are pushed into the silhouettes of
+all cameras, along the gradient of the distance to the outline.
 """
 
 from __future__ import annotations
@@ -19,57 +19,57 @@ from shadowpuppet.camera.projection import NEAR_PLANE, bend_within, make_lens
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import device, kernel
 
-APART = 0.07
-"""Spheres on a limb's axis are about this far apart, metres."""
-SLIM = 0.7
-"""A sphere's radius over the limb's smaller one: nobody is shaped like their model to the pixel."""
+SPHERE_SPACING = 0.07
+"""Approximate distance between spheres on a limb's axis, metres."""
+RADIUS_SHARE = 0.7
+"""Radius of a sphere as a share of the limb's smaller radius, as a margin for the model's shape."""
 TAU = 0.1
-"""How far (m) a sphere may reach out until it costs no longer the square."""
-OTHERS = 3
-"""So many others that see somebody at a place outvote a camera that does not: its silhouette may have lost a limb."""
-MARGIN = 24
-"""Pixels around the person to which the way back is looked up; farther out it is that to the nearest of these, and theirs."""
+"""Distance (m) beyond which the cost grows linearly, not with the square."""
+OUTVOTING_CAMERAS = 3
+"""Number of cameras with a silhouette at a place that outvote one without: its silhouette may lack a limb."""
+WINDOW_MARGIN = 24
+"""Pixels around the person with distances; farther out they are extrapolated."""
 
 
 class Spheres(NamedTuple):
-    """Spheres in a body's limbs."""
+    """Spheres along a body's limbs."""
 
     joints: NDArray[np.int64]
-    """Joint that each is fixed to, of shape (K,)."""
+    """Index of each sphere's joint, of shape (K,)."""
     places: Array
-    """Middle, joint's frame, metres, of shape (K, 3)."""
+    """Centres, joint's frame, metres, of shape (K, 3)."""
     radii: Array
     """Metres, of shape (K,)."""
 
 
 class FreeSpace(NamedTuple):
-    """Distances to the silhouettes' outlines in C cameras' pictures, and what is known of these cameras."""
+    """Distances to the silhouettes' outlines in C pictures, and the parameters of their cameras."""
 
     fields: NDArray[np.float32]
-    """Of all windows, row by row: pixels to the outline, less than 0 inside."""
+    """Signed distances to the outline, pixels, negative inside; all windows one after the other, row by row."""
     windows: NDArray[np.int64]
     """First value, left column, top row, width, height of each window, and the picture's size, of shape (C, 7)."""
     views: Array
     """World to camera, of shape (C, 3, 4)."""
     matrices: Array
-    """Of the cameras, of shape (C, 3, 3)."""
+    """Camera matrices, of shape (C, 3, 3)."""
     bends: Array
-    """Distortion, padded (8), whether it is a fisheye's, whether there is any, and how far it holds, of shape (C, 11)."""
+    """Distortion, padded (8); whether a fisheye; whether any; radius up to which it holds; of shape (C, 11)."""
 
 
 def spheres_in(limbs: Limbs) -> Spheres:
     """Spheres along each limb's axis, from its start to its end."""
     joints, places, radii = [], [], []
     for s, length in enumerate(limbs.lengths):
-        for share in np.linspace(0, 1, max(2, round(length / APART) + 1)):
+        for share in np.linspace(0, 1, max(2, round(length / SPHERE_SPACING) + 1)):
             joints.append(limbs.joints[s])
             places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
-            radii.append(SLIM * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
+            radii.append(RADIUS_SHARE * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
     return Spheres(np.array(joints), np.array(places), np.array(radii))
 
 
 def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
-    """Of cameras and what they see of a person, masks (H, W) of their size in which somebody is."""
+    """Free space of cameras and their masks (H, W), each with a person."""
     fields, windows, start = [np.zeros(0, np.float32)], [], 0
     for camera, mask in views:
         field, left, top = _distances(mask)
@@ -88,14 +88,14 @@ def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
 
 
 def _distances(mask: Mask) -> tuple[NDArray[np.float32], int, int]:
-    """Pixels to the outline, less than 0 inside, in a window around a person, and the window's first column and row."""
+    """Signed distances to the outline, pixels, in a window around the person; the window's first column and row."""
     import cv2
 
-    seen = np.ascontiguousarray(mask).view(np.uint8)
-    x, y, width, height = cv2.boundingRect(seen)
-    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
-    seen = seen[top : y + height + MARGIN, left : x + width + MARGIN]
-    outside, inside = (cv2.distanceTransform(device, cv2.DIST_L2, 3) for device in (1 - seen, seen))
+    pixels = np.ascontiguousarray(mask).view(np.uint8)
+    x, y, width, height = cv2.boundingRect(pixels)
+    left, top = max(x - WINDOW_MARGIN, 0), max(y - WINDOW_MARGIN, 0)
+    pixels = pixels[top : y + height + WINDOW_MARGIN, left : x + width + WINDOW_MARGIN]
+    outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - pixels, pixels))
     return np.asarray(outside - inside, np.float32), left, top
 
 
@@ -118,20 +118,20 @@ def _look_up(fields, window, x, y):  # pragma: no cover
 
 @device
 def _placed(T, place):  # pragma: no cover
-    """A point of a joint's frame, in the world."""
+    """World coordinates of a point in a joint's frame."""
     return (T[0, 0] * place[0] + T[0, 1] * place[1] + T[0, 2] * place[2] + T[0, 3],
             T[1, 0] * place[0] + T[1, 1] * place[1] + T[1, 2] * place[2] + T[1, 3],
             T[2, 0] * place[0] + T[2, 1] * place[1] + T[2, 2] * place[2] + T[2, 3])  # fmt: skip
 
 
 @device
-def _ask(T, spheres, space, c, said):  # pragma: no cover
-    """What camera c says of the spheres, into said (K, 4): how far (m) a sphere reaches out of the silhouette, and how that grows along the
-    camera's axes. Nothing, less than any radius, of spheres that are not in its picture."""
+def _sphere_distances(T, spheres, space, c, distances):  # pragma: no cover
+    """Fill distances (K, 4) for camera c: how far (m) each sphere reaches out of the silhouette, and the gradient along the camera's axes;
+    -inf for spheres outside the picture."""
     V, K, window, lens = space.views[c], space.matrices[c], space.windows[c], space.bends[c]
     fisheye, bends, reach, focal = lens[8] > 0, lens[9] > 0, lens[10], np.sqrt(K[0, 0] * K[1, 1])
     for k in range(spheres.radii.size):
-        joint, place, own = T[spheres.joints[k]], spheres.places[k], said[k]
+        joint, place, own = T[spheres.joints[k]], spheres.places[k], distances[k]
         own[0] = -np.inf
         p0, p1, p2 = _placed(joint, place)
         z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
@@ -149,25 +149,24 @@ def _ask(T, spheres, space, c, said):  # pragma: no cover
 
 
 @kernel
-def push_inside(T, spheres, space, said, weight, origin, sums, adding):  # pragma: no cover
-    """What it costs that spheres under transforms T (J, 3, 4) reach out of silhouettes: `weight` times the squared distances (m^2), beyond
-    `TAU` the distances; where `adding`, what that says of the parts' motion is added to sums (J, >= 27) (see `part_sums`). `said`: room
-    (C, K, 4) for what each camera says of each sphere."""
+def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # pragma: no cover
+    """Cost of spheres under transforms T (J, 3, 4) that reach out of silhouettes: `weight` times the squared distances (m^2), linear beyond
+    `TAU`. With `adding` their normal equations are added to sums (J, >= 27), as in `part_sums`. `distances` (C, K, 4): work array."""
     cameras, number = space.windows.shape[0], spheres.radii.size
     if cameras == 0:
         return 0.0
     total, share = 0.0, weight / (number * cameras)
     for c in range(cameras):
-        _ask(T, spheres, space, c, said[c])
+        _sphere_distances(T, spheres, space, c, distances[c])
     for k in range(number):
         inside = outside = 0
         for c in range(cameras):
-            middle = said[c, k, 0] - spheres.radii[k]
+            middle = distances[c, k, 0] - spheres.radii[k]
             outside += middle > 0
             inside += -np.inf < middle <= 0
-        outvoted = outside == 1 and inside >= OTHERS
+        outvoted = outside == 1 and inside >= OUTVOTING_CAMERAS
         for c in range(cameras):
-            own, V = said[c, k], space.views[c]
+            own, V = distances[c, k], space.views[c]
             r = own[0]
             if r <= 0 or (outvoted and r > spheres.radii[k]):
                 continue
@@ -185,7 +184,7 @@ def push_inside(T, spheres, space, said, weight, origin, sums, adding):  # pragm
 
 @device
 def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
-    """Add to a joint's sums that a point x has to go a distance along n, as `part_sums` does for surface points."""
+    """Add to a joint's sums the equation of a point x that is to move a distance along n, as `gauss_newton` does for surface points."""
     row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
     at = 0
     for i in range(6):

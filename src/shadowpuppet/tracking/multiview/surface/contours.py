@@ -1,4 +1,4 @@
-"""Contours of a mask as closed polygons between its pixels, and where on them a person really ends."""
+"""Contours of a mask as closed polygons between its pixels, and which of their vertices are a person's outline."""
 
 from __future__ import annotations
 
@@ -12,43 +12,41 @@ from shadowpuppet.jit import compiled
 
 Array = NDArray[np.float64]
 
-ROUNDS = 2
-"""How often a contour is smoothed: each time a vertex becomes the mean 1 4 6 4 1 of its neighbourhood. Takes off the stairs of the
-pixels; a circle of 10 pixels' radius loses less than a tenth of a pixel."""
-EVERY = 2
-"""Of the smoothed vertices every such one is kept."""
-ARM = 2
-"""A tangent is taken from this many of those before to as many after."""
-FIRM = 2 * ROUNDS + EVERY * ARM
-"""Vertices this near to where the picture says nothing are neither smoothed nor used as a person's."""
-STRIDE = 16
-"""Along the picture's border every such vertex, and every corner, is kept."""
+SMOOTHING_ROUNDS = 2
+"""Rounds of smoothing with weights 1 4 6 4 1, which removes the pixels' stairs; a circle of 10 pixels' radius shrinks by less than 0.1."""
+VERTEX_STRIDE = 2
+"""Every `VERTEX_STRIDE`-th smoothed vertex is kept."""
+TANGENT_ARM = 2
+"""A tangent spans this many kept vertices on either side."""
+SAFE_DISTANCE = 2 * SMOOTHING_ROUNDS + VERTEX_STRIDE * TANGENT_ARM
+"""Vertices nearer than this to unknown pixels are neither smoothed nor counted as a person's outline."""
+BORDER_STRIDE = 16
+"""Along the picture's border every `BORDER_STRIDE`-th vertex is kept, and every corner."""
 INSIDE, UNKNOWN, VISITED = 1, 2, 4
 """Bits of a pixel while contours are followed."""
 
 
 class Contours(NamedTuple):
-    """The boundary of what a picture shows empty. On the right of its direction lies the person, or what the picture does not show."""
+    """The boundary of a picture's empty area. To the right of its direction lies the person, or an unknown area."""
 
     points: Array
     """Vertices, of shape (N, 2), pixels, smoothed, about a pixel and a half apart; each polygon is closed."""
     starts: NDArray[np.int64]
     """Where each polygon's vertices start, and N at the end, of shape (M + 1,)."""
     person: NDArray[np.bool_]
-    """Whether a person's outline runs there, of shape (N,): not along or near the picture's border."""
+    """Whether a vertex is on a person's outline, of shape (N,): not along or near the picture's border."""
 
 
-def trace(mask: Mask, seen: Mask | None = None) -> Contours:
-    """Contours of a mask (H, W), which are also the picture's borders where it is empty: of the part in which a place can be denied.
+def trace_contours(mask: Mask, seen: Mask | None = None) -> Contours:
+    """Contours of a mask (H, W), including the picture's border where it is empty. Pixels that touch at a corner are connected.
 
-    `seen`, of the same shape: where the picture says anything at all; everywhere, if it is left out. Pixels that touch at a corner
-    hang together.
+    `seen`, of the same shape: the known pixels; default: all.
     """
     return Contours(*_smooth(*_follow(_cells(mask, seen))))
 
 
 def _cells(mask: Mask, seen: Mask | None) -> NDArray[np.uint8]:
-    """The mask's bits, with a rim about which the picture says nothing, in rows of whole 64-bit words."""
+    """The mask's bits with a rim of unknown pixels, in rows of whole 64-bit words."""
     height, width = mask.shape
     cells = np.full((height + 2, -(-(width + 2) // 8) * 8), INSIDE | UNKNOWN, np.uint8)
     cells[1:-1, 1 : width + 1] = mask if seen is None else np.where(seen, mask, INSIDE | UNKNOWN)
@@ -57,7 +55,7 @@ def _cells(mask: Mask, seen: Mask | None) -> NDArray[np.uint8]:
 
 @compiled(nogil=True)
 def _follow(cells):  # pragma: no cover
-    """All boundaries between pixels inside and outside: middles of the pixels' sides, starts, and whether a person is beside them."""
+    """All boundaries between pixels inside and outside: centres of the pixels' sides, starts, and whether the inner pixel is a person's."""
     first = _left_sides(cells)
     total = 2 * first.size + _changes_down(cells)
     points, person = np.empty((total, 2)), np.empty(total, np.bool_)
@@ -72,7 +70,7 @@ def _follow(cells):  # pragma: no cover
 
 @compiled(nogil=True)
 def _left_sides(cells):  # pragma: no cover
-    """Pixels inside with none to the left, as indices into the flat array, row by row; eight pixels that are alike at once."""
+    """Flat indices, row by row, of pixels inside whose left neighbour is outside; eight equal pixels are skipped at once."""
     words, whole = cells.view(np.uint64), np.uint64(0x0101010101010101)
     out, n = np.empty(cells.size // 2, np.int64), 0
     for row in range(1, cells.shape[0] - 1):
@@ -90,7 +88,7 @@ def _left_sides(cells):  # pragma: no cover
 
 @compiled(nogil=True)
 def _changes_down(cells):  # pragma: no cover
-    """How many pixels differ from the one above."""
+    """Number of pixels that differ from the one above."""
     total = 0
     for row in range(1, cells.shape[0]):
         for column in range(cells.shape[1]):
@@ -100,7 +98,7 @@ def _changes_down(cells):  # pragma: no cover
 
 @compiled(nogil=True)
 def _follow_one(flat, stride, at, points, person, n):  # pragma: no cover
-    """Once around, from the left side of pixel `at` upward, what is inside to the right; (dx, dy) is the step. Returns the end."""
+    """Follow one boundary, from the left side of pixel `at` upward, with the inside to the right; (dx, dy) is the step. Returns the end."""
     x, y, dx, dy = at % stride, at // stride + 1, 0, -1
     while True:
         if dy < 0:
@@ -122,14 +120,14 @@ def _follow_one(flat, stride, at, points, person, n):  # pragma: no cover
 
 @compiled(nogil=True)
 def _smooth(points, starts, person):  # pragma: no cover
-    """Take off the stairs, but not at the picture's border, where straight runs are thinned."""
+    """Smooth the outlines and thin the vertices; along the picture's border only thin."""
     kept_points, kept_starts, kept_person, n = np.empty_like(points), np.zeros_like(starts), np.empty_like(person), 0
     for m in range(starts.size - 1):
         own = person[starts[m] : starts[m + 1]]
         firm, size = _far_from_others(own), own.size
         path = np.empty((size + 4, 2))  # two more at each end, so that it closes
         path[2:-2] = points[starts[m] : starts[m + 1]]
-        for _ in range(ROUNDS if own.any() else 0):
+        for _ in range(SMOOTHING_ROUNDS if own.any() else 0):
             _close(path)
             last = path.copy()
             for k in range(2, size + 2):
@@ -140,7 +138,7 @@ def _smooth(points, starts, person):  # pragma: no cover
         _close(path)
         for k in range(size):
             straight = path[k + 1, 0] == path[k + 3, 0] or path[k + 1, 1] == path[k + 3, 1]
-            if k % (EVERY if own[k] else STRIDE) == 0 or not (own[k] or straight):
+            if k % (VERTEX_STRIDE if own[k] else BORDER_STRIDE) == 0 or not (own[k] or straight):
                 kept_points[n, 0], kept_points[n, 1], kept_person[n] = path[k + 2, 0], path[k + 2, 1], firm[k]
                 n += 1
         kept_starts[m + 1] = n
@@ -149,7 +147,7 @@ def _smooth(points, starts, person):  # pragma: no cover
 
 @compiled(nogil=True)
 def _close(path):  # pragma: no cover
-    """Write a closed path's last two vertices before its first, and its first two after its last (there may be only four)."""
+    """Pad a closed path: its last two vertices before the first, its first two after the last (there may be only four)."""
     size = path.shape[0] - 4
     path[0], path[1] = path[size], path[size + 1]
     path[size + 2], path[size + 3] = path[2], path[3]
@@ -157,15 +155,15 @@ def _close(path):  # pragma: no cover
 
 @compiled(nogil=True)
 def _far_from_others(person):  # pragma: no cover
-    """Which of a closed contour's vertices have only a person's within `FIRM`."""
+    """Which of a closed contour's vertices have only outline vertices within `SAFE_DISTANCE`."""
     size = person.size
     out = np.ones(size, np.bool_)
     if person.all() or not person.any():
         return person.copy()
     for step in (1, -1):
-        since = FIRM + 1
+        since = SAFE_DISTANCE + 1
         for k in range(2 * size):  # around twice: what is before the start counts
             at = k % size if step > 0 else size - 1 - k % size
             since = since + 1 if person[at] else 0
-            out[at] &= since > FIRM
+            out[at] &= since > SAFE_DISTANCE
     return out

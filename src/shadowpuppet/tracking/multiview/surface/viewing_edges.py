@@ -1,7 +1,7 @@
-"""Viewing edges: what silhouettes, as polygons on the plane z = 1 of their cameras, leave of the rays of other cameras.
+"""Viewing edges: the intervals of viewing rays that lie inside the silhouettes of the other cameras.
 
-Interval arithmetic along each ray (Matusik et al. 2000, "Image-based visual hulls"). In another camera's plane a ray is a straight line
-of which a side of a polygon is crossed where its two ends lie on different sides; sides are passed over in runs, by circles around them.
+Interval arithmetic along each ray (Matusik et al. 2000, "Image-based visual hulls"). Silhouettes are polygons on the plane z = 1 of their
+camera, where another camera's ray is a straight line. Runs of a polygon's sides that the line cannot cross are skipped by bounding circles.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.projection import NEAR_PLANE, bend_within
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import compiled, kernel
-from shadowpuppet.tracking.multiview.surface.contours import ARM
+from shadowpuppet.tracking.multiview.surface.contours import TANGENT_ARM
 
 Indices = NDArray[np.int64]
 
 FAR = 100.0
-"""Rays end here (m)."""
-SHORTEST = 1e-6
-"""What is left of a ray by less than this (m) is rounding."""
-APART = 1e-3
-"""Cameras nearer to each other than this (m) say nothing about depth along each other's rays."""
-CONFIRMED = 3
-"""A place that a view denies is kept where at least so many others see the person: two alone may see different parts of it there."""
-CHUNK = 8
-"""Sides of a contour in a run."""
+"""Length of a ray (m)."""
+MIN_LENGTH = 1e-6
+"""Shorter intervals of a ray (m) are rounding."""
+MIN_BASELINE = 1e-3
+"""Cameras nearer to each other than this (m) do not carve each other's rays."""
+CONFIRMING_VIEWS = 3
+"""A place that one view denies is kept if at least this many others see the person there."""
+RUN_LENGTH = 8
+"""Sides of a contour per run."""
 
 
 @compiled(nogil=True)
 def straighten(points, starts, person, grid, width, height):  # pragma: no cover
-    """Contours through the lens, closed; viewing planes' outward normals, 0 where none is known; where each polygon ends."""
+    """Contours with the lens undone, closed; outward normals of the viewing planes, 0 where unknown; the end of each polygon."""
     polygons = starts.size - 1
     lines, outward = np.empty((points.shape[0] + polygons, 2)), np.zeros((points.shape[0] + polygons, 3))
     across, down = (grid.shape[1] - 1) / width, (grid.shape[0] - 1) / height
@@ -47,9 +47,9 @@ def straighten(points, starts, person, grid, width, height):  # pragma: no cover
                 low = grid[r + 1, c, axis] + x * (grid[r + 1, c + 1, axis] - grid[r + 1, c, axis])
                 lines[n, axis] = top + y * (low - top)
             n += 1
-        for k in range(size if size > 3 * ARM else 0):
+        for k in range(size if size > 3 * TANGENT_ARM else 0):
             if person[starts[m] + k]:
-                before, after = first + (k - ARM) % size, first + (k + ARM) % size
+                before, after = first + (k - TANGENT_ARM) % size, first + (k + TANGENT_ARM) % size
                 dx, dy = lines[after, 0] - lines[before, 0], lines[after, 1] - lines[before, 1]
                 x, y = lines[first + k, 0], lines[first + k, 1]
                 dz = dx * y - dy * x
@@ -60,16 +60,16 @@ def straighten(points, starts, person, grid, width, height):  # pragma: no cover
 
 
 @compiled(nogil=True)
-def circles(lines, ends):  # pragma: no cover
-    """Runs of sides of closed polygons, each within a circle: circles (3, C), first side and end of each (C, 2)."""
+def bounding_circles(lines, ends):  # pragma: no cover
+    """Bounding circles (3, C) of runs of sides of closed polygons, and first side and end (C, 2) of each run."""
     count = 0
     for m in range(ends.size - 1):
-        count += (ends[m + 1] - ends[m] - 1 + CHUNK - 1) // CHUNK
+        count += (ends[m + 1] - ends[m] - 1 + RUN_LENGTH - 1) // RUN_LENGTH
     circles, spans = np.empty((3, count)), np.empty((count, 2), np.int64)
     n = 0
     for m in range(ends.size - 1):
-        for a in range(ends[m], ends[m + 1] - 1, CHUNK):
-            b = min(a + CHUNK, ends[m + 1] - 1)
+        for a in range(ends[m], ends[m + 1] - 1, RUN_LENGTH):
+            b = min(a + RUN_LENGTH, ends[m + 1] - 1)
             x, y = (lines[a, 0] + lines[b, 0]) / 2, (lines[a, 1] + lines[b, 1]) / 2
             farthest = 0.0
             for k in range(a, b + 1):
@@ -81,8 +81,8 @@ def circles(lines, ends):  # pragma: no cover
 
 
 @compiled(nogil=True)
-def length(lines, outward):  # pragma: no cover
-    """Length of the contours on which rays are taken."""
+def contour_length(lines, outward):  # pragma: no cover
+    """Total length of the contours where rays may start."""
     total = 0.0
     for k in range(lines.shape[0] - 1):
         if outward[k].any():
@@ -91,8 +91,8 @@ def length(lines, outward):  # pragma: no cover
 
 
 @compiled(nogil=True)
-def spread(lines, outward, step):  # pragma: no cover
-    """Vertices `step` apart along the contours, as near as there are any."""
+def spaced_vertices(lines, outward, step):  # pragma: no cover
+    """Indices of vertices about `step` apart along the contours."""
     out, n, passed = np.empty(lines.shape[0], np.int64), 0, step / 2
     for k in range(lines.shape[0] - 1):
         if outward[k].any():
@@ -104,15 +104,18 @@ def spread(lines, outward, step):  # pragma: no cover
     return out[:n]
 
 
-def cut(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
+def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
         tolerated: int) -> tuple[Indices, Array]:
-    """What the other views leave of rays (R, 3), z = 1, of cameras (R,): the ray (E,) of each viewing edge, and its depths (E, 2).
+    """The ray (E,) of each viewing edge, and the edge's depths (E, 2), of rays (R, 3), z = 1, of cameras (R,).
 
-    `relative` (V, V, 4, 4) leads from view to view; `lines` are (2, N); `circles` (3, C) and `spans` (C, 2) of view j are those from
-    `bounds[j]` to `bounds[j + 1]`. Where nothing is left of a ray, what one view denies is, and so on up to what `tolerated` deny.
+    Args:
+        relative: transforms (V, V, 4, 4) from view to view.
+        lines: vertices (2, N) of all polygons.
+        spans, circles: runs (C, 2) and their circles (3, C); view j's are those from `bounds[j]` to `bounds[j + 1]`.
+        tolerated: number of views that may deny a place on rays of which nothing is left otherwise.
     """
-    apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > APART  # and no view from itself
-    most = lines.shape[1] + 2  # each side is crossed once at most
+    apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # no view carves its own rays
+    most = lines.shape[1] + 2  # each side is crossed at most once
     scratch = np.empty(most, np.int64), np.empty(most), np.empty((most, 2)), np.empty((2, most, 3))
     polygons = lines[0], lines[1], spans, circles, bounds
     room = 2 * len(rays) + most
@@ -126,7 +129,7 @@ def cut(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indi
 
 @kernel
 def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ray, depths):  # pragma: no cover
-    """Fill `ray` and `depths`; how many edges there are, and whether there was room for all."""
+    """Fill `ray` and `depths`; returns the number of edges, and whether the arrays had room for all."""
     count, pieces = 0, scratch[-1]
     for r in range(rays.shape[0]):
         i, u, v, level, before = camera[r], rays[r, 0], rays[r, 1], 0, count
@@ -134,10 +137,10 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ra
             return count, False
         while level <= tolerated and count == before:
             at, n = _leave(relative, i, apart, u, v, polygons, level, scratch)
-            k, needed = 0, max(1, (1 + CONFIRMED) * level)
+            k, needed = 0, max(1, (1 + CONFIRMING_VIEWS) * level)
             while k < n:
                 lo, hi, k = _whole(pieces, at, n, k)
-                found = lo > NEAR_PLANE and hi < FAR and hi - lo > SHORTEST
+                found = lo > NEAR_PLANE and hi < FAR and hi - lo > MIN_LENGTH
                 if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1
@@ -147,7 +150,7 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ra
 
 @kernel
 def _leave(relative, i, apart, u, v, polygons, level, scratch):  # pragma: no cover
-    """Pieces of a ray (u, v, 1) of view i that at most `level` others deny: pieces[at, :n]; returns at and n."""
+    """Find the pieces of a ray (u, v, 1) of view i that at most `level` other views deny: pieces[at, :n]. Returns at and n."""
     bounds, denied, pieces = polygons[-1], scratch[2], scratch[3]
     at, n = 0, 1
     pieces[0, 0, 0], pieces[0, 0, 1], pieces[0, 0, 2] = NEAR_PLANE, FAR, 0
@@ -162,7 +165,7 @@ def _leave(relative, i, apart, u, v, polygons, level, scratch):  # pragma: no co
 
 @kernel
 def _whole(pieces, at, n, k):  # pragma: no cover
-    """From, to, and the next: piece k with those that go on where it ends, however many views deny each."""
+    """Start and end of piece k joined with adjacent pieces, and the index of the next."""
     lo, hi = pieces[at, k, 0], pieces[at, k, 1]
     k += 1
     while k < n and pieces[at, k, 0] == hi:
@@ -173,9 +176,9 @@ def _whole(pieces, at, n, k):  # pragma: no cover
 
 @kernel
 def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
-    """Between which depths of a ray of view i, from `lo` to `hi`, view j denies that anything is there: scratch[2][:M]; returns M.
+    """Depth intervals, between `lo` and `hi`, of a ray of view i that lie in empty area of view j: scratch[2][:M]. Returns M.
 
-    Places along the ray's line in the view are told by s. A place is denied if an odd number of crossings with contours come before it.
+    s is the position along the ray's line in view j. A place is empty if an odd number of contour crossings come before it.
     """
     crossings, denied = scratch[1], scratch[2]
     ax, bx = T[i, j, 0, 3], T[i, j, 0, 0] * u + T[i, j, 0, 1] * v + T[i, j, 0, 2]
@@ -204,9 +207,9 @@ def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
 
 @kernel
 def _cross(nx, ny, c, low, high, polygons, j, scratch):  # pragma: no cover
-    """Where a line, nx x + ny y + c = 0, goes into and out of what polygons hold between s = low and high; how many places.
+    """Crossings of a line, nx x + ny y + c = 0, with the polygons between s = low and high, s = nx y - ny x; returns their number.
 
-    s = nx y - ny x. Runs of sides wholly before `low` matter by whether their ends lie on different sides of the line.
+    Of runs of sides wholly before `low` only the parity of crossings counts: whether their ends lie on different sides of the line.
     """
     x, y, spans, circles, bounds = polygons
     near, crossings = scratch[0], scratch[1]
@@ -245,7 +248,7 @@ def _cross(nx, ny, c, low, high, polygons, j, scratch):  # pragma: no cover
 
 @kernel
 def _sort(values, n):  # pragma: no cover
-    """Sort the first n values: a few, as a rule."""
+    """Insertion sort of the first n values, usually few."""
     for k in range(1, n):
         value, h = values[k], k
         while h > 0 and values[h - 1] > value:
@@ -256,15 +259,11 @@ def _sort(values, n):  # pragma: no cover
 
 @kernel
 def _carve(pieces, at, n, denied, m, level):  # pragma: no cover
-    """Pieces (from, to, by how many views denied) pieces[at, :n] into pieces[1 - at] after one more view; their number.
-
-    What more than `level` views deny is left out.
-    """
+    """Split the pieces (start, end, number of views that deny it) in pieces[at, :n] by one more view, into pieces[1 - at]; those that
+    more than `level` views deny are dropped. Returns their number."""
     count, h, to = 0, 0, 1 - at
     for k in range(n):
         z, end, times = pieces[at, k, 0], pieces[at, k, 1], pieces[at, k, 2]
-        while h > 0 and denied[h - 1, 1] > z:  # the last interval may reach into this piece, too
-            h -= 1
         while z < end:
             while h < m and denied[h, 1] <= z:
                 h += 1
@@ -279,7 +278,7 @@ def _carve(pieces, at, n, denied, m, level):  # pragma: no cover
 
 @kernel
 def _witnessed(T, i, apart, u, v, z, lenses, needed):  # pragma: no cover
-    """Whether `needed` other views have a place in their pictures: that at depth z on a ray of view i."""
+    """Whether `needed` other views have the place at depth z on a ray of view i inside their pictures."""
     for j in range(lenses.shape[0]):
         w = (T[i, j, 2, 0] * u + T[i, j, 2, 1] * v + T[i, j, 2, 2]) * z + T[i, j, 2, 3]
         if apart[i, j] and w >= NEAR_PLANE:

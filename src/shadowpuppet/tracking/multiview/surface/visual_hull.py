@@ -1,8 +1,7 @@
-"""Surface points of the visual hull: silhouettes of several calibrated cameras to points in space with outward normals.
+"""Surface points of the visual hull: silhouettes of several calibrated cameras to points in space with outward normals (Ni 2008, III).
 
-After Ni 2008, III: a contour's pixel is seen along a ray, and somewhere on it the ray touches the person. What the other cameras leave of
-the ray is its viewing edge (Matusik et al. 2000, "Image-based visual hulls"). The other silhouettes cut it as polygons, in the plane
-z = 1 of their cameras, where a ray is a straight line whatever the lens.
+The viewing ray of a contour pixel touches the person somewhere on its viewing edge: the part of the ray inside the other cameras'
+silhouettes (Matusik et al. 2000, "Image-based visual hulls").
 """
 
 from __future__ import annotations
@@ -19,15 +18,15 @@ from shadowpuppet.camera.projection import make_lens
 from shadowpuppet.errors import CalibrationError, TrackingError
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.tracking.multiview.settings import HullSettings
-from shadowpuppet.tracking.multiview.surface.contours import trace
-from shadowpuppet.tracking.multiview.surface.viewing_edges import circles, cut, length, spread, straighten
+from shadowpuppet.tracking.multiview.surface.contours import trace_contours
+from shadowpuppet.tracking.multiview.surface.viewing_edges import bounding_circles, contour_length, cut_rays, spaced_vertices, straighten
 
-GRID = 4
-"""The lens is undone exactly at points this far apart (pixels), and linearly between."""
-TRUE = 0.05
-"""A pixel whose ray comes back farther off than this (pixels) lies beyond what the lens's formula can say."""
-WIDEST = 20.0
-"""Radius on the plane z = 1 up to which rays are used: 87 degrees off the axis."""
+GRID_PITCH = 4
+"""Pitch (pixels) of the grid on which lens distortion is undone exactly; linear between."""
+MAX_RETURN_ERROR = 0.05
+"""Pixels whose ray is projected back farther off than this (pixels) are beyond the range of the distortion model."""
+MAX_RADIUS = 20.0
+"""Largest radius of rays on the plane z = 1: 87 degrees off the axis."""
 
 
 class SurfacePoints(NamedTuple):
@@ -38,45 +37,45 @@ class SurfacePoints(NamedTuple):
     normals: Array
     """Unit normals, outward, world, of shape (P, 3)."""
     weights: Array
-    """1 / (1 + (length / falloff)^2) of the viewing edge that each came from, falloff 0.1 m, of shape (P,)."""
+    """1 / (1 + (length / falloff)^2) of each point's viewing edge, of shape (P,)."""
     cameras: NDArray[np.int64]
-    """Index of the camera on whose contour each lies, of shape (P,)."""
+    """Index of the camera on whose contour each point lies, of shape (P,)."""
 
 
 class _View(NamedTuple):
-    """A camera as the kernels know it."""
+    """A camera as the kernels' arrays."""
 
     rays: Array
     """Points on the plane z = 1 of a grid of pixels from (-0.5, -0.5) to (W - 0.5, H - 0.5), of shape (R, C, 2)."""
     seen: Mask | None
-    """Where the lens's formula holds, of shape (H, W); None: everywhere."""
+    """Pixels (H, W) where the distortion model holds; None: everywhere."""
     lens: Array
-    """fx, fy, cx, cy, width, height, whether it is a fisheye's, the formula's reach, and 8 numbers of distortion, of shape (16,)."""
+    """fx, fy, cx, cy, width, height, whether a fisheye, radius up to which the model holds, distortion (8), of shape (16,)."""
 
 
 class _Silhouette(NamedTuple):
-    """What one picture denies, on the plane z = 1."""
+    """A silhouette's contours on the plane z = 1."""
 
     lines: Array
-    """Closed polygons one after the other, each ending with its first vertex again, of shape (N, 2)."""
+    """Vertices of closed polygons one after the other, the first of each repeated at its end, of shape (N, 2)."""
     ends: NDArray[np.int64]
     """Where each polygon starts, and N at the end."""
     outward: Array
-    """Outward normals of the viewing planes (camera's frame), of shape (N, 3); 0 where no ray is to be taken."""
+    """Outward normals of the viewing planes (camera's frame), of shape (N, 3); 0 where no ray starts."""
     chunks: Array
-    """Circles around runs of sides: centre and radius, of shape (3, C)."""
+    """Bounding circles of runs of sides: centre and radius, of shape (3, C)."""
     spans: NDArray[np.int64]
     """First side of each run and its end, of shape (C, 2)."""
 
 
 class VisualHull:
-    """The cameras' half of the work, done once: `points` is then called with each frame's silhouettes.
+    """Calibrated cameras; `points` makes surface points of their silhouettes.
 
-    Raises `CalibrationError` for fewer than two cameras, or for one of which it is not known where it stands.
+    Raises `CalibrationError` for fewer than two cameras, or for one without a pose in the world.
     """
 
     def __init__(self, cameras: Iterable[Camera], settings: HullSettings | None = None) -> None:
-        """Undo the lenses once for all."""
+        """Undo the lens distortion on a grid, once."""
         self.cameras = tuple(cameras)
         self.settings = settings or HullSettings()
         if len(self.cameras) < 2:
@@ -88,11 +87,10 @@ class VisualHull:
         self._T = np.stack([camera.T_camera_world for camera in self.cameras])
 
     def points(self, masks: Sequence[ArrayLike | None]) -> SurfacePoints:
-        """Surface points of one frame's masks (H, W), one a camera, in their order.
+        """Surface points of one frame's masks (H, W), one per camera, in their order.
 
-        A mask that is None, empty, or nearly all of the picture is no person's and says nothing; neither does a picture about what lies
-        beyond its border. There are no points where fewer than two masks are left. Raises `TrackingError` where masks are not as many
-        as cameras, or not of their pictures' size.
+        A mask that is None, empty, or nearly the whole picture is ignored; nothing is carved outside a picture. With fewer than two masks
+        left there are no points. Raises `TrackingError` for a wrong number of masks, or for a size other than the camera's.
         """
         if len(masks) != len(self.cameras):
             raise TrackingError(f"silhouettes: found {len(masks)}, expected {len(self.cameras)}, one a camera (None where there is none)")
@@ -106,8 +104,8 @@ class VisualHull:
 
     def _edges(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """Viewing edges: camera (E,), ray (E, 3) with z = 1, normal (E, 3), both in the camera's frame, and depths (E, 2)."""
-        step = sum(length(s.lines, s.outward) for s in silhouettes) / self.settings.rays
-        taken = [spread(s.lines, s.outward, step) for s in silhouettes]
+        step = sum(contour_length(s.lines, s.outward) for s in silhouettes) / self.settings.rays
+        taken = [spaced_vertices(s.lines, s.outward, step) for s in silhouettes]
         camera = np.repeat(np.arange(len(which)), [len(t) for t in taken])
         rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
         rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
@@ -120,7 +118,7 @@ class VisualHull:
         lenses = np.stack([self._views[n].lens for n in which])
         T = self._T[which]
         relative = T[None] @ inverse(T)[:, None]  # [i, j]: from camera i to j
-        ray, depths = cut(camera, rays, relative, lines, spans, chunks, bounds, lenses, self.settings.tolerated)
+        ray, depths = cut_rays(camera, rays, relative, lines, spans, chunks, bounds, lenses, self.settings.tolerated)
         return which[camera[ray]], rays[ray], outward[ray], depths
 
     def _sampled(self, camera: NDArray[np.int64], rays: Array, outward: Array, depths: Array) -> SurfacePoints:
@@ -139,20 +137,20 @@ class VisualHull:
 
 
 def _view(camera: Camera) -> _View:
-    """What of a camera does not change."""
+    """The arrays of a camera."""
     (width, height), lens = camera.size, make_lens(camera)
-    x, y = (np.linspace(-0.5, side - 0.5, -(-side // GRID) + 1) for side in (width, height))
+    x, y = (np.linspace(-0.5, side - 0.5, -(-side // GRID_PITCH) + 1) for side in (width, height))
     pixels = np.stack(np.meshgrid(x, y), -1)
     rays = camera.rays(pixels)
     back = camera.project(transform(inverse(camera.T_camera_world), rays))
-    good = (np.abs(back - pixels).max(-1) < TRUE) & (np.linalg.norm(rays[..., :2], axis=-1) < min(camera.reach, WIDEST))
-    numbers = [*np.diag(camera.matrix)[:2], *camera.matrix[:2, 2], width, height, camera.fisheye, min(lens[-1], WIDEST)]
+    good = (np.abs(back - pixels).max(-1) < MAX_RETURN_ERROR) & (np.linalg.norm(rays[..., :2], axis=-1) < min(camera.reach, MAX_RADIUS))
+    numbers = [*np.diag(camera.matrix)[:2], *camera.matrix[:2, 2], width, height, camera.fisheye, min(lens[-1], MAX_RADIUS)]
     flat = np.where(good[..., None], rays[..., :2], 0.0)
     return _View(flat, None if good.all() else _seen(good, camera.size), np.pad(np.array([*numbers, *camera.distortion]), (0, 8))[:16])
 
 
 def _seen(good: NDArray[np.bool_], size: tuple[int, int]) -> Mask:
-    """Pixels (H, W) in cells of the grid of which all corners, and their neighbours, are good."""
+    """Pixels (H, W) in cells of the grid whose corners, and their neighbours, are all good."""
     wide = np.pad(good, 1, mode="edge")
     firm = np.lib.stride_tricks.sliding_window_view(wide, (4, 4)).all((2, 3))
     columns, rows = (((np.arange(side) + 0.5) / side * cells).astype(int) for side, cells in zip(size, firm.shape[::-1]))
@@ -161,6 +159,6 @@ def _seen(good: NDArray[np.bool_], size: tuple[int, int]) -> Mask:
 
 def _silhouette(mask: Mask, view: _View) -> _Silhouette:
     """A mask's contours on the plane z = 1."""
-    contours = trace(mask, view.seen)
+    contours = trace_contours(mask, view.seen)
     lines, outward, ends = straighten(*contours, view.rays, view.lens[4], view.lens[5])
-    return _Silhouette(lines, ends, outward, *circles(lines, ends))
+    return _Silhouette(lines, ends, outward, *bounding_circles(lines, ends))

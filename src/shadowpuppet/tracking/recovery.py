@@ -1,0 +1,55 @@
+"""When a tracker searches for the person again: one policy for one camera and for several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+SETTLE_CYCLES = 10
+"""Estimation cycles on the frame of a search, after it."""
+OVERLAP_DROP = 0.2
+"""With several cameras, an overlap that falls by more than this in a frame starts a search: limbs may still overlap a person elsewhere."""
+
+
+class TrackerState(Protocol):
+    """The part of a tracker's state that the policy reads."""
+
+    @property
+    def overlap(self) -> float:
+        """Intersection over union of the drawn estimate and the silhouettes."""
+        ...
+
+    @property
+    def status(self) -> str:
+        """`tracked`, `uncertain`, `lost` or `absent`."""
+        ...
+
+
+State = TypeVar("State", bound=TrackerState)
+
+
+def track_or_recover(state: State, *, is_absent: bool, hold: Callable[[State], State], cycle: Callable[[State], State],
+                     search: Callable[[], State], recover: bool, drop: float = np.inf) -> State:
+    """The state after a frame. If the person is absent, the pose is held.
+
+    With `recover`, a search replaces tracking for a person who was absent; after a loss, or when the overlap falls by more than `drop`,
+    the better of the two counts.
+    """
+    if is_absent:
+        return hold(state)
+    if state.status == "absent" and recover:
+        return search()
+    tracked = cycle(state)
+    if not recover or not (tracked.status == "lost" or tracked.overlap < state.overlap - drop):
+        return tracked
+    found = search()
+    return found if found.overlap > tracked.overlap else tracked
+
+
+def settle(state: State, cycle: Callable[[State], State]) -> State:
+    """The state of a search after `SETTLE_CYCLES` cycles on the same frame."""
+    for _ in range(SETTLE_CYCLES):
+        state = cycle(state)
+    return state
