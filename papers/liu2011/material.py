@@ -27,7 +27,7 @@ from shadowpuppet.pipeline.options import Options, make_options, plain_options
 from shadowpuppet.pipeline.synthesize import make_recording
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.movement.gestures import LEAD
-from shadowpuppet.synthetic.shorthand import gestures_from
+from shadowpuppet.synthetic.spec_changes import gestures_from
 from shadowpuppet.synthetic.spec_file import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.monocular.initialization import Guess

@@ -17,7 +17,7 @@ from papers.common.experiment import Request
 from papers.ni2008 import figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
 from papers.ni2008.__main__ import EXPERIMENTS, main
 from shadowpuppet.synthetic import Ring, Scene, Spec, humaneva, synthesize
-from shadowpuppet.synthetic.shorthand import gestures_from
+from shadowpuppet.synthetic.spec_changes import gestures_from
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
 SEED = 3

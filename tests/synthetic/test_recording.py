@@ -28,14 +28,14 @@ from shadowpuppet.synthetic import (
     synthesize,
 )
 from shadowpuppet.synthetic.movement import gestures
-from shadowpuppet.synthetic.performance import seconds_of
+from shadowpuppet.synthetic.movement.sequence import seconds_of
 from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, pose
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
-from shadowpuppet.synthetic.person.parts import dressed
 from shadowpuppet.synthetic.person.surface import Surface, ball
+from shadowpuppet.synthetic.person_renderer import Renderer
 from shadowpuppet.synthetic.recording import Studio, perform
-from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.video import open_frames, read_image
 
 VIEW = Viewpoint(size=(80, 60))

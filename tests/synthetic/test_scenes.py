@@ -15,17 +15,17 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.synthetic.compositing import FAR, Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
-from shadowpuppet.synthetic.layers import FAR, Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import Surface, ball
+from shadowpuppet.synthetic.person_renderer import Renderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.synthetic.room import brightness
-from shadowpuppet.synthetic.studio import Studio, body_of
+from shadowpuppet.synthetic.scene_renderer import Studio, body_of
 from shadowpuppet.synthetic.viewpoint import JITTER, MIDDLE, STRAY
 from shadowpuppet.video import open_frames
 

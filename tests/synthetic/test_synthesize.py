@@ -37,7 +37,7 @@ from shadowpuppet.synthetic import (
 )
 from shadowpuppet.synthetic.movement.gestures import MOTIONS
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.shorthand import Shorthand, expanded, gestures_from
+from shadowpuppet.synthetic.spec_changes import Shorthand, expanded, gestures_from
 from shadowpuppet.synthetic.spec_file import HEAD, seed_of
 from shadowpuppet.video import open_frames
 

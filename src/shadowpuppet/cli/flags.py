@@ -18,8 +18,8 @@ from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.pipeline.options import PATHS, Options, make_options, over, read_options
 from shadowpuppet.settings import default_of, settings_of, validate
 from shadowpuppet.synthetic.collection import named_specs
-from shadowpuppet.synthetic.shorthand import Shorthand, expanded
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
+from shadowpuppet.synthetic.spec_changes import Shorthand, expanded
 from shadowpuppet.synthetic.spec_file import read_spec
 
 HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other programs", "Learning", "Other")

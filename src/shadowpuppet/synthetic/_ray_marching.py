@@ -1,4 +1,4 @@
-"""Kernels of the renderer: sphere tracing of the blended lofts (Hart 1996). Arrays and scalars only; see `renderer.py`.
+"""Kernels of the renderer: sphere tracing of the blended lofts (Hart 1996). Arrays and scalars only; see `person_renderer.py`.
 
 A placed part is a row of `PLACED` numbers: 0-8 its frame's columns width, depth, axis; 9-11 its start; 12-15 middle and radius of
 a sphere about it; 16 length; 17, 18 one over its caps; 19 blend; 20 samples per length; 21 where the second material begins.

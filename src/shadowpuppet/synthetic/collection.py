@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
-from shadowpuppet.synthetic.shorthand import gestures_from
 from shadowpuppet.synthetic.spec import Scene, Spec
+from shadowpuppet.synthetic.spec_changes import gestures_from
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 
 

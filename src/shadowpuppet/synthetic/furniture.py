@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.layers import FAR, Layer
+from shadowpuppet.synthetic.compositing import FAR, Layer
 
 Place = Annotated[float, Field(ge=-10, le=10)]
 NEAREST = 0.25

@@ -16,9 +16,9 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
+from shadowpuppet.synthetic.scene_renderer import Studio, body_of
 from shadowpuppet.synthetic.spec import Bystander, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
-from shadowpuppet.synthetic.studio import Studio, body_of
 
 Tell = Callable[[int, int], None]
 
@@ -67,7 +67,7 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
 
     Raises `SettingsError` where the motion is over before the film is.
     """
-    from shadowpuppet.synthetic.performance import perform, seconds_of
+    from shadowpuppet.synthetic.movement.sequence import perform, seconds_of
 
     there = int((seconds_of(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
     if there < max(spec.frames or 1, 1):

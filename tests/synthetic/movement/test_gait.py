@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, demo_spec, proving_ground, spec_from
+from shadowpuppet.synthetic.movement.actions import ACTS
 from shadowpuppet.synthetic.movement.gait import Walk
 from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
 from shadowpuppet.synthetic.movement.gait_cycle import JOGGING, WALKING, Cycle, Sole, stride_of
 from shadowpuppet.synthetic.movement.gestures import LEVEL, posture
 from shadowpuppet.synthetic.movement.paths import Path
-from shadowpuppet.synthetic.movement.whole_body import ACTS
-from shadowpuppet.synthetic.performance import SOFT
+from shadowpuppet.synthetic.movement.sequence import SOFT
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, SIDES, figure, lesser, pose
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, GROWTH, JOINTS
 from shadowpuppet.synthetic.recording import perform
@@ -501,8 +501,8 @@ def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
 
     from shadowpuppet.synthetic import Viewpoint
     from shadowpuppet.synthetic.person.clothes import Clothes
-    from shadowpuppet.synthetic.person.parts import dressed
-    from shadowpuppet.synthetic.renderer import Renderer
+    from shadowpuppet.synthetic.person.dressed import dressed
+    from shadowpuppet.synthetic.person_renderer import Renderer
 
     bare = Clothes(looseness=0.0)
     for stature, build, wanted in ((1.629, 0.0, 25.6), (1.756, 1.0, 27.8)):

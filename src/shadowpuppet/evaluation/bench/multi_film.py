@@ -27,7 +27,7 @@ def ring_spec(size: tuple[int, int] = (640, 480), cameras: int = 7) -> Spec:
 def ring_recording(folder: Path, frames: int, spec: Spec | None = None, drawn: int = 12) -> Path:
     """A recording of so many frames in `folder`, of which `drawn` are different, with training motion; no masks, no truth."""
     from shadowpuppet.synthetic.recording import perform, write_truth
-    from shadowpuppet.synthetic.studio import Studio
+    from shadowpuppet.synthetic.scene_renderer import Studio
 
     spec = spec or ring_spec()
     for kind in ("video", "background"):

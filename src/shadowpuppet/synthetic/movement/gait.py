@@ -1,4 +1,4 @@
-"""Walking and jogging along a path: footprints first, feet that stay on them, and the published cycle (`cycle.py`) between.
+"""Walking and jogging along a path: footprints first, feet that stay on them, and the published cycle (`gait_cycle.py`) between.
 
 Arms swing against the legs: by some 30 degrees with nearly straight elbows in walking (Murray et al. 1967), with elbows near a
 right angle in jogging (Yegian et al. 2019). Strides vary by some 2 % (Hausdorff 2005).

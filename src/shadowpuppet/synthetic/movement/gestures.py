@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement.sway import band_noise, involuntary, plain
+from shadowpuppet.synthetic.movement.involuntary import band_noise, involuntary, plain
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS, Mannequin
 

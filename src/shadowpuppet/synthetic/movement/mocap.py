@@ -72,7 +72,7 @@ def _at(table: JointTable, t: Array) -> JointTable:
 def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
     """`body` in the postures of `table`, one a row; `rest` has one row: the same skeleton upright, arms level, facing -Y.
 
-    Both have the joints of `io.amc.ENDS`, `pelvis` and `face`. Where the body stands follows the measured pelvis in proportion to
+    Both have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. Where the body stands follows the measured pelvis in proportion to
     the legs; its soles are brought to the floor where they are lowest.
     """
     p: Points = dict(zip(table.names, table.positions.swapaxes(0, 1)))

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shadowpuppet.synthetic.movement.acts import STANCE, Act, Hop, Step
 from shadowpuppet.synthetic.movement.gestures import Keys, Posture, band_noise, both, left, right, trunk
 from shadowpuppet.synthetic.movement.gestures import random as random_keys
+from shadowpuppet.synthetic.movement.keyframes import STANCE, Act, Hop, Step
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GUARD = both(front=38, side=12, roll=6, elbow=122, supination=10, curl=85, wrist_flex=0)

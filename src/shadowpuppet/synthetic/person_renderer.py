@@ -27,7 +27,7 @@ class Shot(NamedTuple):
     alpha: Array
     """Share of each pixel that the person covers, of shape (H, W)."""
     depth: Array
-    """Distance along the rays of pixel centres, of shape (H, W), metres; `layers.FAR` where the person is missed."""
+    """Distance along the rays of pixel centres, of shape (H, W), metres; `compositing.FAR` where the person is missed."""
 
 
 class Renderer:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.movement.actions import ACTS
 from shadowpuppet.synthetic.movement.gait import Walk
 from shadowpuppet.synthetic.movement.gait_cycle import smooth
 from shadowpuppet.synthetic.movement.gestures import LEAD, MOTIONS, compose, duration, involuntary, keys_of, settled, through
-from shadowpuppet.synthetic.movement.whole_body import ACTS
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, Figure, Stance, figure, planted, pose, turns
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 

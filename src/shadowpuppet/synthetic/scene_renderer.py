@@ -12,13 +12,13 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.compositing import Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.furniture import Furniture
-from shadowpuppet.synthetic.layers import Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person.parts import dressed
-from shadowpuppet.synthetic.renderer import Renderer
+from shadowpuppet.synthetic.person_renderer import Renderer
 from shadowpuppet.synthetic.room import Room, brightness, exposed
 from shadowpuppet.synthetic.spec import Bystander, Spec
 
