@@ -16,7 +16,7 @@ import numpy as np
 
 from shadowpuppet.calibration.epipolar_tangency import Outlines
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.pipeline.check_calibration import RigCheck, Seen, gather, judge
+from shadowpuppet.pipeline.check_calibration import CalibrationCheck, Seen, gather_silhouettes, judge_calibration
 from shadowpuppet.pipeline.footage_rig import Rig, open_rig
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
@@ -80,7 +80,7 @@ def with_fault(rig: Rig, seen: Seen, fault: Fault) -> tuple[Rig, Seen]:
     return Rig(rig.recording, footage), Seen(packed, outlines, seen.every)
 
 
-def row(fault: Fault, found: RigCheck) -> Sequence[str]:
+def row(fault: Fault, found: CalibrationCheck) -> Sequence[str]:
     apart = {name: value for name, value in zip(found.agreement.names, found.agreement.apart) if value is not None}
     worst = max(apart, key=lambda name: apart[name])
     pixels = f"{worst} {apart[worst]:.1f}, others up to {max(v for n, v in apart.items() if n != worst):.1f}"
@@ -99,10 +99,10 @@ def main() -> None:
     given = parser.parse_args()
     options = Options(masks=given.masks)
     rig = open_rig(given.recording, options)
-    seen = gather(rig, options, Listener())
+    seen = gather_silhouettes(rig, options, Listener())
     print("| what is wrong | pixels | turned right, down, clockwise, ° | late, frames | said |\n|---|---|---|---|---|")
     for fault in faults():
-        print("| " + " | ".join(row(fault, judge(*with_fault(rig, seen, fault)))) + " |", flush=True)
+        print("| " + " | ".join(row(fault, judge_calibration(*with_fault(rig, seen, fault)))) + " |", flush=True)
 
 
 if __name__ == "__main__":

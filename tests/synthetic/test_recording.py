@@ -28,13 +28,13 @@ from shadowpuppet.synthetic import (
     synthesize,
 )
 from shadowpuppet.synthetic.movement import gestures
-from shadowpuppet.synthetic.movement.sequence import seconds_of
+from shadowpuppet.synthetic.movement.sequence import sequence_seconds
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, pose
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
-from shadowpuppet.synthetic.person.surface import Surface, ball
-from shadowpuppet.synthetic.person_renderer import Renderer
+from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
+from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import Studio, perform
 from shadowpuppet.video import open_frames, read_image
 
@@ -214,7 +214,7 @@ def test_distance_kernel_against_plain_numpy(rng, monkeypatch):
 
     body, clothes = Mannequin.draw(rng, "woman"), Clothes.draw(rng)
     figure = pose(body, gestures.compose([("random", 3.0)], np.array([1.5]), rng))
-    renderer = Renderer(VIEW.camera(), dressed(body, clothes), clothes, LIGHTS)
+    renderer = PersonRenderer(VIEW.camera(), dressed(body, clothes), clothes, LIGHTS)
     seen = {}
     trace = _ray_marching.find_surface
     monkeypatch.setattr(_ray_marching, "find_surface", lambda *a: (seen.update(a=a), trace(*a)))
@@ -242,7 +242,7 @@ def test_leaving_out_parts_that_a_tile_cannot_see_changes_nothing(rng, monkeypat
     body, clothes = Mannequin.draw(rng), Clothes.draw(rng)
     figure = pose(body, gestures.compose([("random", 6.0)], np.array([3.0, 5.0]), rng))
     camera = replace(VIEW, size=(160, 120), distortion=(-0.2, 0.05, 0, 0)).camera()
-    renderer = Renderer(camera, dressed(body, clothes), clothes, LIGHTS)
+    renderer = PersonRenderer(camera, dressed(body, clothes), clothes, LIGHTS)
     culled = [renderer.draw(figure, index) for index in range(2)]
     monkeypatch.setattr(_ray_marching, "list_parts", list_all)
     for index, shot in enumerate(culled):
@@ -257,9 +257,9 @@ def test_a_ball_has_the_silhouette_of_a_sphere(distortion):
     radius, centre = 0.3, np.array([0.1, 0.0, 1.5])
     figure = pose(Mannequin(), gestures.posture())
     origin = figure.origin[0, SEGMENTS.index("pelvis")]
-    one = Surface.of([ball("pelvis", origin, centre, (radius,) * 3, blend=0.01)])
+    one = Surface.of([ellipsoid("pelvis", origin, centre, (radius,) * 3, blend=0.01)])
     camera = Viewpoint(size=(80, 60), distortion=distortion, pitch_deg=7).camera()
-    shot = Renderer(camera, one, Clothes(), LIGHTS).draw(figure, 0)
+    shot = PersonRenderer(camera, one, Clothes(), LIGHTS).draw(figure, 0)
     pixels = np.stack(np.meshgrid(np.arange(80), np.arange(60)), -1)
     rays = camera.rays(pixels) @ camera.T_camera_world[:3, :3]
     to_centre = centre - camera.centre
@@ -288,7 +288,7 @@ def test_all_true_joints_lie_in_the_mask(changes, rng):
 
 def test_the_level_posture_is_symmetric_to_the_last_finger():
     body, clothes = Mannequin(), Clothes.draw(np.random.default_rng(0))
-    shot = Renderer(Viewpoint(size=(240, 180)).camera(), dressed(body, clothes), clothes, LIGHTS).draw(
+    shot = PersonRenderer(Viewpoint(size=(240, 180)).camera(), dressed(body, clothes), clothes, LIGHTS).draw(
         pose(body, gestures.posture(**gestures.LEVEL)), 0)
     assert (shot.mask != shot.mask[:, ::-1]).sum() <= 2
     assert shot.mask.any(0).sum() > 180
@@ -501,7 +501,7 @@ def test_the_rings_of_the_proving_ground_are_varied_and_fixed():
     used = {gesture.motion for spec in specs for gesture in spec.motion}
     assert used >= {"walk", "jog", "box", "squat", "lift", "sit", "march", "jump", "bow_forward", "bend_aside", "wave_hands", "reach"}
     assert {spec.training == () for spec in specs} == {spec.training is None for spec in specs} == {True, False}
-    assert all(spec.rate <= 60 and 4 <= seconds_of(spec.motion) <= 7 for spec in specs)
+    assert all(spec.rate <= 60 and 4 <= sequence_seconds(spec.motion) <= 7 for spec in specs)
     assert min(spec.body.stature for spec in specs) < 1.35 < 1.8 < max(spec.body.stature for spec in specs)
     assert min(spec.body.girth for spec in specs) < 0.9 < 1.1 < max(spec.body.girth for spec in specs)
 

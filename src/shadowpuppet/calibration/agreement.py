@@ -9,24 +9,24 @@ from itertools import combinations
 import numpy as np
 
 from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines, tangent_distances
-from shadowpuppet.calibration.silhouette_coverage import Coverage, meeting_place
+from shadowpuppet.calibration.silhouette_coverage import Coverage, triangulated_centre
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse
 
-DISAGREES = 0.01
+MAX_DISAGREEMENT = 0.01
 """Pixels, over the picture's longer side, from which on cameras are in doubt (6 of 640); good ones are apart by one."""
-MENDED = 0.4
+REMEDY_SHARE = 0.4
 """A remedy is told where no more than this of the disagreement is left..."""
-ALIKE = 0.5
+BLAME_SHARE = 0.5
 """... and a camera is blamed where no more than this is left without it."""
-MOVED = 12
+MAX_SHIFT = 12
 """Sets by which a camera's pictures are moved, to and fro, to see whether they come late."""
-COMPARED, TRIED = 10, 4
+SETS_COMPARED, SETS_PER_REMEDY = 10, 4
 """Sets in which cameras are compared, and in which each remedy is tried."""
-MILLIMETRES = 100.0
+MILLIMETRE_HEIGHT = 100.0
 """Height (metres by the calibration) of a person from which on it is in millimetres."""
-PEOPLE = (0.5, 2.8)
+PERSON_HEIGHT_RANGE = (0.5, 2.8)
 """Height of people, metres: sitting, and with raised arms."""
 
 
@@ -89,19 +89,19 @@ def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]],
     `remedies`: whether what would mend them is looked for.
     """
     scene = _Scene(tuple(cameras), [list(row) for row in masks])
-    limit = DISAGREES * max(max(camera.size) for camera in cameras)
+    limit = MAX_DISAGREEMENT * max(max(camera.size) for camera in cameras)
     apart, blamed = scene.judged(limit)
     height = scene.height()
     names, pairs = tuple(camera.name for camera in cameras), tuple(map(_plain, scene.tangents()))
     found = Agreement(names=names, apart=_plain(apart), pairs=pairs, limit=limit, height=height)
-    if height is not None and height > MILLIMETRES:
+    if height is not None and height > MILLIMETRE_HEIGHT:
         told = (f"the calibration makes the person {height:,.0f} m high and the cameras up to {_spread(cameras):,.0f} m apart: it is in "
                 "millimetres, it seems; divide every translation in calibration.toml by 1000")
         return replace(found, remedy=told, hopeless=True)
     if found.wrong:
         return replace(found, remedy=_remedy(scene, found, blamed, seconds) if remedies else None)
-    if height is not None and not PEOPLE[0] < height < PEOPLE[1]:
-        told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? "
+    if height is not None and not PERSON_HEIGHT_RANGE[0] < height < PERSON_HEIGHT_RANGE[1]:
+        told = (f"the calibration makes the person {height:.2g} m high, expected {PERSON_HEIGHT_RANGE[0]:g} to {PERSON_HEIGHT_RANGE[1]:g} m: is it in metres? "
                 "multiply every translation in calibration.toml by what is missing")
         return replace(found, remedy=told)
     return found
@@ -116,25 +116,25 @@ class _Scene:
     outlines: Outlines = field(default_factory=Outlines)
     coverage: Coverage = field(default_factory=Coverage)
 
-    def rows(self, count: int = COMPARED) -> list[list[Mask | None]]:
+    def rows(self, count: int = SETS_COMPARED) -> list[list[Mask | None]]:
         """Some of the sets, spread."""
         return [self.masks[f] for f in np.unique(np.linspace(0, len(self.masks) - 1, count).astype(int)) if self.masks]
 
     def seen(self, row: Sequence[Mask | None]) -> list[Outline | None]:
         return [self.outlines.of(camera, mask) for camera, mask in zip(self.cameras, row)]
 
-    def tangents(self, count: int = COMPARED) -> Array:
+    def tangents(self, count: int = SETS_COMPARED) -> Array:
         """Pixels (C, C) between the tangents of every two cameras."""
         return tangent_distances(self.cameras, [self.seen(row) for row in self.rows(count)])
 
-    def beyond(self, count: int = COMPARED) -> Array:
+    def beyond(self, count: int = SETS_COMPARED) -> Array:
         """Pixels (C, C + 1) of `Coverage.beyond`, median over sets."""
         values = np.array([self.coverage.beyond(self.cameras, row, self.seen(row)) for row in self.rows(count)])
         return _median(values.reshape(-1, len(self.cameras), len(self.cameras) + 1))
 
     def total(self) -> float:
         """One figure for how badly all fit together, pixels."""
-        return _mean(self.tangents(TRIED)) + float(np.nan_to_num(_mean(self.beyond(TRIED)[:, -1])))
+        return _mean(self.tangents(SETS_PER_REMEDY)) + float(np.nan_to_num(_mean(self.beyond(SETS_PER_REMEDY)[:, -1])))
 
     def judged(self, limit: float) -> tuple[Array, int | None]:
         """By how many pixels each camera (C,) disagrees, and which one is to blame for it, if one alone is."""
@@ -147,7 +147,7 @@ class _Scene:
         if np.isnan(without).all():
             return apart, None
         w = int(np.nanargmin(without))
-        if without[w] > min(ALIKE * _mean(apart), limit):
+        if without[w] > min(BLAME_SHARE * _mean(apart), limit):
             return apart, None
         rest = np.fmax(lowest, beyond[:, w])
         rest[w] = apart[w]
@@ -158,7 +158,7 @@ class _Scene:
         heights = []
         for row in self.rows():
             outlines = self.seen(row)
-            middle = meeting_place(self.cameras, outlines)
+            middle = triangulated_centre(self.cameras, outlines)
             for camera, outline in zip(self.cameras, outlines):
                 if middle is not None and outline is not None:
                     mean = outline.rays.mean(0)
@@ -175,7 +175,7 @@ def _remedy(scene: _Scene, found: Agreement, blamed: int | None, seconds: float)
     before = scene.total()
     tried = ((changed.total(), told) for changed, told in _changes(scene, found.names, blamed, seconds))
     after, told = min(tried, key=lambda each: each[0])
-    if after > min(MENDED * before, found.limit):
+    if after > min(REMEDY_SHARE * before, found.limit):
         return None
     return f"{told}: then all agree within {after:.1f} pixels, instead of {before:.0f}"
 
@@ -200,7 +200,7 @@ def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: f
     if not np.isfinite(seconds):
         return
     for n in range(C) if blamed is None and C < 4 else [blamed] if blamed is not None else []:
-        for steps in range(-MOVED, MOVED + 1):
+        for steps in range(-MAX_SHIFT, MAX_SHIFT + 1):
             if steps:
                 yield _shifted(scene, n, steps), _late(names, n, seconds * steps)
 

@@ -15,13 +15,13 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 
-WIDE = 2.6
+MAX_ANGULAR_EXTENT = 2.6
 """Radians that a silhouette may cover around the line from camera to camera: beyond, that line runs through or along it."""
-EVERY = 2
+CONTOUR_STEP = 2
 """Pixels of a contour from one taken to the next."""
-BORDER = 2
+BORDER_MARGIN = 2
 """Pixels from the picture's border within which nothing can be said of an outline."""
-SMALL = 0.1
+MIN_CONTOUR_SHARE = 0.1
 """Outlines shorter than this, over the longest, are specks."""
 
 
@@ -62,8 +62,8 @@ def _followed(mask: Mask) -> tuple[Array, Mask]:
 
     contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
     longest = max(map(len, contours))
-    pixels = np.concatenate([c[::EVERY, 0] for c in contours if len(c) > SMALL * longest]).astype(float)
-    return pixels, np.asarray(((pixels >= BORDER) & (pixels < np.array(mask.shape[::-1]) - BORDER)).all(1))
+    pixels = np.concatenate([c[::CONTOUR_STEP, 0] for c in contours if len(c) > MIN_CONTOUR_SHARE * longest]).astype(float)
+    return pixels, np.asarray(((pixels >= BORDER_MARGIN) & (pixels < np.array(mask.shape[::-1]) - BORDER_MARGIN)).all(1))
 
 
 def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]]) -> Array:
@@ -103,7 +103,7 @@ def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outl
         ahead = _unit(aside[0].sum(0)) + _unit(aside[1].sum(0))
         reference = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else aside[0].sum(0))
     angles = [np.arctan2(part @ np.cross(line, reference), part @ reference) for part in aside]
-    if max(float(np.ptp(each)) for each in angles) > WIDE:
+    if max(float(np.ptp(each)) for each in angles) > MAX_ANGULAR_EXTENT:
         return None
     focal = [float(np.diag(camera.matrix)[:2].mean()) for camera in cameras]
     out, levers = np.full((2, 2), np.nan), np.zeros(2)

@@ -13,24 +13,24 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import UPS, Calibration, look_into
 
-PERSON = (0.0, 0.9, 1.8)
+PERSON_HEIGHTS = (0.0, 0.9, 1.8)
 """Heights (metres) at which a standing person must be in the picture to be seen whole."""
-UPRIGHT = 0.7
+MIN_UP_COSINE = 0.7
 """Cosine of the mean way up in the pictures to Z under which Z is not up; and to another axis, from which on it is that one."""
-SPREADS = (0.3, 30.0)
+RIG_EXTENT = (0.3, 30.0)
 """Metres between the cameras farthest apart, beyond which lengths are hardly in metres."""
-ASIDE = 0.2
+MAX_CENTRE_OFFSET = 0.2
 """How far from the picture's middle, over its size, a principal point is odd."""
-PAST = 0.35
+MAX_AIM_OFFSET = 0.35
 """How far beside the place that all look at a camera may look, over its distance, before that is said."""
-AHEAD = 4.0
+VIEW_DISTANCE = 4.0
 """Metres before cameras that the top view takes in where they do not look at one place, and its least side."""
-SIDE = 48
+MAP_COLUMNS = 48
 """Columns of the top view, and twice its rows."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standpoint:
+class CameraPlacement:
     """One camera; plain values."""
 
     name: str
@@ -66,7 +66,7 @@ class CalibrationLook:
     """What the file's lengths are in."""
     unit_told: bool
     """Whether the file says so, or the user; metres are taken otherwise."""
-    cameras: tuple[Standpoint, ...]
+    cameras: tuple[CameraPlacement, ...]
     middle: tuple[float, float, float] | None
     """The place that all look at, nearest to their axes, metres."""
     apart: tuple[float, float] | None
@@ -108,17 +108,17 @@ def meeting_point(cameras: Sequence[Camera]) -> Array | None:
     return middle if 2 * sum(ahead) > len(cameras) else None
 
 
-def way_up(cameras: Sequence[Camera]) -> Array:
+def up_direction(cameras: Sequence[Camera]) -> Array:
     """What is up in the pictures, on the whole, in the world (3,), at most 1 long."""
     return -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
 
 
-def _standpoint(camera: Camera, middle: Array | None) -> Standpoint:
+def _standpoint(camera: Camera, middle: Array | None) -> CameraPlacement:
     R, (width, height) = camera.T_camera_world[:3, :3], camera.size
     fov = [float(np.degrees(2 * np.arctan(side / 2 / focal))) for side, focal in zip(camera.size, np.diag(camera.matrix))]
     lens = "fisheye" if camera.fisheye else "distorted" if camera.distortion.any() else "pinhole"
     away = float(np.linalg.norm(middle - camera.centre)) if middle is not None else None
-    return Standpoint(
+    return CameraPlacement(
         name=camera.name, size=(width, height), fov=(fov[0], fov[1]), lens=lens, bend=_bend(camera), place=_three(camera.centre),
         facing=float(np.degrees(np.arctan2(R[2, 1], R[2, 0]))),
         down=float(np.degrees(-np.arcsin(np.clip(R[2, 2], -1, 1)))), roll=float(np.degrees(np.arctan2(-R[0, 2], -R[1, 2]))), away=away,
@@ -143,25 +143,25 @@ def _three(values: Array) -> tuple[float, float, float]:
 
 def _corners(cameras: Sequence[Camera], middle: Array | None) -> tuple[float, float, float, float]:
     """A square about all that stands in the map."""
-    ahead = [middle] if middle is not None else [camera.centre + AHEAD * camera.T_camera_world[2, :3] for camera in cameras]
+    ahead = [middle] if middle is not None else [camera.centre + VIEW_DISTANCE * camera.T_camera_world[2, :3] for camera in cameras]
     points = np.array([camera.centre for camera in cameras] + ahead)[:, :2]
-    half = 0.55 * max(float(np.ptp(points, axis=0).max()), AHEAD)
+    half = 0.55 * max(float(np.ptp(points, axis=0).max()), VIEW_DISTANCE)
     x, y = (points.min(0) + points.max(0)) / 2
     return float(x - half), float(y - half), float(x + half), float(y + half)
 
 
-def cells(corners: tuple[float, float, float, float]) -> Array:
+def map_cells(corners: tuple[float, float, float, float]) -> Array:
     """Middles (SIDE / 2, SIDE, 2) of the map's cells, metres, the greatest y first."""
     x0, y0, x1, y1 = corners
-    xs, ys = ((np.arange(n) + 0.5) / n for n in (SIDE, SIDE // 2))
+    xs, ys = ((np.arange(n) + 0.5) / n for n in (MAP_COLUMNS, MAP_COLUMNS // 2))
     return np.stack(np.broadcast_arrays(x0 + xs * (x1 - x0), (y1 - ys * (y1 - y0))[:, None]), -1)
 
 
 def _seen(cameras: Sequence[Camera], corners: tuple[float, float, float, float]) -> Array:
     """How many cameras see a person whole who stands on the floor, Z = 0, by cells of the map."""
-    places = cells(corners)
-    people = np.concatenate([np.broadcast_to(places[:, :, None], (*places.shape[:2], len(PERSON), 2)),
-                             np.broadcast_to(np.array(PERSON)[:, None], (*places.shape[:2], len(PERSON), 1))], -1)
+    places = map_cells(corners)
+    people = np.concatenate([np.broadcast_to(places[:, :, None], (*places.shape[:2], len(PERSON_HEIGHTS), 2)),
+                             np.broadcast_to(np.array(PERSON_HEIGHTS)[:, None], (*places.shape[:2], len(PERSON_HEIGHTS), 1))], -1)
     count = np.zeros(places.shape[:2], int)
     for camera in cameras:
         pixels = camera.project(people)
@@ -176,7 +176,7 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
     if placed:
         yield from _up_doubts(placed)
     gaps = {(a.name, b.name): float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(placed, 2)}
-    if gaps and not found.told and not SPREADS[0] < max(gaps.values()) < SPREADS[1]:
+    if gaps and not found.told and not RIG_EXTENT[0] < max(gaps.values()) < RIG_EXTENT[1]:
         yield (f"the cameras stand up to {max(gaps.values()):.3g} m apart: is that in metres? say what the file's lengths are in: "
                "--unit mm, or unit = \"mm\" in recording.toml")
     same = [pair for pair, gap in gaps.items() if gap < 1e-3]
@@ -186,16 +186,16 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
         yield from _lens_doubts(camera)
         if middle is not None and len(placed) > 2:
             beside = np.linalg.norm(np.cross(camera.T_camera_world[2, :3], middle - camera.centre)) / np.linalg.norm(middle - camera.centre)
-            if beside > PAST or camera.T_camera_world[2, :3] @ (middle - camera.centre) < 0:
+            if beside > MAX_AIM_OFFSET or camera.T_camera_world[2, :3] @ (middle - camera.centre) < 0:
                 yield f"camera {camera.name!r} looks past the place that the others look at"
 
 
 def _up_doubts(cameras: Sequence[Camera]) -> Iterator[str]:
-    mean = way_up(cameras)
-    if mean[2] < UPRIGHT:
+    mean = up_direction(cameras)
+    if mean[2] < MIN_UP_COSINE:
         named = {name: float(np.dot(axis, mean)) for name, axis in UPS.items() if axis is not None}
         best = max(named, key=lambda name: named[name])
-        up = best if named[best] > UPRIGHT else "cameras"
+        up = best if named[best] > MIN_UP_COSINE else "cameras"
         told = f"its direction {best} is" if up == best else "none of its axes is"
         yield (f"by the pictures the world's Z is not up, {told}: say so, with --up {up} here and up = \"{up}\" in recording.toml, or "
                f"write it upright: --up {up} --to calibration.toml")
@@ -207,7 +207,7 @@ def _up_doubts(cameras: Sequence[Camera]) -> Iterator[str]:
 
 def _lens_doubts(camera: Camera) -> Iterator[str]:
     aside = np.abs(camera.matrix[:2, 2] / (np.array(camera.size) - 1) - 0.5)
-    if (aside > ASIDE).any():
+    if (aside > MAX_CENTRE_OFFSET).any():
         x, y = camera.matrix[:2, 2]
         yield (f"camera {camera.name!r}: the principal point {x:.0f}, {y:.0f} is far from the middle of {camera.size[0]} x "
                f"{camera.size[1]} pixels: was it calibrated in pictures of another size?")

@@ -12,12 +12,12 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector
 
-WORST = 1.0
+OUTLIER_PIXELS = 1.0
 """Pixels from which on a difference counts less than in proportion (soft L1): some tangents are those of a limb that is missing."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Turn:
+class RotationError:
     """A turn that makes a camera agree better; plain values."""
 
     right: float
@@ -35,10 +35,10 @@ class Turn:
 
     def of(self, camera: Camera) -> Camera:
         """The camera as it stands now."""
-        return _turned(camera, np.radians([self.down, -self.right, -self.clockwise]))
+        return _rotated(camera, np.radians([self.down, -self.right, -self.clockwise]))
 
 
-def turning(cameras: Sequence[Camera], rows: Sequence[Sequence[Mask | None]], n: int) -> Turn | None:
+def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Sequence[Mask | None]], n: int) -> RotationError | None:
     """The turn of camera `n` that brings its silhouettes' tangents nearest to the others', over sets of masks (H, W) by camera.
 
     None where there are not two others to tell it by. Its place is taken as right: a camera that was carried off is found to be turned
@@ -53,29 +53,29 @@ def turning(cameras: Sequence[Camera], rows: Sequence[Sequence[Mask | None]], n:
         return None
 
     def off(vector: Array) -> Array:
-        camera, values = _turned(cameras[n], vector), list[float]()
+        camera, values = _rotated(cameras[n], vector), list[float]()
         for row in seen:
             for k in others:
                 own, other, found = row[n], row[k], None
                 if own is not None and other is not None:
-                    found = tangent_angles((camera, cameras[k]), (turned_outline(own, cameras[n], camera), other))
+                    found = tangent_angles((camera, cameras[k]), (rotated_outline(own, cameras[n], camera), other))
                 values += [np.nan] * 2 if found is None else ((found.angles[0] - found.angles[1]) * found.levers).tolist()
         return np.array(values)
 
     start = off(np.zeros(3))
     if np.isfinite(start).sum() < 3:
         return None
-    best = least_squares(lambda v: np.nan_to_num(off(v), nan=0.0), np.zeros(3), loss="soft_l1", f_scale=WORST, x_scale=0.02, diff_step=1e-3,
-                         max_nfev=40).x
+    best = least_squares(lambda v: np.nan_to_num(off(v), nan=0.0), np.zeros(3), loss="soft_l1",
+                         f_scale=OUTLIER_PIXELS, x_scale=0.02, diff_step=1e-3, max_nfev=40).x
     x, y, z = np.degrees(best)
-    return Turn(right=float(-y), down=float(x), clockwise=float(-z), before=float(np.nanmedian(np.abs(start))),
+    return RotationError(right=float(-y), down=float(x), clockwise=float(-z), before=float(np.nanmedian(np.abs(start))),
                 after=float(np.nanmedian(np.abs(off(best)))))
 
 
-def turned_outline(outline: Outline, before: Camera, after: Camera) -> Outline:
+def rotated_outline(outline: Outline, before: Camera, after: Camera) -> Outline:
     """What a camera sees, once it is known to be turned."""
     return outline._replace(rays=outline.rays @ before.T_camera_world[:3, :3].T @ after.T_camera_world[:3, :3])
 
 
-def _turned(camera: Camera, vector: Array) -> Camera:
+def _rotated(camera: Camera, vector: Array) -> Camera:
     return replace(camera, T_camera_world=rigid(rotation_from_vector(vector), np.zeros(3)) @ camera.T_camera_world)

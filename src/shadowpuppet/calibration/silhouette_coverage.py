@@ -15,11 +15,11 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 
-PIXELS, DEPTHS = 24, 32
+RAYS_PER_OUTLINE, DEPTHS_PER_RAY = 24, 32
 """Pixels of each outline that are looked at, and places along the ray of each."""
-DEEP = 0.3
+DEPTH_RANGE = 0.3
 """How far before and behind the middle of the person places are taken, over its distance."""
-SHARE = 75
+COVERAGE_PERCENTILE = 75
 """Percentile over an outline: a camera that looks elsewhere is off along a side of it, a limb missing in another camera is less."""
 
 
@@ -36,13 +36,13 @@ class Coverage:
         Of shape (C, C + 1): row k, column w is camera k's without camera w; the last column without none. Not a number where nothing is
         known: it takes two other cameras.
         """
-        out, middle = np.full((len(cameras), len(cameras) + 1), np.nan), meeting_place(cameras, outlines)
+        out, middle = np.full((len(cameras), len(cameras) + 1), np.nan), triangulated_centre(cameras, outlines)
         for k, outline in enumerate(outlines):
             firm = np.flatnonzero(outline.firm) if outline is not None else []
-            if outline is None or middle is None or len(firm) < PIXELS:
+            if outline is None or middle is None or len(firm) < RAYS_PER_OUTLINE:
                 continue
-            rays = outline.rays[firm[np.linspace(0, len(firm) - 1, PIXELS).astype(int)]]
-            depth = np.linalg.norm(middle - cameras[k].centre) * np.linspace(1 - DEEP, 1 + DEEP, DEPTHS)
+            rays = outline.rays[firm[np.linspace(0, len(firm) - 1, RAYS_PER_OUTLINE).astype(int)]]
+            depth = np.linalg.norm(middle - cameras[k].centre) * np.linspace(1 - DEPTH_RANGE, 1 + DEPTH_RANGE, DEPTHS_PER_RAY)
             away = self._away(cameras, masks, k, cameras[k].centre + rays[:, None] * depth[:, None])
             if away is not None:
                 out[k] = _percentiles(away)
@@ -66,7 +66,7 @@ class Coverage:
         return self._known[id(mask)][1]
 
 
-def meeting_place(cameras: Sequence[Camera], outlines: Sequence[Outline | None]) -> Array | None:
+def triangulated_centre(cameras: Sequence[Camera], outlines: Sequence[Outline | None]) -> Array | None:
     """The place (3,) nearest to the rays through the outlines' middles; None where there are not two."""
     A, b, count = np.zeros((3, 3)), np.zeros(3), 0
     for camera, outline in zip(cameras, outlines):
@@ -90,4 +90,4 @@ def _percentiles(away: Array) -> Array:
     order = np.sort(away, axis=0)
     most, next_most, which = order[-1], order[-2], away.argmax(0)
     without = [np.where(which == n, next_most, most) for n in range(len(away))]
-    return np.array([np.percentile(each.min(1), SHARE) for each in (*without, most)])
+    return np.array([np.percentile(each.min(1), COVERAGE_PERCENTILE) for each in (*without, most)])

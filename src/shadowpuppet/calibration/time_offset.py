@@ -18,18 +18,18 @@ from shadowpuppet.calibration.epipolar_tangency import Outline, tangent_angles
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 
-LEAST = 24
+MIN_COMMON_SETS = 24
 """Sets that two signals must have in common."""
-TRIMMED = 80
+TRIM_PERCENTILE = 80
 """Percentile of differences up to which they are averaged: a limb that is missing in one silhouette is not a difference in time."""
-TELLING = 0.6
+MAX_RESIDUAL_SHARE = 0.6
 """Two signals say something about time where no more than this of their usual difference is left at the best shift."""
-ROUNDS = 30
+SOLVER_ROUNDS = 30
 """Of the solution for all cameras, each with less weight on pairs that disagree."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lateness:
+class TimeOffsets:
     """Frames by which films are late against most of the others; plain values."""
 
     names: tuple[str, ...]
@@ -53,9 +53,9 @@ class _Pair:
     weight: float
 
 
-def lateness(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]], most: int | None = None) -> Lateness:
+def time_offsets(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]], most: int | None = None) -> TimeOffsets:
     """How late each film is, from outlines by set and camera, which follow one another; `most`: sets that are tried, to and fro."""
-    most = min(len(rows) - LEAST, len(rows) // 2) if most is None else most
+    most = min(len(rows) - MIN_COMMON_SETS, len(rows) // 2) if most is None else most
     pairs = [pair for i, j in combinations(range(len(cameras)), 2)
              if most > 0 and (pair := _compared(i, j, tangent_signals(cameras, rows, i, j), most)) is not None]
     late, known = _solved(len(cameras), pairs)
@@ -66,7 +66,7 @@ def lateness(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]]
         for n in (pair.first, pair.second):
             off[n].append(abs(late[pair.second] - late[pair.first] - pair.shift))
     spread = np.array([np.median(values) if values else np.nan for values in off])
-    return Lateness(names=tuple(camera.name for camera in cameras), frames=_plain(np.where(known, late, np.nan)), spread=_plain(spread),
+    return TimeOffsets(names=tuple(camera.name for camera in cameras), frames=_plain(np.where(known, late, np.nan)), spread=_plain(spread),
                     pairs=tuple(map(_plain, table)))
 
 
@@ -92,7 +92,7 @@ def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
     if np.isfinite(cost).sum() < 5:
         return None
     usual, k = float(np.nanmedian(cost)), int(np.nanargmin(cost))
-    if not 0 < k < len(cost) - 1 or not np.isfinite(cost[k - 1 : k + 2]).all() or cost[k] > TELLING * usual:
+    if not 0 < k < len(cost) - 1 or not np.isfinite(cost[k - 1 : k + 2]).all() or cost[k] > MAX_RESIDUAL_SHARE * usual:
         return None
     before, least, after = cost[k - 1 : k + 2]
     rise = max(before, after) - least
@@ -108,8 +108,8 @@ def _difference(signals: Array, shift: int) -> float:
     total, tangents = 0.0, 0
     for d in a - b:
         d = d[np.isfinite(d)]
-        if len(d) >= LEAST:
-            d = np.sort(np.abs(d - np.median(d)))[: max(1, len(d) * TRIMMED // 100)]
+        if len(d) >= MIN_COMMON_SETS:
+            d = np.sort(np.abs(d - np.median(d)))[: max(1, len(d) * TRIM_PERCENTILE // 100)]
             total, tangents = total + float(d.mean()), tangents + 1
     return total / tangents if tangents else np.nan
 
@@ -120,7 +120,7 @@ def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, NDArray[np.bool_
     for pair in pairs:
         known[[pair.first, pair.second]] = True
     weights = np.array([pair.weight for pair in pairs])
-    for _ in range(ROUNDS if pairs else 0):
+    for _ in range(SOLVER_ROUNDS if pairs else 0):
         A, b = np.zeros((len(pairs) + 1, count)), np.zeros(len(pairs) + 1)
         for n, (pair, weight) in enumerate(zip(pairs, np.sqrt(weights))):
             A[n, [pair.first, pair.second]], b[n] = (-weight, weight), weight * pair.shift

@@ -20,14 +20,14 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     turned; and by how many frames each film is late."""
     from shadowpuppet.cli.calibration_tables import check_table
     from shadowpuppet.cli.terminal import show, show_json, terminal
-    from shadowpuppet.pipeline.check_calibration import check_rig
+    from shadowpuppet.pipeline.check_calibration import check_calibration
     from shadowpuppet.pipeline.footage_rig import open_rig
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
     options = options_from(flags, config)
     with terminal(quiet=as_json) as shown:
-        found = check_rig(open_rig(recording, options), options, shown)
+        found = check_calibration(open_rig(recording, options), options, shown)
     if as_json:
         show_json(found)
     else:

@@ -8,9 +8,9 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from shadowpuppet.calibration.overview import SIDE, CalibrationLook, Standpoint
+from shadowpuppet.calibration.overview import MAP_COLUMNS, CalibrationLook, CameraPlacement
 from shadowpuppet.cli.tables import pairs, plain_table
-from shadowpuppet.pipeline.check_calibration import RigCheck
+from shadowpuppet.pipeline.check_calibration import CalibrationCheck
 
 ARROWS = "→↗↑↖←↙↓↘"
 """By eighths of a turn, counter-clockwise from +x."""
@@ -51,7 +51,7 @@ def _each(look: CalibrationLook) -> RenderableType:
     return table
 
 
-def _looks(camera: Standpoint) -> str:
+def _looks(camera: CameraPlacement) -> str:
     return "level" if abs(camera.down) < 0.5 else f"{abs(camera.down):.0f}° {'down' if camera.down > 0 else 'up'}"
 
 
@@ -65,9 +65,9 @@ def top_view(look: CalibrationLook) -> Text:
     rows = [["·" if not count else str(count) if count < 10 else "#" for count in row] for row in look.seen]
 
     def put(x: float, y: float, mark: str) -> None:
-        column, row = int((x - x0) / (x1 - x0) * SIDE), int((y1 - y) / (y1 - y0) * SIDE / 2)
+        column, row = int((x - x0) / (x1 - x0) * MAP_COLUMNS), int((y1 - y) / (y1 - y0) * MAP_COLUMNS / 2)
         for n, character in enumerate(mark):
-            if 0 <= row < len(rows) and 0 <= column + n < SIDE:
+            if 0 <= row < len(rows) and 0 <= column + n < MAP_COLUMNS:
                 rows[row][column + n] = character
 
     if look.middle is not None:
@@ -89,7 +89,7 @@ def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
                       else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
 
 
-def check_table(check: RigCheck) -> RenderableType:
+def check_table(check: CalibrationCheck) -> RenderableType:
     """What silhouettes say of a calibration."""
     found, late = check.agreement, check.lateness
     table = plain_table("", ("camera", "disagrees by", "with", "late by", "sure to", ""), right=(1, 3, 4))

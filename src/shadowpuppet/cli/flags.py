@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.options import PATHS, Options, make_options, over, re
 from shadowpuppet.settings import default_of, settings_of, validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
-from shadowpuppet.synthetic.spec_changes import Shorthand, expanded
+from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 from shadowpuppet.synthetic.spec_file import read_spec
 
 HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other programs", "Learning", "Other")
@@ -103,7 +103,7 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
     spec = read_spec(path) if path is not None else named[like] if like is not None else Spec()
     if seed is not None:
         spec = spec_from(spec_values(spec) | {"seed": seed}, "flags")
-    return expanded(validate(Shorthand, given(flags), "flags"), spec)
+    return apply_changes(validate(SpecChanges, given(flags), "flags"), spec)
 
 
 if TYPE_CHECKING:
@@ -127,5 +127,5 @@ else:
     """To whom motion is given."""
     PriorFlags = flags_of(PriorSettings, without=("regions",), groups={field.name: LEARNING for field, _, _ in settings_of(PriorSettings)})
     """How a motion prior is learnt."""
-    SpecFlags = flags_of(Shorthand, groups=SPEC_GROUPS)
+    SpecFlags = flags_of(SpecChanges, groups=SPEC_GROUPS)
     """What is often wanted of a made recording."""

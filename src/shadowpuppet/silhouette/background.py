@@ -98,7 +98,7 @@ def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
     Memory does not grow with the film. Right wherever the person is elsewhere for more than half of it; who stands still becomes
     background. Raises `SilhouetteError` for fewer than 3 frames.
     """
-    frames = spread(images, count)
+    frames = sample_frames(images, count)
     if len(frames) < 3:
         raise SilhouetteError(f"background: found a film of {len(frames)} frames, expected at least 3 to tell a person who moves "
                               "from the scene; give a picture or film of the empty scene")
@@ -110,7 +110,7 @@ def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
     return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
 
 
-class Spread:
+class FrameSampler:
     """Copies of `count` to twice as many of the pictures added (of all, where they are fewer), evenly spread over them."""
 
     def __init__(self, count: int) -> None:
@@ -127,9 +127,9 @@ class Spread:
         self._seen += 1
 
 
-def spread(images: Iterable[Image], count: int) -> list[Image]:
-    """The pictures that `Spread` keeps of a sequence."""
-    kept = Spread(count)
+def sample_frames(images: Iterable[Image], count: int) -> list[Image]:
+    """The pictures that `FrameSampler` keeps of a sequence."""
+    kept = FrameSampler(count)
     for image in images:
         kept.add(image)
     return kept.kept

@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask
 from shadowpuppet.errors import SilhouetteError
 
-TINY = 0.003
+MIN_AREA = 0.003
 """Share of the picture below which limbs are too few pixels wide (15 pixels high of 240)."""
-JUMP = 0.25
+AREA_JUMP = 0.25
 """Relative change of the area from one frame to the next that no motion makes: a part of the person was lost or found."""
-CONTACT = 2
+MIN_CONTACT = 2
 """Pixels on a side of the picture from which on the person touches it: one may be noise."""
 
 # From here on a warning is due. Exact silhouettes of walking, running and waving people reach at most a third of these.
-MUCH_CONTACT = 0.02
-MUCH_CHANGE = 0.05
-MANY_JUMPS = 0.02
-MUCH_FLICKER = 0.06
-MUCH_SPECK = 0.02
-MUCH_HOLE = 0.1
-MANY_HOLES = 10
+WARN_CONTACT = 0.02
+WARN_AREA_CHANGE = 0.05
+WARN_JUMPS = 0.02
+WARN_FLICKER = 0.06
+WARN_SPECK_AREA = 0.02
+WARN_HOLE_AREA = 0.1
+WARN_HOLES = 10
 
 
 @dataclass(frozen=True)
@@ -89,30 +89,30 @@ class MaskQuality:
             yield (f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
                    f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure")
         for side in ("left", "right", "top"):
-            if self.border[side] > MUCH_CONTACT:
+            if self.border[side] > WARN_CONTACT:
                 yield (f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
                        "is partly outside the picture, and what is outside is guessed; step back, or turn the camera")
-        if 0 < self.area < TINY:
+        if 0 < self.area < MIN_AREA:
             yield (f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
                    "camera with more pixels")
 
     def _unsteady(self) -> Iterator[str]:
         remedy = ("the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
-        if self.area_jumps > MANY_JUMPS:
-            yield (f"the area of the silhouette changes by over {_percent(JUMP)} at once in {_percent(self.area_jumps)} of the "
+        if self.area_jumps > WARN_JUMPS:
+            yield (f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
                    f"frames, as parts are lost and found: {remedy}")
-        elif self.area_change > MUCH_CHANGE:
+        elif self.area_change > WARN_AREA_CHANGE:
             yield f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}"
-        if self.flicker > MUCH_FLICKER:
+        if self.flicker > WARN_FLICKER:
             yield (f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
                    "a lamp's flicker, or silhouettes that are not cleaned; use more light, or the setting clean")
 
     def _unclean(self) -> Iterator[str]:
-        if self.speck_area > MUCH_SPECK:
+        if self.speck_area > WARN_SPECK_AREA:
             yield (f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
                    "noise, shadow or another person; use the setting clean, or keep others out of the picture")
-        if self.hole_area > MUCH_HOLE or self.holes > MANY_HOLES:
+        if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
             yield (f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
                    "background, or noise; try another method, or other clothes")
 
@@ -174,7 +174,7 @@ def _look(mask: Mask) -> _Look:
     holes = gaps[2:, cv2.CC_STAT_AREA]
     largest = max(int(areas[0]) if len(areas) else 0, 1)
     sides = (mask[:, 0], mask[:, -1], mask[0], mask[-1])
-    left, right, top, bottom = (int(np.count_nonzero(side)) >= CONTACT for side in sides)
+    left, right, top, bottom = (int(np.count_nonzero(side)) >= MIN_CONTACT for side in sides)
     specks = areas[1:]
     return _Look(int(areas.sum()), (left, right, top, bottom), len(specks), float(specks.sum() / largest), len(holes),
                  float(holes.sum() / largest))
@@ -192,7 +192,7 @@ def _summary(looks: list[_Look], blinks: list[int], size: int) -> MaskQuality:
         frames=len(looks),
         area=person / max(size, 1),
         area_change=_median(change),
-        area_jumps=float(np.mean(change > JUMP)) if len(change) else 0.0,
+        area_jumps=float(np.mean(change > AREA_JUMP)) if len(change) else 0.0,
         flicker=_median(np.array(blinks)) / max(person, 1),
         border=dict(zip(("left", "right", "top", "bottom"), touched.tolist())),
         specks=specks,

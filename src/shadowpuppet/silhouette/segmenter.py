@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
-from shadowpuppet.silhouette.boundary import Contrast, Mask, Outline
-from shadowpuppet.silhouette.classifiers import KEYED, PlainRule
+from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile, Labels
+from shadowpuppet.silhouette.classifiers import KEY_CHANNELS, AveragingClassifier
 from shadowpuppet.silhouette.cleanup import Window, clean
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
-EVERYTHING: Window = (slice(None), slice(None))
+WHOLE_IMAGE: Window = (slice(None), slice(None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class Segmenter:
     """What is compared: brightness, colour, both; or the method where it is averaging, mog2 or knn."""
     reason: str
     """Why, in one sentence."""
-    outline: Outline
+    outline: EdgeProfile
     """How blurred outlines are in the film."""
-    rule: Callable[[Image], Mask]
+    rule: Callable[[Image], Labels]
     """The test of pixels: picture to labels (H, W), 0 background, 1 perhaps a person, 2 a person."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
@@ -55,17 +55,17 @@ class Segmenter:
         return self.plain(image) > 0
 
     @cached_property
-    def plain(self) -> PlainRule:
+    def plain(self) -> AveragingClassifier:
         """Eq. 1 for this background, as a range of whole numbers a pixel."""
         return plain_rule(self.background, self.settings.factor)
 
-    def contrast(self, image: Image, window: Window = EVERYTHING) -> Contrast:
+    def contrast(self, image: Image, window: Window = WHOLE_IMAGE) -> Contrast:
         """Difference to the background (H, W) in the key's channels, grey levels, in a window of rows and columns."""
         from shadowpuppet.silhouette._kernels import contrast
 
         planes = to_planes(np.ascontiguousarray(image[window]))
         out = np.empty(planes.shape[:2], np.float32)
-        seen = KEYED.get("brightness" if self.key == "averaging" else self.key, KEYED["both"])
+        seen = KEY_CHANNELS.get("brightness" if self.key == "averaging" else self.key, KEY_CHANNELS["both"])
         contrast(planes, self.background.mean[window], np.array(seen, np.float32), out)
         return out
 
@@ -74,9 +74,9 @@ class Segmenter:
         check_alike(image, self.background.image_shape, "frame")
 
 
-def plain_rule(background: Background, factor: float) -> PlainRule:
+def plain_rule(background: Background, factor: float) -> AveragingClassifier:
     """Eq. 1 with a background's sigma. Raises `SilhouetteError` for a single picture."""
     if background.frames < 2:
         raise SilhouetteError("background: found a single picture, expected at least 2 frames for method averaging (eq. 1), "
                               "which needs their standard deviation; give a film of the empty scene or choose method auto")
-    return PlainRule.of(background.brightness, background.sigma, factor)
+    return AveragingClassifier.of(background.brightness, background.sigma, factor)

@@ -1,6 +1,6 @@
 """Kernels of the renderer: sphere tracing of the blended lofts (Hart 1996). Arrays and scalars only; see `person_renderer.py`.
 
-A placed part is a row of `PLACED` numbers: 0-8 its frame's columns width, depth, axis; 9-11 its start; 12-15 middle and radius of
+A placed part is a row of `PLACED_COLUMNS` numbers: 0-8 its frame's columns width, depth, axis; 9-11 its start; 12-15 middle and radius of
 a sphere about it; 16 length; 17, 18 one over its caps; 19 blend; 20 samples per length; 21 where the second material begins.
 `table` (P, samples, 4) holds one over the half widths and half depths, and the centres along the axes, `code` (P, 3) the group
 and both materials, `joints` (groups, 4) where a group melts into the trunk and how far around. `parts` lists a tile's parts:
@@ -15,13 +15,13 @@ import numpy as np
 
 from shadowpuppet.jit import compiled
 
-PLACED = 22
+PLACED_COLUMNS = 22
 FAR = 1e9
-STEP = 0.85
+STEP_SHARE = 0.85
 """Share of the distance bound that a step takes: lofts' distances are first-order estimates."""
 HIT, EDGE_HIT = 2.5e-4, 1e-3
 """A ray that comes this close to the surface (m) hits it: rays of pixel centres, and the others at edges."""
-MELT = 0.06
+JOINT_BLEND = 0.06
 """Width of the smooth union of limb and trunk at the joint, metres."""
 TILE = 8
 """Pixels along the side of the tiles that list the parts in reach of their rays."""
@@ -71,7 +71,7 @@ def _join(total, limb, x, y, z, group, joints):
     if total >= FAR:
         return limb
     dx, dy, dz = x - joints[group, 0], y - joints[group, 1], z - joints[group, 2]
-    k = MELT * (1.0 - np.sqrt(dx * dx + dy * dy + dz * dz) / joints[group, 3])
+    k = JOINT_BLEND * (1.0 - np.sqrt(dx * dx + dy * dy + dz * dz) / joints[group, 3])
     return blend(total, limb, k) if k > 1e-4 else min(total, limb)
 
 
@@ -88,7 +88,7 @@ def distance(x, y, z, parts, placed, table, code, joints):
             group, limb = code[p, 0], FAR
         k = placed[p, 19]
         dx, dy, dz = x - placed[p, 12], y - placed[p, 13], z - placed[p, 14]
-        far = min(limb + k, total + MELT) + placed[p, 15]  # beyond it the part changes nothing
+        far = min(limb + k, total + JOINT_BLEND) + placed[p, 15]  # beyond it the part changes nothing
         if dx * dx + dy * dy + dz * dz > far * far:
             continue
         d = part_distance(x, y, z, p, placed, table)
@@ -133,7 +133,7 @@ def march(eye, rx, ry, rz, start, stop, hit, parts, placed, table, code, joints)
         d, near = distance(eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz, parts, placed, table, code, joints)
         if d < hit:
             return t, near
-        t += max(STEP * d, 2.0 * hit)
+        t += max(STEP_SHARE * d, 2.0 * hit)
         if t > stop:
             break
     return FAR, -1

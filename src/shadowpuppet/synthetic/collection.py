@@ -9,20 +9,20 @@ import numpy as np
 
 from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
 from shadowpuppet.synthetic.spec import Scene, Spec
-from shadowpuppet.synthetic.spec_changes import gestures_from
+from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 
 
 def demo_spec() -> Spec:
     """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
-    gestures = gestures_from("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
+    gestures = parse_gestures("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
     return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=7, room=2))
 
 
 def demo_ring_spec() -> Spec:
     """The recording of several cameras of `shadowpuppet demo`: somebody walks and turns before four small cameras, 5.6 s."""
     ring = Ring(count=4, radius=3.8, start_deg=35, jitter=0.5, fov_deg=42, seed=5)
-    scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), gestures_from("walk 2, turn_around 2")
+    scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), parse_gestures("walk 2, turn_around 2")
     return Spec(name="demo_ring", body=Mannequin(stature=1.70, build=0.2), motion=gestures, ring=ring, scene=scene, rate=20)
 
 
@@ -68,7 +68,7 @@ def _proof(
     return Spec(
         name=name,
         body=body,
-        motion=gestures_from(gestures),
+        motion=parse_gestures(gestures),
         cameras=(view,),
         scene=Scene(clothing=n, room=n, noise=noise),
         turn_deg=turn,
@@ -97,7 +97,7 @@ def around() -> tuple[Spec, ...]:
         body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
         ring = Ring(count=7, radius=radius, jitter=0.5, seed=n, size=(640, 480), distortion=(-0.09, 0.05, 0.0, 0.0))
         scene = Scene(clothing=30 + n, room=30 + n)
-        specs.append(Spec(name=name, body=body, motion=gestures_from(gestures), ring=ring, scene=scene, rate=60, seed=(1, n)))
+        specs.append(Spec(name=name, body=body, motion=parse_gestures(gestures), ring=ring, scene=scene, rate=60, seed=(1, n)))
     return tuple(specs)
 
 
@@ -126,7 +126,7 @@ def _humaneva(n: int, name: str, kind: Kind, seed: int, gestures: str, begin: fl
               fov: float, look: tuple[int, int]) -> Spec:  # fmt: skip
     body, scene = Mannequin.draw(np.random.default_rng(seed), kind), Scene(clothing=look[0], room=look[1])
     ring = Ring(count=7, radius=radius, fov_deg=fov, jitter=0.5, seed=10 + n, size=VGA, distortion=PLAIN_LENS)
-    return Spec(name=name, body=body, motion=gestures_from(gestures), begin=begin, frames=frames, training_frames=TRAINING_FRAMES,
+    return Spec(name=name, body=body, motion=parse_gestures(gestures), begin=begin, frames=frames, training_frames=TRAINING_FRAMES,
                 ring=ring, scene=scene, rate=60, tells="height", seed=(3, n))
 
 
@@ -169,8 +169,8 @@ def proving_rings() -> tuple[Spec, ...]:
     none. They are fixed; the n-th is made with its own seed, (2, n).
     """
     return tuple(
-        Spec(name=name, body=body, motion=gestures_from(gestures), ring=replace(ring, seed=n),
-             training=None if training is None else gestures_from(training) if training else (),
+        Spec(name=name, body=body, motion=parse_gestures(gestures), ring=replace(ring, seed=n),
+             training=None if training is None else parse_gestures(training) if training else (),
              scene=Scene(**{"clothing": 60 + n, "room": 60 + n, "empty_seconds": 2.0, **scene}), rate=rate, seed=(2, n))
         for n, (name, body, gestures, training, ring, scene, rate) in enumerate(_rings(), 1)
     )  # fmt: skip

@@ -40,19 +40,19 @@ class Layer(NamedTuple):
         return self.picture + (1 - self.alpha)[..., None] * below
 
 
-def pictured(room: Array, people: Sequence[Layer], things: Sequence[Layer]) -> Array:
-    """People among things over the room's picture (H, W, 3): `composed`, but people are sorted in only where they are."""
-    picture = composed(room, things)
+def composite_people(room: Array, people: Sequence[Layer], things: Sequence[Layer]) -> Array:
+    """People among things over the room's picture (H, W, 3): `composite`, but people are sorted in only where they are."""
+    picture = composite(room, things)
     covered = np.any([layer.alpha > 0 for layer in people], axis=0)
     rows, columns = (np.flatnonzero(covered.any(axis)) for axis in (1, 0))
     if len(rows):
         box = slice(max(rows[0] - 1, 0), rows[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
         picture = picture.copy()
-        picture[box] = composed(room[box], [layer.part(box) for layer in (*people, *things)])
+        picture[box] = composite(room[box], [layer.part(box) for layer in (*people, *things)])
     return picture
 
 
-def composed(room: Array, layers: Sequence[Layer]) -> Array:
+def composite(room: Array, layers: Sequence[Layer]) -> Array:
     """Layers over the room's picture (H, W, 3), at each pixel the farthest first."""
     if len(layers) < 2:
         return layers[0].over(room) if layers else room
@@ -70,7 +70,7 @@ def composed(room: Array, layers: Sequence[Layer]) -> Array:
     return picture
 
 
-def in_front(layer: Layer, others: Sequence[Layer]) -> np.ndarray:
+def visible(layer: Layer, others: Sequence[Layer]) -> np.ndarray:
     """Where (H, W) a layer is nearer than all others, at pixel centres."""
     shown = layer.depth < FAR
     for other in others:

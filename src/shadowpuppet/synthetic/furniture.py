@@ -13,8 +13,8 @@ from pydantic.dataclasses import dataclass
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.compositing import FAR, Layer
 
-Place = Annotated[float, Field(ge=-10, le=10)]
-NEAREST = 0.25
+Coordinate = Annotated[float, Field(ge=-10, le=10)]
+MIN_DISTANCE = 0.25
 """Metres that a thing keeps from the person's place."""
 
 
@@ -24,9 +24,9 @@ class Obstacle:
 
     kind: Literal["table", "chair", "pillar", "cabinet"]
     """What it is: a table 74 cm high, a chair with its back 92 cm high, a round pillar, a cabinet 1.05 m high."""
-    ahead: Place = 0.8
+    ahead: Coordinate = 0.8
     """How far before the person, metres; negative behind them."""
-    left: Place = 0.0
+    left: Coordinate = 0.0
     """How far to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """How far it is turned to the left about the vertical, degrees; 0 shows its front to where the person looks."""
@@ -35,8 +35,9 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         """It must not stand where the person does."""
-        if np.hypot(self.ahead, self.left) < NEAREST:
-            raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; expected {NEAREST} m of distance")
+        if np.hypot(self.ahead, self.left) < MIN_DISTANCE:
+            raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; "
+                             f"expected {MIN_DISTANCE} m of distance")
 
 
 class Block(NamedTuple):

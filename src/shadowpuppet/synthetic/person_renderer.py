@@ -13,7 +13,7 @@ from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import GROUPS, MATERIALS, Surface
 
-OFFSETS = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
+EDGE_SAMPLES = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
 """Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
 
 
@@ -30,7 +30,7 @@ class Shot(NamedTuple):
     """Distance along the rays of pixel centres, of shape (H, W), metres; `compositing.FAR` where the person is missed."""
 
 
-class Renderer:
+class PersonRenderer:
     """Draws one person with one camera: rays and tiles are prepared once."""
 
     def __init__(self, camera: Camera, surface: Surface, clothes: Clothes, lights: Array) -> None:
@@ -77,7 +77,7 @@ class Renderer:
         depth, near = np.empty((height, width)), np.empty((height, width), np.int64)
         _ray_marching.find_surface(*traced, depth, near)
         alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
-        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
+        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, EDGE_SAMPLES, picture, alpha)
         return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha, depth)
 
     def _joins(self, figure: Figure, index: int) -> Array:

@@ -16,11 +16,11 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
-from shadowpuppet.synthetic.scene_renderer import Studio, body_of
+from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
 
-Tell = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 
 REFERENCES = {
     "front_t_pose": LEVEL,
@@ -30,7 +30,7 @@ REFERENCES = {
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
 
 
-def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Tell | None = None) -> Path:
+def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Progress | None = None) -> Path:
     """Write the recording that `spec` describes into `folder`, made where missing, and return its path.
 
     rng: where none is given, one of the spec's seed. tell: called after each picture with how many are done and how many there
@@ -50,7 +50,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     _write_given(folder, spec, cameras, times, figure, for_training)
     hidden = 0
     for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
-        studio = Studio(spec, camera, noise, others, _wall(figure, others))
+        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others))
         hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         hidden += hides
         if not seen:
@@ -67,21 +67,21 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
 
     Raises `SettingsError` where the motion is over before the film is.
     """
-    from shadowpuppet.synthetic.movement.sequence import perform, seconds_of
+    from shadowpuppet.synthetic.movement.sequence import animate, sequence_seconds
 
-    there = int((seconds_of(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
+    there = int((sequence_seconds(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
     if there < max(spec.frames or 1, 1):
         raise SettingsError(f"frames: found {spec.frames or 1} pictures at {spec.rate:g} a second after {spec.begin:g} s, expected at most "
                             f"{max(there, 0)}: then the motion is over")
     times = np.arange(spec.frames or there) / spec.rate
-    return times, perform(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
+    return times, animate(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
     """A bystander in `count` pictures, where they stand."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
-    always = replace(spec, body=body_of(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
+    always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
     _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
@@ -95,11 +95,11 @@ def _wall(figure: Figure, others: list[Figure]) -> float:
     return max(behind if others or behind > 1.15 else -0.4, aside if aside > 5.6 else -0.4) + 0.4
 
 
-def _part(tell: Tell | None, before: int, total: int) -> Callable[[int], None]:
+def _part(tell: Progress | None, before: int, total: int) -> Callable[[int], None]:
     return lambda done: tell(before + done, total) if tell is not None else None
 
 
-def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Callable[[int], None]) -> tuple[int, int]:
+def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell: Callable[[int], None]) -> tuple[int, int]:
     """Write a camera's films, and tell after each picture how many there are; returns how many pixels of the person are hidden and seen.
 
     After Ctrl-C the films end with the last picture that was made, and have their own names: they can be used.
@@ -170,7 +170,7 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
     _write(trc, [*head, *lines])
 
 
-def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
+def _write_references(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
     """Reference pictures with masks and joints; none where a thing hides part of them: sizes are fitted to whole silhouettes."""
     from shadowpuppet.video import write_image
 

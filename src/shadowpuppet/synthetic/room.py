@@ -33,7 +33,7 @@ SHADOW_PARTS = (
 )
 """What casts the shadow: round sticks between joints, and their radius (m)."""
 
-COARSE = 4
+SHADOW_CELL = 4
 """Pixels along a cell of the grid on which shadows are computed; they are soft."""
 
 
@@ -46,7 +46,7 @@ class Room:
         rng: np.random.Generator,
         shadow: float,
         least: float = 0.0,
-        background: walls.Background = "room",
+        background: walls.WallStyle = "room",
         furniture: Furniture | None = None,
     ) -> None:
         """shadow: how dark shadows are, 0 to 1; least: the wall is at least so far behind the person, metres."""
@@ -63,8 +63,8 @@ class Room:
         across = np.cross(self.lights[0, :3], [0.0, 0.0, 1.0])
         across /= np.linalg.norm(across)
         self._from_lamp = np.stack([across, np.cross(self.lights[0, :3], across), self.lights[0, :3]], 1)
-        coarse = np.stack(np.meshgrid(*(np.arange(-(-n // COARSE)) for n in camera.size)), -1)
-        self._seen = self._points(COARSE * coarse + (COARSE - 1) / 2)[0] @ self._from_lamp
+        coarse = np.stack(np.meshgrid(*(np.arange(-(-n // SHADOW_CELL)) for n in camera.size)), -1)
+        self._seen = self._points(SHADOW_CELL * coarse + (SHADOW_CELL - 1) / 2)[0] @ self._from_lamp
 
     def _points(self, pixels: ArrayLike) -> tuple[Array, Array]:
         """Where the rays of pixels (..., 2) meet floor or wall, (..., 3), and the place along the walls, (...), metres."""
@@ -79,13 +79,13 @@ class Room:
         along = np.where(met < 2, points[..., 1], points[..., 0]) + np.array([start for *_, start in ends])[met]
         return points, along
 
-    def _paint(self, rng: np.random.Generator, background: walls.Background, furniture: Furniture | None) -> Array:
+    def _paint(self, rng: np.random.Generator, background: walls.WallStyle, furniture: Furniture | None) -> Array:
         """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of four rays."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         points, along = self._points(grid)
-        wall = walls.wall(background, along, points[..., 2], rng)
-        floor = walls.floor(background, points[..., 0], points[..., 1], rng)
+        wall = walls.paint_wall(background, along, points[..., 2], rng)
+        floor = walls.paint_floor(background, points[..., 0], points[..., 1], rng)
         picture = np.where(points[..., 2:] < 1e-9, floor, wall)
         picture *= 0.78 + 0.22 * np.exp(-((points[..., :1] - 0.5) ** 2 + (points[..., 2:] - 1.8) ** 2) / 6)
         if furniture:
@@ -105,7 +105,7 @@ class Room:
         width, height = self.camera.size
         return (
             self.picture
-            * cv2.resize(light, (COARSE * light.shape[1], COARSE * light.shape[0]), interpolation=cv2.INTER_LINEAR)[
+            * cv2.resize(light, (SHADOW_CELL * light.shape[1], SHADOW_CELL * light.shape[0]), interpolation=cv2.INTER_LINEAR)[
                 :height, :width, None
             ]
         )
@@ -128,7 +128,7 @@ class Room:
         return 1 - clear
 
 
-def brightness(scene: Scene, seconds: float, length: float) -> float:
+def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
     """How bright the lamps are, 1 as they are meant, `seconds` after the film's first picture; before it in the empty scene.
 
     length: of the film, seconds, over which `scene.drift` builds up, slow at both ends.
@@ -138,7 +138,7 @@ def brightness(scene: Scene, seconds: float, length: float) -> float:
     return float((1 + drift) * (1 + scene.flicker * np.sin(2 * np.pi * scene.flicker_hz * seconds)))
 
 
-def exposed(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
+def expose(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
     """What the sensor makes of light (H, W, 3), 0 to 1: slight blur of the lens, display gamma, noise; RGB uint8.
 
     noise: standard deviation in grey levels at middle grey; it grows with brightness as photon noise does.

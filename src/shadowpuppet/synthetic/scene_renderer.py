@@ -12,21 +12,18 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.compositing import Layer, composed, in_front, pictured
+from shadowpuppet.synthetic.compositing import Layer, composite, composite_people, visible
 from shadowpuppet.synthetic.furniture import Furniture
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person_renderer import Renderer
-from shadowpuppet.synthetic.room import Room, brightness, exposed
+from shadowpuppet.synthetic.person_renderer import PersonRenderer
+from shadowpuppet.synthetic.room import Room, expose, lamp_brightness
 from shadowpuppet.synthetic.spec import Bystander, Spec
 
-CLEAR = 0.4
-"""Metres that the wall keeps from the joints of whoever comes nearest."""
 
-
-class Picture(NamedTuple):
+class RenderedFrame(NamedTuple):
     """A picture with what is exactly known of it."""
 
     image: np.ndarray
@@ -39,7 +36,7 @@ class Picture(NamedTuple):
     """How many pixels of the person obstacles and other people hide."""
 
 
-class Studio:
+class SceneRenderer:
     """One camera with the person, their clothes and the room; others, and things, where the spec has them."""
 
     def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator, others: Sequence[Figure] = (), least: float = 0.0) -> None:
@@ -55,7 +52,7 @@ class Studio:
         clothes = Clothes.draw(np.random.default_rng(scene.clothing))
         if scene.camouflage:
             clothes = _camouflaged(clothes, self.room.wall_colour, scene.camouflage)
-        self.renderer = Renderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
+        self.renderer = PersonRenderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
         self.spec, self.rng = spec, rng
         self.others = [(figure, self._of(bystander, camera)) for figure, bystander in zip(others, scene.bystanders, strict=True)]
         self.things = []
@@ -64,13 +61,13 @@ class Studio:
             self.things = [furniture.layer(camera.centre, self.renderer.rays, fine, self.room.lights)]
         self._length = 0.0
 
-    def _of(self, bystander: Bystander, camera: Camera) -> Renderer:
+    def _of(self, bystander: Bystander, camera: Camera) -> PersonRenderer:
         clothes = Clothes.draw(np.random.default_rng([bystander.seed, 1]))
-        return Renderer(camera, dressed(body_of(bystander), clothes), clothes, self.room.lights)
+        return PersonRenderer(camera, dressed(bystander_body(bystander), clothes), clothes, self.room.lights)
 
     def empty(self, index: int = 0, count: int = 1) -> np.ndarray:
         """Picture `index` of `count` without anybody, (H, W, 3) BGR, before the film begins."""
-        return self._exposed(composed(self.room.picture, self.things), (index - count) / self.spec.rate)
+        return self._exposed(composite(self.room.picture, self.things), (index - count) / self.spec.rate)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
         """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255; nobody else is there."""
@@ -81,7 +78,7 @@ class Studio:
         """Whether things hide anything of the figure in its first posture."""
         return bool(self.things) and self._lit(figure, 0)[3] > 0
 
-    def film(self, figure: Figure, workers: int | None = None) -> Iterator[Picture]:
+    def film(self, figure: Figure, workers: int | None = None) -> Iterator[RenderedFrame]:
         """Pictures of all postures, one after another; `workers` threads draw ahead (2 to 8 by the processor), noise is drawn in order."""
         from concurrent.futures import ThreadPoolExecutor
 
@@ -94,7 +91,7 @@ class Studio:
                 light, mask, people, hidden = ahead.popleft().result()
                 if index + 2 * workers < count:
                     ahead.append(pool.submit(self._lit, figure, index + 2 * workers, True))
-                yield Picture(self._exposed(light, index / self.spec.rate), mask, people, hidden)
+                yield RenderedFrame(self._exposed(light, index / self.spec.rate), mask, people, hidden)
 
     def _lit(self, figure: Figure, index: int, company: bool = False) -> tuple[Array, np.ndarray, np.ndarray, int]:
         """Light, mask, everybody's mask and how much is hidden; `company`: with the bystanders."""
@@ -107,18 +104,19 @@ class Studio:
         drawn = [renderer.draw(other, index) for other, renderer in others]
         company_layers = [Layer(other.picture, other.alpha, other.depth) for other in drawn]
         rest = [*company_layers, *self.things]
-        seen = in_front(person, rest)
+        seen = visible(person, rest)
         people = seen.copy()
         for n, layer in enumerate(company_layers):
-            people |= in_front(layer, [person, *rest[:n], *rest[n + 1 :]])
-        return pictured(room, [person, *company_layers], self.things), _mask(seen), _mask(people), int(((shot.mask > 0) & ~seen).sum())
+            people |= visible(layer, [person, *rest[:n], *rest[n + 1 :]])
+        hidden = int(((shot.mask > 0) & ~seen).sum())
+        return composite_people(room, [person, *company_layers], self.things), _mask(seen), _mask(people), hidden
 
     def _exposed(self, light: Array, seconds: float) -> np.ndarray:
         scene = self.spec.scene
-        return exposed(light, scene.noise, self.rng, brightness(scene, seconds, self._length))[..., ::-1]
+        return expose(light, scene.noise, self.rng, lamp_brightness(scene, seconds, self._length))[..., ::-1]
 
 
-def body_of(bystander: Bystander) -> Mannequin:
+def bystander_body(bystander: Bystander) -> Mannequin:
     """The body that a bystander's seed draws."""
     kind = None if bystander.kind == "random" else bystander.kind
     return Mannequin.draw(np.random.default_rng([bystander.seed, 0]), kind)

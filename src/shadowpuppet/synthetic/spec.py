@@ -11,11 +11,11 @@ from pydantic import Field, PlainValidator, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.synthetic.furniture import Furniture, Obstacle, Place
+from shadowpuppet.synthetic.furniture import Coordinate, Furniture, Obstacle
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.viewpoint import STRICT, Name, Ring, Viewpoint
-from shadowpuppet.synthetic.walls import Background
+from shadowpuppet.synthetic.walls import WallStyle
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -28,9 +28,9 @@ class Bystander:
     """Seed of body and clothes."""
     motion: Gesture = Gesture(motion="stand")
     """What they do, as long as the film is."""
-    ahead: Place = -1.0
+    ahead: Coordinate = -1.0
     """How far before the person they stand, metres; negative behind."""
-    left: Place = 0.9
+    left: Coordinate = 0.9
     """How far to the person's left they stand, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """How far they are turned to their left, degrees; 0 looks where the person looks."""
@@ -55,7 +55,7 @@ class Scene:
     """Sensor noise: standard deviation in grey levels at middle grey."""
     empty_seconds: Annotated[float, Field(ge=0.2, le=60)] = 4.0
     """Length of the film of the empty scene."""
-    background: Background = "room"
+    background: WallStyle = "room"
     """What is behind: a room with some posters, a plain wall and floor, a wall cluttered with shelves, or textured bricks and planks."""
     camouflage: Annotated[float, Field(ge=0, le=1)] = 0.0
     """How near the colour of shirt and trousers is to the wall's: 0 as drawn, 1 the same."""

@@ -15,16 +15,16 @@ from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.viewpoint import STRICT
-from shadowpuppet.synthetic.walls import Background
+from shadowpuppet.synthetic.walls import WallStyle
 
-OBSTACLES: dict[str, dict[str, float]] = {
+OCCLUDERS: dict[str, dict[str, float]] = {
     "table": {"ahead": 0.75},
     "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
     "pillar": {"ahead": 0.9, "left": 0.2},
     "cabinet": {"ahead": 0.7, "left": 0.35},
 }
 """Where `occluder` puts things."""
-COMPANY: dict[str, dict[str, Any]] = {
+SECOND_PERSONS: dict[str, dict[str, Any]] = {
     "behind": {"ahead": -1.0, "left": -0.6},
     "aside": {"ahead": 0.0, "left": 1.0},
     "passing": {"ahead": -1.3, "left": 0.0, "turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 3.0}},
@@ -33,7 +33,7 @@ COMPANY: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
-class Shorthand:
+class SpecChanges:
     """What is often wanted of a made recording; None leaves the spec as it is."""
 
     motion: str | None = None
@@ -61,7 +61,7 @@ class Shorthand:
     """Width and height of the pictures, such as 640x480."""
     rate: float | None = None
     """Pictures a second."""
-    background: Background | None = None
+    background: WallStyle | None = None
     """What is behind: room, plain, cluttered or textured."""
     room: int | None = None
     """Seed of wall, floor and lamps."""
@@ -85,17 +85,17 @@ class Shorthand:
     """Somebody else: standing behind or aside, or passing to and fro behind."""
 
 
-PLAIN = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
+SCENE_CHANGES = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
 """Words that are settings of the scene."""
-LENSES = {"fov": "fov_deg", "camera_height": "height", "fisheye": "fisheye"}
+CAMERA_CHANGES = {"fov": "fov_deg", "camera_height": "height", "fisheye": "fisheye"}
 """Words that are settings of every camera."""
 
 
-def expanded(words: Shorthand, spec: Spec, source: str = "flags") -> Spec:
+def apply_changes(words: SpecChanges, spec: Spec, source: str = "flags") -> Spec:
     """A spec with what the words say in place of its own. Raises `SettingsError`: one sentence on what cannot be."""
-    said = {field.name: value for field in fields(Shorthand) if (value := getattr(words, field.name)) is not None}
+    said = {field.name: value for field in fields(SpecChanges) if (value := getattr(words, field.name)) is not None}
     values = spec_values(spec)
-    values["scene"] |= {name: said[name] for name in PLAIN if name in said}
+    values["scene"] |= {name: said[name] for name in SCENE_CHANGES if name in said}
     values |= {name: said[name] for name in ("rate",) if name in said}
     if {"motion", "seconds"} & set(said):
         values["motion"] = _motion(said.get("motion"), said.get("seconds"), spec, source)
@@ -107,13 +107,13 @@ def expanded(words: Shorthand, spec: Spec, source: str = "flags") -> Spec:
         values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))
     _place_cameras(values, said, source)
     if "occluder" in said:
-        values["scene"]["obstacles"] = [{"kind": said["occluder"], **OBSTACLES[said["occluder"]]}]
+        values["scene"]["obstacles"] = [{"kind": said["occluder"], **OCCLUDERS[said["occluder"]]}]
     if "second_person" in said:
-        values["scene"]["bystanders"] = [COMPANY[said["second_person"]]]
+        values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
     return spec_from(values, source)
 
 
-def gestures_from(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:
+def parse_gestures(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:
     """Gestures from `name seconds, name seconds`; those without seconds share what is left of `seconds`, or take 4 each."""
     items = [item.split() for item in text.split(",")]
     for item in items:
@@ -137,7 +137,7 @@ def _named(motion: str) -> dict[str, Any]:
 def _motion(text: str | None, seconds: float | None, spec: Spec, source: str) -> list[dict[str, Any]]:
     """Plain gestures: those of the text, or the spec's own at other lengths."""
     if text is not None:
-        return [asdict(gesture) for gesture in gestures_from(text, seconds, f"{source}: motion")]
+        return [asdict(gesture) for gesture in parse_gestures(text, seconds, f"{source}: motion")]
     assert seconds is not None
     scale = seconds / sum(gesture.seconds for gesture in spec.motion)
     return [asdict(gesture) | {"seconds": gesture.seconds * scale} for gesture in spec.motion]
@@ -164,7 +164,7 @@ def _place_cameras(values: dict[str, Any], said: dict[str, Any], source: str) ->
     if "ring" in values:
         values.pop("cameras", None)
     for camera in [values["ring"]] if "ring" in values else values["cameras"]:
-        camera |= {key: said[word] for word, key in LENSES.items() if word in said}
+        camera |= {key: said[word] for word, key in CAMERA_CHANGES.items() if word in said}
         camera |= {"distance": said["distance"]} if "distance" in said else {}
         camera |= {"size": _size(said["size"], source)} if "size" in said else {}
 

@@ -14,8 +14,8 @@ from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 
 SPEC_FILE = "spec.toml"
 """What a made recording was made of; it is there from the beginning."""
-HEAD = "# What this recording was made of; the same again: shadowpuppet synthesize spec.toml -o FOLDER\n"
-UNSEEDED = "# The generator that was given had no seed that could be kept: the seed below gives other chance.\n"
+SPEC_HEADER = "# What this recording was made of; the same again: shadowpuppet synthesize spec.toml -o FOLDER\n"
+UNSEEDED_HEADER = "# The generator that was given had no seed that could be kept: the seed below gives other chance.\n"
 
 
 def read_spec(path: str | Path) -> Spec:
@@ -59,7 +59,7 @@ def write_spec(path: Path, spec: Spec, seed: int | tuple[int, ...] | None) -> No
     for gesture in _gestures(values):
         if "file" in gesture:
             gesture["file"] = str(Path(gesture["file"]).resolve())
-    write_whole(path, HEAD + ("" if seed is not None else UNSEEDED) + _text(values))
+    write_whole(path, SPEC_HEADER + ("" if seed is not None else UNSEEDED_HEADER) + _text(values))
 
 
 def seed_of(rng: np.random.Generator) -> int | tuple[int, ...] | None:

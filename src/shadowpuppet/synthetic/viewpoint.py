@@ -18,15 +18,15 @@ Angle = Annotated[float, Field(ge=-180, le=180)]
 FovDeg = Annotated[float, Field(ge=10, le=170)]
 Height = Annotated[float, Field(ge=0.05, le=6)]
 Distance = Annotated[float, Field(ge=0.8, le=20)]
-WIDEST = 120.0
+MAX_PINHOLE_FOV = 120.0
 """Widest horizontal field of view of a lens that is no fisheye, degrees."""
-SLACK = 8
+BORDER_SLACK = 8
 """Pixels beyond the border of a picture, unless it is a fisheye's, that the renderer's tiles may look at."""
-MIDDLE = 0.52
+BODY_CENTRE = 0.52
 """Height of a person's middle, fraction of the stature."""
-JITTER = {"azimuth_deg": 7.0, "height": 0.25, "yaw_deg": 3.0, "pitch_deg": 3.0, "roll_deg": 4.0}
-"""How far a ring's cameras stray at most, with a jitter of 1; distance and focal length by `STRAY` of themselves."""
-STRAY = 0.07
+RING_JITTER = {"azimuth_deg": 7.0, "height": 0.25, "yaw_deg": 3.0, "pitch_deg": 3.0, "roll_deg": 4.0}
+"""How far a ring's cameras stray at most, with a jitter of 1; distance and focal length by `RING_SCALE_JITTER` of themselves."""
+RING_SCALE_JITTER = 0.07
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -64,8 +64,8 @@ class Viewpoint:
             raise ValueError(f"distortion: found {len(self.distortion)} numbers, expected {expected}")
         if not np.isfinite(self.distortion).all():
             raise ValueError(f"distortion: found {list(self.distortion)}, expected finite numbers")
-        if self.fov_deg > WIDEST and not self.fisheye:
-            raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {WIDEST:g}, or fisheye = true")
+        if self.fov_deg > MAX_PINHOLE_FOV and not self.fisheye:
+            raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {MAX_PINHOLE_FOV:g}, or fisheye = true")
         corner = self.fov_deg / 2 * np.hypot(*self.size) / self.size[0]
         if self.fisheye and corner > 88:
             most = np.floor(self.fov_deg * 88 / corner)
@@ -123,11 +123,11 @@ class Ring:
         """The cameras around a person of a `stature` (m), in turn."""
         rng, views = np.random.default_rng(self.seed), []
         for n in range(self.count):
-            off = {name: self.jitter * most * rng.uniform(-1, 1) for name, most in JITTER.items()}
-            distance = float(np.clip(self.radius * (1 + self.jitter * STRAY * rng.uniform(-1, 1)), 0.8, 20))
-            fov = float(np.clip(self.fov_deg * (1 + self.jitter * STRAY * rng.uniform(-1, 0)), 10, 170))
+            off = {name: self.jitter * most * rng.uniform(-1, 1) for name, most in RING_JITTER.items()}
+            distance = float(np.clip(self.radius * (1 + self.jitter * RING_SCALE_JITTER * rng.uniform(-1, 1)), 0.8, 20))
+            fov = float(np.clip(self.fov_deg * (1 + self.jitter * RING_SCALE_JITTER * rng.uniform(-1, 0)), 10, 170))
             height = float(np.clip(self.height + off["height"], 0.05, 6))
-            down = np.degrees(np.arctan2(height - MIDDLE * stature, distance)) + off["pitch_deg"]
+            down = np.degrees(np.arctan2(height - BODY_CENTRE * stature, distance)) + off["pitch_deg"]
             azimuth = (self.start_deg + 360 * n / self.count + off["azimuth_deg"] + 180) % 360 - 180
             views.append(Viewpoint(name=f"cam{n + 1}", size=self.size, fov_deg=fov, height=height, distance=distance,
                                    azimuth_deg=float(azimuth), pitch_deg=float(np.clip(down, -60, 60)), yaw_deg=off["yaw_deg"],
@@ -137,7 +137,7 @@ class Ring:
 
 def _sees_everywhere(camera: Camera) -> bool:
     """Whether every pixel's ray leads back to the pixel: distortion beyond what its polynomial can do folds the picture."""
-    (width, height), slack = camera.size, 0.5 if camera.fisheye else SLACK
+    (width, height), slack = camera.size, 0.5 if camera.fisheye else BORDER_SLACK
     pixels = np.stack(np.meshgrid(np.linspace(-slack, width - 1 + slack, 17), np.linspace(-slack, height - 1 + slack, 17)), -1)
     rays = camera.rays(pixels)
     if not np.isfinite(rays).all() or np.abs(rays).max() > 60:

@@ -27,7 +27,7 @@ def ring_spec(size: tuple[int, int] = (640, 480), cameras: int = 7) -> Spec:
 def ring_recording(folder: Path, frames: int, spec: Spec | None = None, drawn: int = 12) -> Path:
     """A recording of so many frames in `folder`, of which `drawn` are different, with training motion; no masks, no truth."""
     from shadowpuppet.synthetic.recording import perform, write_truth
-    from shadowpuppet.synthetic.scene_renderer import Studio
+    from shadowpuppet.synthetic.scene_renderer import SceneRenderer
 
     spec = spec or ring_spec()
     for kind in ("video", "background"):
@@ -36,7 +36,7 @@ def ring_recording(folder: Path, frames: int, spec: Spec | None = None, drawn: i
     _, figure = perform(spec, for_motion)
     shown = figure._replace(**{name: part[STEP : STEP + drawn] for name, part in figure._asdict().items()})
     for view, noise in zip(spec.views(), noises):
-        studio = Studio(spec, view.camera(), noise)
+        studio = SceneRenderer(spec, view.camera(), noise)
         empty = [studio.empty(index, 6) for index in range(6)]
         _write(folder / "background" / f"{view.name}.mp4", empty, len(empty), spec.rate)
         _write(folder / "video" / f"{view.name}.mp4", [picture.image for picture in studio.film(shown)], frames, spec.rate)

@@ -11,25 +11,25 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, JOGGING, WALKING, Cycle, smooth, stride_of
+from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, JOGGING, WALKING, GaitCycle, smoothstep, stride_length
 from shadowpuppet.synthetic.movement.gestures import STANDING, band_noise
 from shadowpuppet.synthetic.movement.paths import Path, PathName
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, turns
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
-TICK = 0.002
+CLOCK_STEP = 0.002
 """Seconds between the times at which speed and cadence are summed up."""
-WIDTH = {False: 0.055, True: 0.03}
+TRACK_HALF_WIDTH = {False: 0.055, True: 0.03}
 """Half the distance of the feet's tracks in leg lengths, walking and jogging."""
-LEAN = np.radians(13)
+MAX_LEAN = np.radians(13)
 """Most that a person leans into a turn, rad; small leans are those at which weight and centrifugal force agree."""
-SPEED = {False: 1.35, True: 2.6}
+COMFORTABLE_SPEED = {False: 1.35, True: 2.6}
 """Comfortable speeds of an adult, m/s; others at equal Froude number."""
-RISES, SETTLES = 0.3, 0.22
+HEEL_RISE_PHASE, FLAT_PHASE = 0.3, 0.22
 """Phases of the leg at which the heel begins to rise, and at which the foot lies flat again."""
 
 
-class Prints(NamedTuple):
+class Footprints(NamedTuple):
     """Where one foot stands, one after another; the first is at stride `first` of its leg."""
 
     first: int
@@ -57,9 +57,9 @@ class Walk:
         """speed: m/s, or None for a comfortable one; path, size: see `Path`."""
         hip = body.rest()["pelvis"][2]
         if speed is None:
-            speed = float(SPEED[jogging] * np.sqrt(hip / 0.93) * np.clip(1 + 0.04 * rng.standard_normal(), 0.9, 1.1))
+            speed = float(COMFORTABLE_SPEED[jogging] * np.sqrt(hip / 0.93) * np.clip(1 + 0.04 * rng.standard_normal(), 0.9, 1.1))
         self.body, self.jogging, self.speed, self.seconds = body, jogging, speed, seconds
-        self.cycle = Cycle(body, JOGGING if jogging else WALKING, speed, stride_of(speed, hip, jogging))
+        self.cycle = GaitCycle(body, JOGGING if jogging else WALKING, speed, stride_length(speed, hip, jogging))
         self.path = Path(path, size, speed * seconds * 1.15)
         self.arms = rng.uniform(0.85, 1.2)
         self._clock(rng)
@@ -69,37 +69,37 @@ class Walk:
         """Phase of the left leg, length gone, how fully the person goes (0 to 1), and how far they lean inward, at every tick."""
         from scipy.ndimage import gaussian_filter1d
 
-        self.ticks = np.arange(-1.0, self.seconds + 1.0 + TICK, TICK)
+        self.ticks = np.arange(-1.0, self.seconds + 1.0 + CLOCK_STEP, CLOCK_STEP)
         period = self.cycle.stride / self.speed
         stops = self.seconds - 0.8 * period  # the feet come beside each other after it
         ramp = min(1.7 * period, 0.45 * stops)
-        starts = smooth(self.ticks / ramp)
-        self.fully = starts * smooth((self.seconds - self.ticks) / (ramp + 0.5 * period))
+        starts = smoothstep(self.ticks / ramp)
+        self.fully = starts * smoothstep((self.seconds - self.ticks) / (ramp + 0.5 * period))
         cadence = (1 + 0.012 * band_noise(self.ticks, 0.4, rng)) / period
-        self.phase = 0.5 + np.cumsum(cadence * TICK) - np.sum(cadence[self.ticks < 0] * TICK)
+        self.phase = 0.5 + np.cumsum(cadence * CLOCK_STEP) - np.sum(cadence[self.ticks < 0] * CLOCK_STEP)
         slow = 1 / (1 + 0.2 * self.path.bend**2 * (self.cycle.leg / 0.86) ** 2)
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
         short = min(1.0, stops / (3.0 * period))  # who has no time for more than a step or two does not get up to speed
-        pace = short * self.speed * starts * smooth((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
-        self.gone = np.interp(np.cumsum(pace) * TICK, due, self.path.samples)
-        quick = np.gradient(self.gone, TICK)
+        pace = short * self.speed * starts * smoothstep((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
+        self.gone = np.interp(np.cumsum(pace) * CLOCK_STEP, due, self.path.samples)
+        quick = np.gradient(self.gone, CLOCK_STEP)
         pull = quick**2 * np.interp(self.gone, self.path.samples, self.path.bend) / GRAVITY
-        self.lean = gaussian_filter1d(LEAN * np.tanh(pull / LEAN), 0.15 / TICK)
+        self.lean = gaussian_filter1d(MAX_LEAN * np.tanh(pull / MAX_LEAN), 0.15 / CLOCK_STEP)
 
-    def _prints(self, side: int, rng: np.random.Generator) -> Prints:
+    def _prints(self, side: int, rng: np.random.Generator) -> Footprints:
         phase = self.phase - 0.5 * side
         strides = np.arange(np.floor(phase[0]) - 1, np.ceil(phase[-1]) + 2)
         along = np.interp(strides + self.cycle.middle, phase, self.gone)
         first, last = np.interp([0.0, self.seconds], self.ticks, phase)
-        before, after = strides - 1 + RISES < first, strides >= np.floor(last - SETTLES)
+        before, after = strides - 1 + HEEL_RISE_PHASE < first, strides >= np.floor(last - FLAT_PHASE)
         along = np.where(before, 0.0, np.where(after, self.gone[-1], along))
         goes = ~(before | after)
         sign = 1 - 2 * side
-        width = np.where(goes, WIDTH[self.jogging], 0.13) * self.cycle.leg * sign
+        width = np.where(goes, TRACK_HALF_WIDTH[self.jogging], 0.13) * self.cycle.leg * sign
         jitter = 0.012 * np.clip(rng.standard_normal((2, len(strides))), -2, 2) * np.where(goes, self.cycle.leg, 0)
         along, aside = along + jitter[0], width + jitter[1]
         size = np.minimum(np.hypot(np.diff(along, append=along[-1]), np.diff(aside, append=aside[-1])) / (0.5 * self.cycle.stride), 1)
-        return Prints(int(strides[0]), along, aside, size**0.7)
+        return Footprints(int(strides[0]), along, aside, size**0.7)
 
     def at(self, t: Array) -> tuple[Array, Stance]:
         """Postures (T, `CHANNELS`) and stance at times `t` (T,), s, from the origin facing -Y."""
@@ -113,7 +113,7 @@ class Walk:
         inward = np.sin(lean) * (height - self.cycle.sole.ankle)
         pelvis = np.column_stack([self.path.place(gone, aside + inward), height * np.cos(lean)])
         ankles, frames, toes = (np.stack(part, 1) for part in zip(*feet))
-        around = turns(0 * heading, 0 * heading, heading)
+        around = rotations(0 * heading, 0 * heading, heading)
         ahead = frames @ np.array([0.0, -1.0, 0.0]) + (around @ np.array([0.0, -1.0, 0.0]))[:, None]
         ahead[..., 2] = 0
         postures = self._postures(t, phase, fully)
@@ -132,13 +132,13 @@ class Walk:
         aside = prints.aside[k] + gone * (prints.aside[k + 1] - prints.aside[k])
         pitch = self.cycle.pitch(part)
         pitch = pitch * np.where((pitch < 0) | swings, prints.size[k], prints.size[k - 1])
-        spent = smooth((part - self.cycle.gait.carries) / (0.6 * (1 - self.cycle.gait.carries)))
+        spent = smoothstep((part - self.cycle.gait.carries) / (0.6 * (1 - self.cycle.gait.carries)))
         toes = np.clip(-pitch * (1 - 0.4 * spent), 0, 1.0)
         hangs = 0.25 * self.body.measure("foot_length") * np.sin(np.clip(-pitch - toes, 0, None))
         forward, up = self.cycle.sole.rolled(pitch)
         turn = self.path.heading(along) + out
         place = self.path.place(along, aside) + forward[:, None] * np.column_stack([np.sin(turn), -np.cos(turn)])
-        frame = turns(0 * turn, 0 * turn, turn) @ turns(-pitch, 0 * pitch, 0 * pitch)
+        frame = rotations(0 * turn, 0 * turn, turn) @ rotations(-pitch, 0 * pitch, 0 * pitch)
         return np.column_stack([place, up + hangs + self.cycle.lift(part) * prints.size[k]]), frame, toes
 
     def _postures(self, t: Array, phase: Array, fully: Array) -> Array:

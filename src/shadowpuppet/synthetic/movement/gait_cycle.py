@@ -17,9 +17,9 @@ from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GRAVITY = 9.81
-POINTS = 200
+CYCLE_SAMPLES = 200
 """Phases at which a cycle is computed."""
-FLAT = np.radians(5.0)
+FLAT_PITCH = np.radians(5.0)
 """Pitch of the foot, rad, below which it lies almost flat while it carries."""
 
 
@@ -47,7 +47,7 @@ class Sole(NamedTuple):
         It rolls over the heel, or over the ball, and from some 20 degrees on over the tips of the toes, too.
         """
         c, s = np.cos(pitch), np.sin(pitch)
-        late = smooth((-pitch - np.radians(20)) / np.radians(60))
+        late = smoothstep((-pitch - np.radians(20)) / np.radians(60))
         lever = np.where(pitch > 0, -self.heel, self.ball + late * (self.tip - self.ball))
         return lever - lever * c - self.ankle * s, -lever * s + self.ankle * c
 
@@ -97,7 +97,7 @@ JOGGING = Gait(
 assert STANDING_TILT == 10.0  # what WALKING.bow is counted from: 10.3 on average
 
 
-def stride_of(speed: float, leg: float, jogging: bool) -> float:
+def stride_length(speed: float, leg: float, jogging: bool) -> float:
     """Length (m) of a stride at `speed` (m/s) of a person whose hips are `leg` (m) high.
 
     Walking: it grows with the root of the speed (Inman 1981), and is 1.2 hip heights at one hip height a second: so long that
@@ -109,7 +109,7 @@ def stride_of(speed: float, leg: float, jogging: bool) -> float:
     return 1.2 * leg * (speed / np.sqrt(0.9 * leg)) ** 0.5
 
 
-class Cycle:
+class GaitCycle:
     """A gait of a body at a speed (m/s)."""
 
     def __init__(self, body: Mannequin, gait: Gait, speed: float, stride: float) -> None:
@@ -118,7 +118,7 @@ class Cycle:
         self.sole = Sole.of(body)
         self.leg = body.length("thigh") + body.length("shank")
         self.amplitude = self._amplitude()
-        phase = np.arange(POINTS) / POINTS
+        phase = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
         thigh, shank, pitch = self._angles(phase, self.amplitude)
         base, drop = self._foot(phase, thigh, shank, pitch)
         carried = phase <= gait.carries
@@ -145,13 +145,13 @@ class Cycle:
 
     def _angles(self, phase: Array, amplitude: float) -> tuple[Array, Array, Array]:
         """Thigh and shank before the vertical, and the foot's pitch, rad: swings `amplitude` times as wide as published."""
-        whole = np.arange(POINTS) / POINTS
+        whole = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
         mean, more = self.gait.thigh(whole).mean(), np.sqrt(amplitude)
         least = self.gait.knee(whole).min()
         thigh = np.radians(mean + amplitude * (self.gait.thigh(phase) - mean))
         shank = thigh - np.radians(least + more * (self.gait.knee(phase) - least))
         pitch = shank + np.radians(more * self.gait.ankle(phase))
-        return thigh, shank, pitch * np.abs(pitch) / (np.abs(pitch) + FLAT)
+        return thigh, shank, pitch * np.abs(pitch) / (np.abs(pitch) + FLAT_PITCH)
 
     def _foot(self, phase: Array, thigh: Array, shank: Array, pitch: Array) -> tuple[Array, Array]:
         """Where the flat foot's ankle would lie along the way, and how far the ankle is below the pelvis, metres."""
@@ -194,9 +194,9 @@ class Cycle:
         late = (phase > 0.55 * self.gait.carries) & (phase <= self.gait.carries)
         more = np.where(late, tries[off.argmin(1)], 0.0)
         last = int(np.flatnonzero(late)[-1])
-        after = np.arange(last + 1, POINTS)
-        more[after] = more[last] * (1 - smooth((phase[after] - phase[last]) / 0.25))
-        return -gaussian_filter1d(more, 0.02 * POINTS, mode="wrap")
+        after = np.arange(last + 1, CYCLE_SAMPLES)
+        more[after] = more[last] * (1 - smoothstep((phase[after] - phase[last]) / 0.25))
+        return -gaussian_filter1d(more, 0.02 * CYCLE_SAMPLES, mode="wrap")
 
     def _swing(self, phase: Array) -> tuple[Callable, Callable]:
         """`progress` and `lift` between toe-off and contact: the published way, less what would jerk at its ends."""
@@ -213,7 +213,7 @@ class Cycle:
         return CubicSpline(phase, progress, bc_type="clamped"), CubicSpline(phase, lift)
 
 
-def smooth(x: Array) -> Array:
+def smoothstep(x: Array) -> Array:
     """From 0 to 1 as x goes from 0 to 1, with no jump in speed or acceleration (a quintic)."""
     x = np.clip(x, 0, 1)
     return x**3 * (10 - 15 * x + 6 * x * x)

@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement.involuntary import band_noise, involuntary, plain
+from shadowpuppet.synthetic.movement.involuntary import band_noise, involuntary_motion, without_side
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS, Mannequin
 
 Posture = dict[str, float]
 Keys = list[tuple[float, Posture]]
 
-LEAD, TAIL = 0.8, 0.8
+LEAD_SECONDS, TAIL_SECONDS = 0.8, 0.8
 """Seconds of standing before the first gesture and for lowering the arms after the last."""
 
 
@@ -129,7 +129,7 @@ def overhead(seconds: float, rng: np.random.Generator) -> Keys:
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
-LIMITS = {
+RANDOM_LIMITS = {
     "spine_bow": (-5, 24),
     "spine_side": (-17, 17),
     "spine_twist": (-26, 26),
@@ -151,14 +151,14 @@ LIMITS = {
 
 
 def random(seconds: float, rng: np.random.Generator) -> Keys:
-    """Smooth random motion of the upper body within `LIMITS`, below about 0.5 Hz, with pauses."""
+    """Smooth random motion of the upper body within `RANDOM_LIMITS`, below about 0.5 Hz, with pauses."""
     step = 0.16
     t = np.arange(0.7, max(seconds - 0.3, 0.9), step)
     pace = np.clip(1.4 + 1.6 * band_noise(t, 0.25, rng), 0.0, 1.6)
     own = np.cumsum(pace) * step
     table = np.zeros((len(t), len(CHANNELS)))
     for column, channel in enumerate(CHANNELS):
-        low, high = np.radians(LIMITS.get(plain(channel), (0, 0)))
+        low, high = np.radians(RANDOM_LIMITS.get(without_side(channel), (0, 0)))
         table[:, column] = low + (high - low) * (0.5 + 0.5 * np.tanh(0.9 * band_noise(own, 0.3, rng)))
     for side in ("left", "right"):
         swing = [CHANNELS.index(f"{side}_side"), CHANNELS.index(f"{side}_front")]
@@ -199,30 +199,30 @@ def _off(points: Array, start: Array, end: Array) -> Array:
     return np.linalg.norm(points - start - t[:, None] * along, axis=1)
 
 
-MOTIONS: dict[str, Callable[[float, np.random.Generator], Keys]] = {
+GESTURES: dict[str, Callable[[float, np.random.Generator], Keys]] = {
     f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)
 }
 """All gestures by name."""
 
-def compose(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
+def gesture_postures(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
     """Postures (T, `CHANNELS`) at times `t` (s) of gestures `(name, seconds)` one after another.
 
-    Key postures are joined by shape-preserving cubics and rounded over 0.1 s; the first stands `LEAD` seconds, and the arms are
-    lowered `TAIL` seconds after the last. still: factor on the involuntary part (0: a robot).
+    Key postures are joined by shape-preserving cubics and rounded over 0.1 s; the first stands `LEAD_SECONDS` seconds, and the arms are
+    lowered `TAIL_SECONDS` seconds after the last. still: factor on the involuntary part (0: a robot).
     """
-    return settled(through(keys_of(gestures, rng), t) + still * involuntary(t, rng))
+    return clamp_joints(interpolate_keys(key_postures(gestures, rng), t) + still * involuntary_motion(t, rng))
 
 
-def keys_of(gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> Keys:
+def key_postures(gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> Keys:
     """Key postures of gestures `(name, seconds)` one after another, standing before and after."""
-    begin, keys = LEAD, [(0.0, {}), (0.5 * LEAD, {})]
+    begin, keys = LEAD_SECONDS, [(0.0, {}), (0.5 * LEAD_SECONDS, {})]
     for name, seconds in gestures:
-        keys += [(begin + when, posture) for when, posture in MOTIONS[name](seconds, rng)]
+        keys += [(begin + when, posture) for when, posture in GESTURES[name](seconds, rng)]
         begin += seconds
-    return [*keys, (begin + TAIL, {}), (begin + TAIL + 1, {})]
+    return [*keys, (begin + TAIL_SECONDS, {}), (begin + TAIL_SECONDS + 1, {})]
 
 
-def through(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
+def interpolate_keys(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
     """Values (T, names) at times `t` (s) on the way through `keys`; what a key does not name stands, or is 0.
 
     rounding: seconds before and after a time that are averaged.
@@ -235,17 +235,17 @@ def through(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: flo
             if name in names:
                 row[names.index(name)] = value
     path = PchipInterpolator([when for when, _ in keys], table)
-    return rounded(lambda when: path(np.clip(when, 0, None)), t, rounding)
+    return time_average(lambda when: path(np.clip(when, 0, None)), t, rounding)
 
 
-def rounded(values: Callable[[Array], Array], t: Array, rounding: float) -> Array:
+def time_average(values: Callable[[Array], Array], t: Array, rounding: float) -> Array:
     """`values` about times `t` (T,), s, averaged over `rounding` seconds before and after."""
     window = np.linspace(-1, 1, 9)
     weight = np.exp(-2 * window**2) / np.exp(-2 * window**2).sum()
     return np.sum([w * values(t + rounding * x) for w, x in zip(weight, window)], 0)
 
 
-def settled(postures: Array) -> Array:
+def clamp_joints(postures: Array) -> Array:
     """Postures (T, `CHANNELS`) with elbows and fingers kept from bending backward."""
     postures = postures.copy()
     for side in ("left", "right"):
@@ -257,7 +257,7 @@ def settled(postures: Array) -> Array:
 
 def duration(gestures: Sequence[tuple[str, float]]) -> float:
     """Seconds from the first to the last picture of gestures `(name, seconds)`."""
-    return LEAD + sum(seconds for _, seconds in gestures) + TAIL
+    return LEAD_SECONDS + sum(seconds for _, seconds in gestures) + TAIL_SECONDS
 
 
 def posture(**named: float) -> Array:

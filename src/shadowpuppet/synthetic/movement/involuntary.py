@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.person.kinematics import CHANNELS
 
-RESTLESS = {
+RESTLESSNESS = {
     "sway_x": (0.006, 0.35),
     "sway_y": (0.006, 0.35),
     "spine_bow": (0.8, 0.4),
@@ -38,18 +38,18 @@ def band_noise(t: Array, highest: float, rng: np.random.Generator, terms: int = 
     return np.sqrt(2 / terms) * np.cos(2 * np.pi * np.multiply.outer(t, frequency) + phase).sum(-1)
 
 
-def involuntary(t: Array, rng: np.random.Generator) -> Array:
+def involuntary_motion(t: Array, rng: np.random.Generator) -> Array:
     """Sway, breathing, restlessness and tremor at times `t` (T,), of shape (T, `CHANNELS`)."""
     total = np.zeros((len(t), len(CHANNELS)))
     for column, channel in enumerate(CHANNELS):
-        name = plain(channel)
-        size, highest = RESTLESS.get(name, (0.0, 1.0))
+        name = without_side(channel)
+        size, highest = RESTLESSNESS.get(name, (0.0, 1.0))
         size = size if name.startswith("sway") else np.radians(size)
         total[:, column] = size * band_noise(t, highest, rng) + np.radians(TREMOR.get(name, 0.0)) * band_noise(t, 5.0, rng)
         total[:, column] += np.radians(0.4) * np.sin(2 * np.pi * 0.25 * t) if name in ("shrug", "spine_bow") else 0.0
     return total
 
 
-def plain(channel: str) -> str:
+def without_side(channel: str) -> str:
     """A channel's name without its side."""
     return channel.removeprefix("left_").removeprefix("right_")

@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, Sole, smooth
-from shadowpuppet.synthetic.movement.gestures import Keys, rounded, through
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, turns
+from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, Sole, smoothstep
+from shadowpuppet.synthetic.movement.gestures import Keys, interpolate_keys, time_average
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
-STANCE = 0.13
+HALF_STANCE = 0.13
 """Half the distance of a standing person's ankles."""
-GROUND = ("drop", "aside", "ahead", "left_heel", "right_heel")
+GROUND_CHANNELS = ("drop", "aside", "ahead", "left_heel", "right_heel")
 """What keys may name besides `CHANNELS`: how far the pelvis is lowered from standing, and moved to the left and forward, in leg
 lengths; how far the heels are raised, rad. A leg that would not reach lowers the pelvis further."""
 
@@ -52,7 +52,7 @@ class Hop(NamedTuple):
     """How long they are in the air."""
 
 
-class Act:
+class KeyframeMotion:
     """Key postures over stepping feet."""
 
     def __init__(
@@ -64,7 +64,7 @@ class Act:
         hops: Sequence[Hop] = (),
         rounding: float = 0.16,
     ) -> None:
-        """keys: of `CHANNELS` and `GROUND`, between 0 and `seconds`; what they do not name stands; `rounding`: see `through`."""
+        """keys: of `CHANNELS` and `GROUND_CHANNELS`, between 0 and `seconds`; others stand; `rounding`: see `interpolate_keys`."""
         self.body, self.seconds, self.hops, self.rounding = body, seconds, tuple(hops), rounding
         self.leg, self.sole = body.length("thigh") + body.length("shank"), Sole.of(body)
         last = {"turn": max((s.begin, s.turn) for s in steps)[1]} if steps else {}
@@ -75,9 +75,9 @@ class Act:
 
     def at(self, t: Array) -> tuple[Array, Stance]:
         """Postures (T, `CHANNELS`) and stance at times `t` (T,), s."""
-        values = through(self.keys, np.clip(t, 0, self.seconds), (*CHANNELS, *GROUND), self.rounding)
+        values = interpolate_keys(self.keys, np.clip(t, 0, self.seconds), (*CHANNELS, *GROUND_CHANNELS), self.rounding)
         postures, (drop, aside, ahead, *heels) = values[:, : len(CHANNELS)], values[:, len(CHANNELS) :].T
-        lift = rounded(self._flight, t, 0.1)
+        lift = time_average(self._flight, t, 0.1)
         feet = [self._foot(n, t, heels[n]) for n in (0, 1)]
         ankles, frames, toes, looks = (np.stack(part, 1) for part in zip(*feet))
         ankles = ankles + (lift[:, None] * [0, 0, 1])[:, None]
@@ -95,24 +95,24 @@ class Act:
     def _foot(self, n: int, t: Array, heel: Array) -> tuple[Array, Array, Array, Array]:
         """Ankle (T, 3), frame (T, 3, 3), bent toes (T,) and where the foot points (T, 3), at times `t` (T,)."""
         out = TOE_OUT * (1 - 2 * n)
-        place = np.array([STANCE * (1 - 2 * n), 0.0, 0.0])
+        place = np.array([HALF_STANCE * (1 - 2 * n), 0.0, 0.0])
         values, up = np.repeat(place[None], len(t), 0), 0 * t
         for step in self.steps[n]:
             share, goal = np.clip((t - step.begin) / step.seconds, 0, 1), np.array([step.aside, step.ahead, step.turn])
-            values = values + smooth(share)[:, None] * (goal - place)
+            values = values + smoothstep(share)[:, None] * (goal - place)
             up, place = up + step.height * 16 * (share * (1 - share)) ** 2, goal
         turn, pitch = values[:, 2] + out, -np.maximum(heel, 0) - 2.5 * up
         forward, rise = self.sole.rolled(pitch)
         heading = np.column_stack([np.sin(turn), -np.cos(turn)])
         floor = self.leg * values[:, :2] * [1, -1] + forward[:, None] * heading
-        frame = turns(0 * turn, 0 * turn, turn) @ turns(-pitch, 0 * pitch, 0 * pitch)
+        frame = rotations(0 * turn, 0 * turn, turn) @ rotations(-pitch, 0 * pitch, 0 * pitch)
         ankle = np.column_stack([floor, rise + self.leg * up])
         return ankle, frame, np.clip(-pitch, 0, 0.9), np.column_stack([heading, 0 * turn])
 
 
 def _last(steps: Sequence[Step], what: str) -> float:
     """Where the pelvis ends up: between the places of both feet."""
-    places = [(STANCE if n == 0 else -STANCE) if what == "aside" else 0.0 for n in (0, 1)]
+    places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):
         places[step.foot] = getattr(step, what)
     return sum(places) / 2

@@ -15,7 +15,7 @@ import numpy as np
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.synthetic.person.kinematics import SIDES, Figure, assembled, fingers, turns
+from shadowpuppet.synthetic.person.kinematics import SIDES, Figure, assemble_figure, fingers, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Points = dict[str, Array]
 
 
-def play(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
+def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
     """The figure of `body` at times `t` (T,), s, moving as in the one file of `gestures`; at first it faces -Y turned by `turn`.
 
     The middle of the area it covers lies at the origin. Raises `FormatError` where a file cannot be used.
@@ -36,13 +36,13 @@ def play(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0
     figure = retarget(body, shown, capture.at_rest.joints())
     pelvis = figure.rotation[:, 0]
     heading = turn - float(np.arctan2(-pelvis[0, 0, 1], pelvis[0, 1, 1]))
-    R = turns(*np.zeros((2, 1)), np.array([heading]))[0]
+    R = rotations(*np.zeros((2, 1)), np.array([heading]))[0]
     joints, origin = figure.joints @ R.T, figure.origin @ R.T
     middle = np.append((joints[:, 0, :2].max(0) + joints[:, 0, :2].min(0)) / 2, 0.0)
     return Figure(joints - middle, R @ figure.rotation, origin - middle, figure.curl)
 
 
-def seconds_of(gestures: Sequence[Gesture]) -> float:
+def mocap_seconds(gestures: Sequence[Gesture]) -> float:
     """How long the file of `gestures` plays."""
     gesture, capture = _one(gestures)
     there = (len(capture.root) - 1) / gesture.file_rate - gesture.start
@@ -82,7 +82,7 @@ def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
     frame: dict[str, tuple[Array, Array]] = {}
     legs = _length(calm, "hip", "knee") + _length(calm, "knee", "ankle")
     joint["pelvis"] = p["pelvis"] * (body.length("thigh") + body.length("shank")) / legs
-    trunk = {name: _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for name, axes in TRUNK.items()}
+    trunk = {name: _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for name, axes in TRUNK_AXES.items()}
     pelvis, thorax, head = trunk["pelvis"], trunk["thorax"], trunk["head"]
     abdomen, neck = _between(pelvis, thorax), _between(thorax, head)
     lumbar = joint["pelvis"] + pelvis @ (bones["lumbar"] - bones["pelvis"])
@@ -94,10 +94,10 @@ def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
     for side in SIDES:
         _arm(bones, p, calm, side, thorax, thoracic, joint, frame)
         _leg(body, bones, p, calm, side, pelvis, joint, frame)
-    return _on_the_floor(body, assembled(joint, frame, np.full((len(table.times), 2), 0.35)))
+    return _on_the_floor(body, assemble_figure(joint, frame, np.full((len(table.times), 2), 0.35)))
 
 
-TRUNK = {
+TRUNK_AXES = {
     "pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"),
     "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
     "head": ("head", "crown", "crown", "face"),
@@ -119,7 +119,7 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
     now = _unit(np.einsum("tji,tj->ti", thorax, p[f"{side}_shoulder"] - p["neck"]))
     clavicle = thorax @ _swing(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now)
     upper, fore = (_unit(p[f"{side}_{b}"] - p[f"{side}_{a}"]) for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
-    hinge = _steady(-sign * np.cross(upper, fore), thorax @ np.array([sign, 0, 0.3]))
+    hinge = _steady_normals(-sign * np.cross(upper, fore), thorax @ np.array([sign, 0, 0.3]))
     upper_arm, bare = (_along_x(sign * axis, hinge) for axis in (upper, fore))
     hand_axis = _unit(p[f"{side}_hand"] - p[f"{side}_wrist"])
     thumb = p[f"{side}_thumb"] - p[f"{side}_wrist"]
@@ -146,7 +146,7 @@ def _leg(
 ) -> None:
     """Thigh, shank, foot, toes."""
     hip, knee, ankle = (p[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))
-    ahead = _steady(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
+    ahead = _steady_normals(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
     thigh, shank = (_along_z(_unit(a - b), -ahead) for a, b in ((hip, knee), (knee, ankle)))
     axes = (f"{side}_ankle", f"{side}_ball", f"{side}_ankle", f"{side}_knee")
     foot = _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2)
@@ -159,7 +159,7 @@ def _leg(
         f"{side}_thigh": (thigh, joint[f"{side}_hip"]),
         f"{side}_shank": (shank, joint[f"{side}_knee"]),
         f"{side}_foot": (foot, at),
-        f"{side}_toes": (foot @ turns(-bend, 0 * bend, 0 * bend), at + foot @ body.ball()),
+        f"{side}_toes": (foot @ rotations(-bend, 0 * bend, 0 * bend), at + foot @ body.ball()),
     }
 
 
@@ -182,7 +182,7 @@ def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
     return Figure(figure.joints + shift, figure.rotation, figure.origin + shift, figure.curl)
 
 
-def _steady(plane: Array, usual: Array) -> Array:
+def _steady_normals(plane: Array, usual: Array) -> Array:
     """Normals of planes (T, 3), long where they are sure; where they are short the neighbours and at last `usual` decide."""
     from scipy.ndimage import gaussian_filter1d
 

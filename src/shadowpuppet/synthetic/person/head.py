@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person.surface import Loft, Rows, ball, between
+from shadowpuppet.synthetic.person.surface import Loft, Rows, ellipsoid, loft_between
 
 
 def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
@@ -19,7 +19,7 @@ def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
     cheek, chin = skull + np.array([0, -0.30 * deep, -0.10 * high]), np.array([0, skull[1] - 0.65 * deep, H - 0.955 * high])
     bridge, tip = skull + np.array([0, -0.91 * deep, -0.02 * high]), skull + np.array([0, -1.07 * deep, -0.16 * high])
     parts = [
-        between(
+        loft_between(
             "neck",
             joints["neck"],
             joints["neck"] + np.array([0, 0.004, -0.035]),
@@ -30,8 +30,8 @@ def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
             materials=("shirt", "skin"),
             change=0.045 * unit,
         ),
-        ball("head", joint, skull, (wide, deep, 0.44 * high), blend=0.02),
-        between(
+        ellipsoid("head", joint, skull, (wide, deep, 0.44 * high), blend=0.02),
+        loft_between(
             "head",
             joint,
             cheek,
@@ -40,7 +40,7 @@ def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
             caps=(0.03, 0.012),
             blend=0.02,
         ),
-        between(
+        loft_between(
             "head",
             joint,
             bridge,
@@ -61,11 +61,11 @@ def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
             (eye + np.array([0, -0.003, 0.016 * unit]), (0.018, 0.008, 0.0035), 0.002, "hair"),
         ]
         parts += [
-            ball("head", joint, at, (rx * unit, ry * unit, rz * unit), blend=blend, materials=(material, material))
+            ellipsoid("head", joint, at, (rx * unit, ry * unit, rz * unit), blend=blend, materials=(material, material))
             for at, (rx, ry, rz), blend, material in marks
         ]
     parts.append(
-        ball(
+        ellipsoid(
             "head",
             joint,
             skull + np.array([0, -0.93 * deep, -0.275 * high]),
@@ -79,7 +79,7 @@ def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
 
 def _hair(skull: Array, size: tuple[float, float, float], joint: Array, thick: float, long: bool) -> list[Loft]:
     (wide, deep, high), hair = size, {"materials": ("hair", "hair")}
-    cap = ball(
+    cap = ellipsoid(
         "head",
         joint,
         skull + np.array([0, 0.13 * deep + 0.9 * thick, 0.05 * high]),
@@ -90,7 +90,7 @@ def _hair(skull: Array, size: tuple[float, float, float], joint: Array, thick: f
     top = skull + np.array([0, 0.45 * deep, 0.02 * high])
     rows: Rows = [(0, 0.95 * wide, 0.55 * deep), (0.5, 1.02 * wide, 0.50 * deep), (1, 0.85 * wide, 0.34 * deep)]
     return (
-        [cap, between("head", joint, top, top + np.array([0, 0.020, -0.62 * high]), rows, caps=(0.04, 0.02), blend=0.02, **hair)]
+        [cap, loft_between("head", joint, top, top + np.array([0, 0.020, -0.62 * high]), rows, caps=(0.04, 0.02), blend=0.02, **hair)]
         if long
         else [cap]
     )

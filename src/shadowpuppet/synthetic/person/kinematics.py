@@ -50,9 +50,9 @@ SEGMENTS = (
 SIDES = ("left", "right")
 TOE_OUT = 0.12
 """How far the feet of a standing person point outward, rad."""
-SPAN = 0.999
+MAX_LEG_SPAN = 0.999
 """Share of its length that a leg may stretch to: knees are never quite straight."""
-FIST = (1.0, 1.5)
+FIST_CURL = (1.0, 1.5)
 """Curls, rad, between which the fingers close from open to a fist; less is left to the fingers' own slight bend."""
 MIRROR = np.array([1.0, -1.0, -1.0])
 HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -87,7 +87,7 @@ class Stance(NamedTuple):
     """Where left and right knee look, of shape (T, 2, 3)."""
 
 
-def turns(*vector: Array) -> Array:
+def rotations(*vector: Array) -> Array:
     """Rotation matrices (T, 3, 3) of rotation vectors given by their components (T,)."""
     from scipy.spatial.transform import Rotation
 
@@ -100,22 +100,22 @@ def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     stance: half the distance between the ankles, as a fraction of the leg's length. Feet stay where they are: the pelvis sinks
     as far as both legs need, and hips and knees follow from its place.
     """
-    return figure(body, postures, planted(body, postures, stance))
+    return pose_over(body, postures, planted_stance(body, postures, stance))
 
 
-def planted(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
+def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
     """The `Stance` of `pose`: feet beside each other about the origin, the pelvis above them as high as the legs allow."""
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
     yaw = _yaw(q)
     half, height = stance * (body.length("thigh") + body.length("shank")), body.rest()["left_ankle"][2]
     sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
     ankles = np.stack([yaw @ np.array([sign * half, 0, height]) for sign in (1, -1)], 1)
-    feet = np.stack([yaw @ turns(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
+    feet = np.stack([yaw @ rotations(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
     ahead = np.repeat((yaw @ np.array([0.0, -1.0, 0.0]))[:, None], 2, 1)
     return Stance(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
 
 
-def figure(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
+def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
     """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`; its pelvis and feet count, not `sway` in the postures.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
@@ -124,25 +124,25 @@ def figure(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) 
     rest = body.rest()
     joint: dict[str, Array] = {}
     frame: dict[str, tuple[Array, Array]] = {}
-    pelvis = _yaw(q) @ turns(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
+    pelvis = _yaw(q) @ rotations(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
     joint["pelvis"] = _legs(body, pelvis, stance, soft, joint, frame)
     frame["pelvis"] = pelvis, joint["pelvis"]
-    half = turns(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
+    half = rotations(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
     abdomen, thorax = pelvis @ half, pelvis @ half @ half
     lumbar = joint["pelvis"] + pelvis @ (rest["lumbar"] - rest["pelvis"])
     thoracic = lumbar + abdomen @ (rest["thoracic"] - rest["lumbar"])
     joint["neck"] = thoracic + thorax @ (rest["neck"] - rest["thoracic"])
-    nod = turns(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
+    nod = rotations(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
     neck, head = thorax @ nod, thorax @ nod @ nod
     joint["head"] = joint["neck"] + neck @ (rest["head"] - rest["neck"])
     frame |= {"abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
     frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
     for side in SIDES:
         _arm(rest, q, side, thorax, thoracic, joint, frame)
-    return assembled(joint, frame, np.stack([q["left_curl"], q["right_curl"]], 1))
+    return assemble_figure(joint, frame, np.stack([q["left_curl"], q["right_curl"]], 1))
 
 
-def assembled(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
+def assemble_figure(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
     """A `Figure` of joints (T, 3) by name and of segments' frames and origins by name; fingers bent by `curl` (T, 2)."""
     return Figure(
         np.stack([joint[name] for name in JOINTS], 1),
@@ -154,7 +154,7 @@ def assembled(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], cu
 
 def _yaw(q: dict[str, Array]) -> Array:
     """The figure's heading, of shape (T, 3, 3)."""
-    return turns(0 * q["turn"], 0 * q["turn"], q["turn"])
+    return rotations(0 * q["turn"], 0 * q["turn"], q["turn"])
 
 
 def _arm(
@@ -168,7 +168,7 @@ def _arm(
     mirror = np.ones(3) if side == "left" else MIRROR
 
     def about(x: Array | float, y: Array | float, z: Array | float) -> Array:
-        return turns(*(m * np.asarray(v) + 0 * q["turn"] for m, v in zip(mirror, (x, y, z))))
+        return rotations(*(m * np.asarray(v) + 0 * q["turn"] for m, v in zip(mirror, (x, y, z))))
 
     arm = {name: q[f"{side}_{name}"] for name in ARM}
     at = {name: rest[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
@@ -201,9 +201,9 @@ def _arm(
 
 def fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
     """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: of the hand, from the wrist, in its frame."""
-    close = np.clip((curl - FIST[0]) / (FIST[1] - FIST[0]), 0, 1)
+    close = np.clip((curl - FIST_CURL[0]) / (FIST_CURL[1] - FIST_CURL[0]), 0, 1)
     bend = np.radians(115) * np.sign(base[0]) * close
-    return hand @ turns(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
+    return hand @ rotations(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
 
 
 def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: dict, frame: dict) -> Array:
@@ -212,16 +212,16 @@ def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: di
     rest = body.rest()
     hips = [pelvis @ (rest[f"{side}_hip"] - rest["pelvis"]) for side in SIDES]
     ankles = [stance.ankles[:, n] for n in (0, 1)]
-    sway, span = np.where([True, True, False], stance.pelvis, 0.0), SPAN * (thigh + shank)
+    sway, span = np.where([True, True, False], stance.pelvis, 0.0), MAX_LEG_SPAN * (thigh + shank)
     heights = [
         ankle[:, 2] - hip[:, 2] + np.sqrt(np.maximum(span**2 - ((sway + hip - ankle)[:, :2] ** 2).sum(1), 0))
         for hip, ankle in zip(hips, ankles)
     ]
-    centre = sway + lesser(lesser(heights[0], heights[1], soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
+    centre = sway + soft_minimum(soft_minimum(heights[0], heights[1], soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
     for n, side in enumerate(SIDES):
         hip, ankle, ahead, foot = centre + hips[n], ankles[n], stance.ahead[:, n], stance.feet[:, n]
         knee, ahead = _bent(hip, ankle, ahead, thigh, shank)
-        toes = foot @ turns(-stance.toes[:, n], np.zeros(1), np.zeros(1))
+        toes = foot @ rotations(-stance.toes[:, n], np.zeros(1), np.zeros(1))
         joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
         frame |= {
             f"{side}_thigh": (_upright(hip - knee, ahead), hip),
@@ -243,7 +243,7 @@ def _bent(hip: Array, ankle: Array, ahead: Array, thigh: float, shank: float) ->
     return hip + thigh * (cosine * down + np.sqrt(1 - cosine**2) * ahead), ahead
 
 
-def lesser(a: Array, b: Array, soft: float) -> Array:
+def soft_minimum(a: Array, b: Array, soft: float) -> Array:
     """The smaller of `a` and `b`, rounded off where they come closer than `soft`."""
     if soft == 0:
         return np.minimum(a, b)

@@ -19,7 +19,7 @@ GROUPS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Parts blend within a group, and limbs with the trunk only close to shoulder or hip: a hanging arm does not melt into it."""
 Rows = list[tuple[float, ...]]
 """Cross-sections as they are written down: (place along the axis, half width, half depth[, centre's width, centre's depth])."""
-SAMPLES = 33
+LOFT_SAMPLES = 33
 """Cross-sections of a loft."""
 
 
@@ -53,11 +53,11 @@ class Loft:
         return replace(self, segment=segment, group=group, start=self.start * flip, frame=self.frame * flip[:, None])
 
     def sampled(self) -> Array:
-        """Half width, half depth and centre at `SAMPLES` places evenly along the axis, of shape (SAMPLES, 4), metres."""
+        """Half width, half depth and centre at `LOFT_SAMPLES` places evenly along the axis, of shape (SAMPLES, 4), metres."""
         from scipy.interpolate import PchipInterpolator
 
         along = self.stations[:, 0]
-        return PchipInterpolator(along, self.stations[:, 1:])(np.linspace(along[0], along[-1], SAMPLES))
+        return PchipInterpolator(along, self.stations[:, 1:])(np.linspace(along[0], along[-1], LOFT_SAMPLES))
 
 
 class Surface(NamedTuple):
@@ -104,7 +104,7 @@ class Surface(NamedTuple):
         return (np.maximum(self.table[..., 0], self.table[..., 1]) + np.hypot(self.table[..., 2], self.table[..., 3])).max(1)
 
 
-def between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **more: Any) -> Loft:
+def loft_between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **more: Any) -> Loft:
     """A loft from `start` to `end` (world of the T-pose) on the segment whose joint is `joint`; rows by fraction of length."""
     axis = end - start
     length = float(np.linalg.norm(axis))
@@ -127,8 +127,8 @@ def stations_of(rows: Rows, scale: float = 1.0) -> Array:
     return table
 
 
-def ball(segment: str, joint: Array, middle: Array, radii: tuple[float, float, float], **more: Any) -> Loft:
+def ellipsoid(segment: str, joint: Array, middle: Array, radii: tuple[float, float, float], **more: Any) -> Loft:
     """An ellipsoid of half `radii` (x, y, z): a short loft with long caps."""
     half, cap = np.array([0, 0, 0.02 * radii[2]]), 0.98 * radii[2]
     rows: Rows = [(0, radii[0], radii[1]), (1, radii[0], radii[1])]
-    return between(segment, joint, middle - half, middle + half, rows, caps=(cap, cap), **more)
+    return loft_between(segment, joint, middle - half, middle + half, rows, caps=(cap, cap), **more)
