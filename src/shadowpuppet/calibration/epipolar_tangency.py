@@ -11,66 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 
 MAX_ANGULAR_EXTENT = 2.6
 """Radians that a silhouette may cover around the line from camera to camera: beyond, that line runs through or along it."""
-CONTOUR_STEP = 2
-"""Pixels of a contour from one taken to the next."""
-BORDER_MARGIN = 2
-"""Pixels from the picture's border within which nothing can be said of an outline."""
-MIN_CONTOUR_SHARE = 0.1
-"""Outlines shorter than this, over the longest, are specks."""
 
 
-class Outline(NamedTuple):
-    """A silhouette's outline as one camera sees it."""
-
-    pixels: Array
-    """Of shape (K, 2)."""
-    firm: Mask
-    """Whether each is far from the picture's border, of shape (K,)."""
-    rays: Array
-    """Unit directions in the world, of shape (K, 3)."""
-
-
-class Outlines:
-    """Outlines of masks in cameras, each found once."""
-
-    def __init__(self) -> None:
-        """None yet."""
-        self._pixels: dict[int, tuple[Mask, Array, Mask]] = {}
-        self._known: dict[tuple[int, int], tuple[Camera, Outline]] = {}
-
-    def of(self, camera: Camera, mask: Mask | None) -> Outline | None:
-        """The outline of a mask (H, W); None where nobody is in it."""
-        if mask is None or not may_be_person(mask):
-            return None
-        if id(mask) not in self._pixels:
-            self._pixels[id(mask)] = (mask, *_followed(mask))  # the mask is kept, so that no other gets its number
-        if (id(camera), id(mask)) not in self._known:
-            _, pixels, firm = self._pixels[id(mask)]
-            rays = camera.rays(pixels) @ camera.T_camera_world[:3, :3]
-            self._known[id(camera), id(mask)] = camera, Outline(pixels, firm, rays / np.linalg.norm(rays, axis=1, keepdims=True))
-        return self._known[id(camera), id(mask)][1]
-
-
-def _followed(mask: Mask) -> tuple[Array, Mask]:
-    import cv2
-
-    contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
-    longest = max(map(len, contours))
-    pixels = np.concatenate([c[::CONTOUR_STEP, 0] for c in contours if len(c) > MIN_CONTOUR_SHARE * longest]).astype(float)
-    return pixels, np.asarray(((pixels >= BORDER_MARGIN) & (pixels < np.array(mask.shape[::-1]) - BORDER_MARGIN)).all(1))
-
-
-def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]]) -> Array:
-    """Median distance (C, C) of the tangents of every two cameras, pixels, over rows of outlines; not a number where there is none."""
+def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Row]) -> Array:
+    """Median distance (C, C) of the tangents of every two cameras over sets, pixels; NaN where there is none."""
     out = np.full((len(cameras), len(cameras)), np.nan)
+    outlines = [outlines_of(cameras, row) for row in rows]
     for i, j in combinations(range(len(cameras)), 2):
-        pairs = [(row[i], row[j]) for row in rows]
+        pairs = [(row[i], row[j]) for row in outlines]
         values = np.array([_apart(cameras[i], a, cameras[j], b) for a, b in pairs if a is not None and b is not None]).ravel()
         values = values[np.isfinite(values)]
         out[i, j] = out[j, i] = np.median(values) if len(values) else np.nan

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines, tangent_angles
+from shadowpuppet.calibration.epipolar_tangency import tangent_angles
+from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector
 
 OUTLIER_PIXELS = 1.0
@@ -38,7 +38,7 @@ class RotationError:
         return _rotated(camera, np.radians([self.down, -self.right, -self.clockwise]))
 
 
-def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Sequence[Mask | None]], n: int) -> RotationError | None:
+def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
     """The turn of camera `n` that brings its silhouettes' tangents nearest to the others', over sets of masks (H, W) by camera.
 
     None where there are not two others to tell it by. Its place is taken as right: a camera that was carried off is found to be turned
@@ -46,19 +46,18 @@ def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Sequence[M
     """
     from scipy.optimize import least_squares
 
-    outlines = Outlines()
-    seen = [[outlines.of(camera, mask) for camera, mask in zip(cameras, row)] for row in rows]
-    others = [k for k in range(len(cameras)) if k != n and any(row[n] is not None and row[k] is not None for row in seen)]
+    outlines = [outlines_of(cameras, row) for row in rows]
+    others = [k for k in range(len(cameras)) if k != n and any(row[n] is not None and row[k] is not None for row in outlines)]
     if len(others) < 2:
         return None
 
     def off(vector: Array) -> Array:
         camera, values = _rotated(cameras[n], vector), list[float]()
-        for row in seen:
+        for row in outlines:
             for k in others:
                 own, other, found = row[n], row[k], None
                 if own is not None and other is not None:
-                    found = tangent_angles((camera, cameras[k]), (rotated_outline(own, cameras[n], camera), other))
+                    found = tangent_angles((camera, cameras[k]), (_rotated_outline(own, cameras[n], camera), other))
                 values += [np.nan] * 2 if found is None else ((found.angles[0] - found.angles[1]) * found.levers).tolist()
         return np.array(values)
 
@@ -72,7 +71,7 @@ def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Sequence[M
                 after=float(np.nanmedian(np.abs(off(best)))))
 
 
-def rotated_outline(outline: Outline, before: Camera, after: Camera) -> Outline:
+def _rotated_outline(outline: Outline, before: Camera, after: Camera) -> Outline:
     """What a camera sees, once it is known to be turned."""
     return outline._replace(rays=outline.rays @ before.T_camera_world[:3, :3].T @ after.T_camera_world[:3, :3])
 

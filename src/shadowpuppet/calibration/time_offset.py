@@ -14,7 +14,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.calibration.epipolar_tangency import Outline, tangent_angles
+from shadowpuppet.calibration.agreement import plain_values
+from shadowpuppet.calibration.epipolar_tangency import tangent_angles
+from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 
@@ -53,11 +55,12 @@ class _Pair:
     weight: float
 
 
-def time_offsets(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]], most: int | None = None) -> TimeOffsets:
+def time_offsets(cameras: Sequence[Camera], rows: Sequence[Row]) -> TimeOffsets:
     """How late each film is, from outlines by set and camera, which follow one another; `most`: sets that are tried, to and fro."""
-    most = min(len(rows) - MIN_COMMON_SETS, len(rows) // 2) if most is None else most
+    most = min(len(rows) - MIN_COMMON_SETS, len(rows) // 2)
+    outlines = [outlines_of(cameras, row) for row in rows]
     pairs = [pair for i, j in combinations(range(len(cameras)), 2)
-             if most > 0 and (pair := _compared(i, j, tangent_signals(cameras, rows, i, j), most)) is not None]
+             if most > 0 and (pair := _compared(i, j, tangent_signals(cameras, outlines, i, j), most)) is not None]
     late, known = _solved(len(cameras), pairs)
     table = np.full((len(cameras), len(cameras)), np.nan)
     off: list[list[float]] = [[] for _ in cameras]
@@ -66,16 +69,16 @@ def time_offsets(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | No
         for n in (pair.first, pair.second):
             off[n].append(abs(late[pair.second] - late[pair.first] - pair.shift))
     spread = np.array([np.median(values) if values else np.nan for values in off])
-    return TimeOffsets(names=tuple(camera.name for camera in cameras), frames=_plain(np.where(known, late, np.nan)), spread=_plain(spread),
-                    pairs=tuple(map(_plain, table)))
+    return TimeOffsets(names=tuple(camera.name for camera in cameras), frames=plain_values(np.where(known, late, np.nan)),
+                       spread=plain_values(spread), pairs=tuple(map(plain_values, table)))
 
 
-def tangent_signals(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]], i: int, j: int) -> Array:
+def tangent_signals(cameras: Sequence[Camera], outlines: Sequence[Sequence[Outline | None]], i: int, j: int) -> Array:
     """Angles (2 cameras, 2 tangents, F sets) of the outermost planes through cameras i and j that touch their silhouettes, in pixels of
     the one that sees them smaller; not a number where there is none."""
-    signals, reference = np.full((2, 2, len(rows)), np.nan), None
+    signals, reference = np.full((2, 2, len(outlines)), np.nan), None
     levers = []
-    for f, row in enumerate(rows):
+    for f, row in enumerate(outlines):
         a, b = row[i], row[j]
         found = None if a is None or b is None else tangent_angles((cameras[i], cameras[j]), (a, b), reference)
         if found is not None:
@@ -131,7 +134,3 @@ def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, NDArray[np.bool_
     if known.sum() == 2:
         return late - late[np.argmax(known)], known  # the second against the first
     return late - (np.sort(late[known])[(known.sum() - 1) // 2] if known.any() else 0.0), known
-
-
-def _plain(values: Array) -> tuple[float | None, ...]:
-    return tuple(round(float(value), 2) if np.isfinite(value) else None for value in values)

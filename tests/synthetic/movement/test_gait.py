@@ -63,7 +63,7 @@ def steady(jogging=False, speed=None, seconds=24.0, body=MAN, path="line", size=
     """A gait far from its start and end: (walk, figure, phase of the left leg)."""
     walk = Walk(body, seconds, np.random.default_rng(seed), jogging, speed, path, size)
     t = np.arange(3.0, seconds - 3.0, 1 / 100)
-    return walk, figure(body, *walk.at(t), SOFT_LIMIT), np.interp(t, walk.ticks, walk.phase)
+    return walk, pose_over(body, *walk.at(t), SOFT_LIMIT), np.interp(t, walk.ticks, walk.phase)
 
 
 def by_phase(values, phase, places):
