@@ -136,7 +136,7 @@ def test_a_trembling_camera_makes_no_silhouette_of_edges(rng):
     wall = np.where(np.arange(SIZE[1])[:, None] // 20 % 2, (200, 190, 180), (60, 70, 80)) + np.zeros((*SIZE, 3))
     segmenter = learn_background(empty_shots(rng, wall))
     shifted = cv2.warpAffine(wall, np.array([[1, 0, 0.12], [0, 1, 0]]), SIZE[::-1], borderMode=cv2.BORDER_REPLICATE)
-    assert not (segmenter.rule(shot(rng, shifted)) == 2).any()
+    assert not (segmenter.classifier(shot(rng, shifted)) == 2).any()
 
 
 def test_one_neighbour_is_not_enough(rng):
@@ -196,8 +196,8 @@ def test_colour_that_is_mere_noise_is_left_alone(rng):
 
 
 def test_the_wardrobe_is_of_true_colours(rng):
-    skin = learn_background(empty_shots(rng, scene(rng, (155, 180, 225)))).rule
-    other = learn_background(empty_shots(rng, scene(rng, (225, 180, 155)))).rule
+    skin = learn_background(empty_shots(rng, scene(rng, (155, 180, 225)))).classifier
+    other = learn_background(empty_shots(rng, scene(rng, (225, 180, 155)))).classifier
     assert isinstance(skin, ChannelClassifier)
     assert isinstance(other, ChannelClassifier)
     assert wardrobe_share(skin) < wardrobe_share(other) - 0.03

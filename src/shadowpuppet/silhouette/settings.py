@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from shadowpuppet.settings import checked
+from shadowpuppet.silhouette.classifiers import METHODS
 
-Method = Literal["auto", "brightness", "colour", "both", "averaging", "mog2", "knn"]
+Method = str if TYPE_CHECKING else Literal[("auto", *METHODS)]
 
 
 @checked
