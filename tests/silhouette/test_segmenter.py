@@ -149,6 +149,14 @@ def test_one_neighbour_is_not_enough(rng):
     assert segmenter(image)[52:78, 52:78].all()
 
 
+def test_neighbours_of_a_single_background_picture(rng):
+    """A single sample can be near only once: two must not be asked for, or all is foreground."""
+    wall, mask = scene(rng), figure()
+    segmenter = learn_background([shot(rng, wall)], SilhouetteSettings(method="knn", shadow=False))
+    assert not segmenter(shot(rng, wall)).any()
+    assert overlap(segmenter(shot(rng, dressed(wall, mask))), mask) > 0.9
+
+
 # ---------------------------------------------------------------- the key
 
 

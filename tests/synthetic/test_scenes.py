@@ -265,7 +265,14 @@ def test_the_empty_scene_shows_the_thing_and_its_shadow():
     bare, alone, shaded = (image.astype(int) for image in empty)
     assert (np.abs(alone - bare).max(-1) > 15).mean() > 0.03
     assert (shaded <= alone + 1).all()
-    assert (shaded < 0.8 * alone).any()
+    room = SceneRenderer(with_scene(spec, obstacles=things), view.camera(), np.random.default_rng(0)).room
+    points = room._points(np.stack(np.meshgrid(*map(np.arange, view.size)), -1))[0]
+    lit = Furniture(things).layer(view.camera().centre, nobody(view.camera()).rays, nobody(view.camera()).fine_rays(), LIGHTS)
+    shadow = Furniture(things).shades(points, room.lights[0, :3]) & ~lit.mask
+    dark = (shaded < 0.8 * alone).all(-1)
+    assert shadow.sum() > 40
+    assert dark[shadow].mean() > 0.9
+    assert not (dark & ~grown(shadow, 2)).any()
 
 
 # Other people

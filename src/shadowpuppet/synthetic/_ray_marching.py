@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.jit import compiled
+from shadowpuppet.synthetic.compositing import FAR
 
 PLACED_COLUMNS = 22
-FAR = 1e9
 STEP_SHARE = 0.85
 """Share of the distance bound that a step takes: lofts' distances are first-order estimates."""
 HIT, EDGE_HIT = 2.5e-4, 1e-3

@@ -24,6 +24,11 @@ class Layer(NamedTuple):
     """Distance from the camera along the ray of each pixel's centre, of shape (H, W), metres; `FAR` where it is missed."""
 
     @property
+    def mask(self) -> np.ndarray:
+        """Where the thing is met at pixel centres, of shape (H, W), true or false."""
+        return self.depth < FAR
+
+    @property
     def reach(self) -> Array:
         """The depth, (H, W), also where a thing covers a part of the pixel but not its centre: that of the nearest neighbour."""
         import cv2

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.geometry import Array
+from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.compositing import FAR, Layer
 
 Coordinate = Annotated[float, Field(ge=-10, le=10)]
@@ -18,7 +19,7 @@ MIN_DISTANCE = 0.25
 """Metres that a thing keeps from the person's place."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
+@dataclass(frozen=True, config=STRICT, kw_only=True)
 class Obstacle:
     """A thing that does not move, from the film of the empty scene on."""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.synthetic.compositing import Layer
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import JOINTS
@@ -15,19 +14,6 @@ from shadowpuppet.synthetic.person.surface import GROUPS, MATERIALS, Surface
 
 EDGE_SAMPLES = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
 """Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
-
-
-class Shot(NamedTuple):
-    """What the camera sees of the person alone."""
-
-    mask: np.ndarray
-    """Exact silhouette at pixel centres, of shape (H, W), uint8, 0 or 255."""
-    picture: Array
-    """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
-    alpha: Array
-    """Share of each pixel that the person covers, of shape (H, W)."""
-    depth: Array
-    """Distance along the rays of pixel centres, of shape (H, W), metres; `compositing.FAR` where the person is missed."""
 
 
 class PersonRenderer:
@@ -60,7 +46,7 @@ class PersonRenderer:
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         return _unit(self.camera.rays(grid) @ inverse(self.camera.T_camera_world)[:3, :3].T)
 
-    def draw(self, figure: Figure, index: int) -> Shot:
+    def draw(self, figure: Figure, index: int) -> Layer:
         """The figure's posture `index`."""
         from shadowpuppet.synthetic import _ray_marching
 
@@ -78,7 +64,7 @@ class PersonRenderer:
         _ray_marching.find_surface(*traced, depth, near)
         alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
         _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, EDGE_SAMPLES, picture, alpha)
-        return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha, depth)
+        return Layer(picture, alpha, depth)
 
     def _joins(self, figure: Figure, index: int) -> Array:
         """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""

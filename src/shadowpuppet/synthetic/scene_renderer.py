@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.compositing import Layer, composite, composite_people, visible
+from shadowpuppet.synthetic.compositing import composite, composite_people, visible
 from shadowpuppet.synthetic.furniture import Furniture
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
@@ -95,21 +95,20 @@ class SceneRenderer:
 
     def _lit(self, figure: Figure, index: int, company: bool = False) -> tuple[Array, np.ndarray, np.ndarray, int]:
         """Light, mask, everybody's mask and how much is hidden; `company`: with the bystanders."""
-        shot = self.renderer.draw(figure, index)
+        person = self.renderer.draw(figure, index)
         others = self.others if company else []
         room = self.room.shaded(figure, index, *(other for other, _ in others))
         if not (others or self.things):
-            return shot.picture + (1 - shot.alpha[..., None]) * room, shot.mask, shot.mask, 0
-        person = Layer(shot.picture, shot.alpha, shot.depth)
-        drawn = [renderer.draw(other, index) for other, renderer in others]
-        company_layers = [Layer(other.picture, other.alpha, other.depth) for other in drawn]
-        rest = [*company_layers, *self.things]
+            mask = _mask(person.mask)
+            return person.over(room), mask, mask, 0
+        bystanders = [renderer.draw(other, index) for other, renderer in others]
+        rest = [*bystanders, *self.things]
         seen = visible(person, rest)
         people = seen.copy()
-        for n, layer in enumerate(company_layers):
+        for n, layer in enumerate(bystanders):
             people |= visible(layer, [person, *rest[:n], *rest[n + 1 :]])
-        hidden = int(((shot.mask > 0) & ~seen).sum())
-        return composite_people(room, [person, *company_layers], self.things), _mask(seen), _mask(people), hidden
+        hidden = int((person.mask & ~seen).sum())
+        return composite_people(room, [person, *bystanders], self.things), _mask(seen), _mask(people), hidden
 
     def _exposed(self, light: Array, seconds: float) -> np.ndarray:
         scene = self.spec.scene

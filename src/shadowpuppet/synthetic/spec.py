@@ -11,10 +11,11 @@ from pydantic import Field, PlainValidator, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.furniture import Coordinate, Furniture, Obstacle
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.viewpoint import STRICT, Name, Ring, Viewpoint
+from shadowpuppet.synthetic.viewpoint import Name, Ring, Viewpoint
 from shadowpuppet.synthetic.walls import WallStyle
 
 

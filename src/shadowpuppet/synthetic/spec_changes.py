@@ -11,10 +11,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
-from shadowpuppet.synthetic.viewpoint import STRICT
 from shadowpuppet.synthetic.walls import WallStyle
 
 OCCLUDERS: dict[str, dict[str, float]] = {

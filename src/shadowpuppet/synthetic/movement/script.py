@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.movement.paths import PathName
-from shadowpuppet.synthetic.viewpoint import STRICT
 
 MotionName = Literal[
     "stand", "wave_hands", "bend_aside", "bow_forward", "twist", "reach", "forearms_up", "overhead", "random",

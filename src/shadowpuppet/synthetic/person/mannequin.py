@@ -10,11 +10,12 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
+from shadowpuppet.settings import STRICT
 
 Kind = Literal["woman", "man", "child"]
 
@@ -90,7 +91,7 @@ GROWTH = {
 Factor = Annotated[float, Field(ge=0.7, le=1.4)]
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=STRICT)
 class Mannequin:
     """A person: stature, build, and factors on what the mean person of that stature and build measures."""
 
