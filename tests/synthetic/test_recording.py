@@ -35,7 +35,8 @@ from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, pose
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
-from shadowpuppet.synthetic.recording import Studio, perform
+from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.scene_renderer import SceneRenderer
 from shadowpuppet.video import open_frames, read_image
 
 VIEW = Viewpoint(size=(80, 60))
@@ -277,7 +278,7 @@ def test_all_true_joints_lie_in_the_mask(changes, rng):
     view = Viewpoint(**{"size": (240, 180)} | changes)
     spec = small(body=Mannequin.draw(rng), cameras=(view,), motion=(Gesture(motion="random", seconds=4),))
     _, figure = perform(spec, rng)
-    studio, camera = Studio(spec, view.camera(), rng), view.camera()
+    studio, camera = SceneRenderer(spec, view.camera(), rng), view.camera()
     for index in range(0, len(figure.joints), 6):
         _, mask = studio.take(figure, index)
         pixels = np.rint(camera.project(figure.joints[index])).astype(int)
@@ -297,7 +298,7 @@ def test_the_level_posture_is_symmetric_to_the_last_finger():
 def test_the_room_does_not_shine_through_the_person(rng):
     spec = small(scene=Scene(noise=0, shadow=0))
     _, figure = perform(spec, rng)
-    studio = Studio(spec, VIEW.camera(), rng)
+    studio = SceneRenderer(spec, VIEW.camera(), rng)
     solid = studio.renderer.draw(figure, 5).alpha == 1
     solid = solid & np.roll(solid, 1, 0) & np.roll(solid, -1, 0) & np.roll(solid, 1, 1) & np.roll(solid, -1, 1)
     pictures = []
@@ -310,7 +311,7 @@ def test_the_room_does_not_shine_through_the_person(rng):
 def test_pictures_show_the_person_where_the_mask_is(rng):
     spec = small(scene=Scene(noise=0, shadow=0, clothing=3, room=4))
     _, figure = perform(spec, rng)
-    studio = Studio(spec, VIEW.camera(), rng)
+    studio = SceneRenderer(spec, VIEW.camera(), rng)
     shot = studio.renderer.draw(figure, 6)
     mask = shot.mask == 255
     assert ((shot.alpha > 0.5) == mask).mean() > 0.985
@@ -327,7 +328,7 @@ def test_pictures_show_the_person_where_the_mask_is(rng):
 def test_noise_and_shadow_do_what_they_say(rng):
     spec = small(scene=Scene(noise=6, shadow=0.5))
     _, figure = perform(spec, rng)
-    studio = Studio(spec, VIEW.camera(), rng)
+    studio = SceneRenderer(spec, VIEW.camera(), rng)
     two = np.stack([studio.empty(), studio.empty()]).astype(float)
     assert 5 < np.diff(two, axis=0).std() / np.sqrt(2) < 8
     clear = studio.room.picture
@@ -340,7 +341,7 @@ def test_noise_and_shadow_do_what_they_say(rng):
 def test_pictures_are_the_same_whatever_the_number_of_threads(rng):
     spec = small()
     _, figure = perform(spec, rng)
-    films = [list(Studio(spec, VIEW.camera(), np.random.default_rng(1)).film(figure, workers)) for workers in (1, 3)]
+    films = [list(SceneRenderer(spec, VIEW.camera(), np.random.default_rng(1)).film(figure, workers)) for workers in (1, 3)]
     for a, b in zip(*films):
         np.testing.assert_array_equal(a.image, b.image)
         np.testing.assert_array_equal(a.mask, b.mask)

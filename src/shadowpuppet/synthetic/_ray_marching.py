@@ -244,19 +244,8 @@ def colour_surface(
                     continue
                 if code[p, 0] != group:
                     group = code[p, 0]
-                    material, light = shade(
-                        eye[0] + t * rx,
-                        eye[1] + t * ry,
-                        eye[2] + t * rz,
-                        p,
-                        lists[tile],
-                        placed,
-                        table,
-                        code,
-                        joints,
-                        lights,
-                        stripes,
-                    )
+                    material, light = shade(eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz, p, lists[tile], placed, table, code, joints,
+                                            lights, stripes)
                 alpha[v, u] += 1.0 / count
                 for c in range(3):
                     picture[v, u, c] += colours[material, c] * light / count

@@ -59,21 +59,12 @@ def proving_ground() -> tuple[Spec, ...]:
     return tuple(_proof(n, *row) for n, row in enumerate(PROVING))
 
 
-def _proof(
-    n: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float, turn: float
-) -> Spec:
+def _proof(n: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float, turn: float) -> Spec:
     body = Mannequin.draw(np.random.default_rng(seed), kind)
     height = 0.9 * body.stature + distance * float(np.tan(np.radians(pitch)))
     view = Viewpoint(fov_deg=fov, height=height, distance=distance, pitch_deg=pitch)
-    return Spec(
-        name=name,
-        body=body,
-        motion=parse_gestures(gestures),
-        cameras=(view,),
-        scene=Scene(clothing=n, room=n, noise=noise),
-        turn_deg=turn,
-        seed=(0, n),
-    )
+    return Spec(name=name, body=body, motion=parse_gestures(gestures), cameras=(view,), scene=Scene(clothing=n, room=n, noise=noise),
+                turn_deg=turn, seed=(0, n))
 
 
 def _person(kind: Kind, seed: int, **told: float) -> Mannequin:

@@ -22,11 +22,7 @@ from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
 
 Progress = Callable[[int, int], None]
 
-REFERENCES = {
-    "front_t_pose": LEVEL,
-    "side_arms_hanging": HANGING_ARMS | trunk(turn=90),
-    "front_arms_t_pose": LEVEL,
-}
+REFERENCES = {"front_t_pose": LEVEL, "side_arms_hanging": HANGING_ARMS | trunk(turn=90), "front_arms_t_pose": LEVEL}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
 
 
@@ -163,10 +159,7 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
         "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"),
         "",
     ]
-    lines = [
-        "\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)])
-        for n, (t, row) in enumerate(zip(times, rows), 1)
-    ]
+    lines = ["\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)]) for n, (t, row) in enumerate(zip(times, rows), 1)]
     _write(trc, [*head, *lines])
 
 
@@ -209,6 +202,4 @@ def _folders(folder: Path, *names: str) -> None:
         for name in names or ("",):
             (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RecordingError(
-            f"{folder}: the recording cannot be written there ({(error.strerror or str(error)).lower()})"
-        ) from None
+        raise RecordingError(f"{folder}: the recording cannot be written there ({(error.strerror or str(error)).lower()})") from None

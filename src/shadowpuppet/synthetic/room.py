@@ -23,12 +23,7 @@ SHADOW_PARTS = (
     *(
         (f"{side}_{a}", f"{side}_{b}", radius)
         for side in ("left", "right")
-        for a, b, radius in (
-            ("shoulder", "elbow", 0.05),
-            ("elbow", "wrist", 0.04),
-            ("hip", "knee", 0.08),
-            ("knee", "ankle", 0.055),
-        )
+        for a, b, radius in (("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.055))
     ),
 )
 """What casts the shadow: round sticks between joints, and their radius (m)."""
@@ -40,15 +35,8 @@ SHADOW_CELL = 4
 class Room:
     """A floor at z = 0, walls around, one of them behind the person, with their texture, and two lamps; all drawn from `rng`."""
 
-    def __init__(
-        self,
-        camera: Camera,
-        rng: np.random.Generator,
-        shadow: float,
-        least: float = 0.0,
-        background: walls.WallStyle = "room",
-        furniture: Furniture | None = None,
-    ) -> None:
+    def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float, least: float = 0.0, background: walls.WallStyle = "room",
+                 furniture: Furniture | None = None) -> None:
         """shadow: how dark shadows are, 0 to 1; least: the wall is at least so far behind the person, metres."""
         self.camera, self.shadow = camera, shadow
         self.distance = max(rng.uniform(1.2, 3.5), least)

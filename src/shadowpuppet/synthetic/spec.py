@@ -168,15 +168,8 @@ def spec_values(spec: Spec) -> dict[str, Any]:
     return values
 
 
-TABLES: dict[str, Any] = {
-    "body": Mannequin,
-    "motion": Gesture,
-    "cameras": Viewpoint,
-    "ring": Ring,
-    "scene": Scene,
-    "obstacles": Obstacle,
-    "bystanders": Bystander,
-}
+TABLES: dict[str, Any] = {"body": Mannequin, "motion": Gesture, "cameras": Viewpoint, "ring": Ring, "scene": Scene, "obstacles": Obstacle,
+                          "bystanders": Bystander}
 """The tables of a spec, by name."""
 
 

@@ -17,12 +17,8 @@ from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.walls import WallStyle
 
-OCCLUDERS: dict[str, dict[str, float]] = {
-    "table": {"ahead": 0.75},
-    "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
-    "pillar": {"ahead": 0.9, "left": 0.2},
-    "cabinet": {"ahead": 0.7, "left": 0.35},
-}
+OCCLUDERS: dict[str, dict[str, float]] = {"table": {"ahead": 0.75}, "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
+                                          "pillar": {"ahead": 0.9, "left": 0.2}, "cabinet": {"ahead": 0.7, "left": 0.35}}
 """Where `occluder` puts things."""
 SECOND_PERSONS: dict[str, dict[str, Any]] = {
     "behind": {"ahead": -1.0, "left": -0.6},

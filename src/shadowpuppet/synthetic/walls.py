@@ -114,7 +114,5 @@ def fractal_noise(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4
         fu, fv = u - i, v - j
         fu, fv = fu * fu * (3 - 2 * fu), fv * fv * (3 - 2 * fv)
         corner = [lattice[(i + a) % 64, (j + b) % 64] for a in (0, 1) for b in (0, 1)]
-        total += (
-            (corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu
-        ) * 0.55**octave
+        total += ((corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu) * 0.55**octave
     return total

@@ -144,12 +144,8 @@ def random_body(body: Mannequin, seconds: float, rng: np.random.Generator) -> Ke
     keys = random_keys(seconds, rng)
     t = np.array([when for when, _ in keys])
     drop, aside, ahead, turn = (band_noise(t, highest, rng) for highest in (0.35, 0.3, 0.3, 0.25))
-    own = {
-        "drop": 0.11 * (1 + np.tanh(drop)),
-        "aside": 0.10 * np.tanh(aside),
-        "ahead": 0.05 * np.tanh(ahead),
-        "turn": np.radians(18) * np.tanh(turn),
-    }
+    own = {"drop": 0.11 * (1 + np.tanh(drop)), "aside": 0.10 * np.tanh(aside), "ahead": 0.05 * np.tanh(ahead),
+           "turn": np.radians(18) * np.tanh(turn)}
     return KeyframeMotion(body, seconds, [(when, posture | {name: float(values[n]) for name, values in own.items()})
                                for n, (when, posture) in enumerate(keys)])  # fmt: skip
 

@@ -44,16 +44,8 @@ class Footprints(NamedTuple):
 class Walk:
     """Going along a path from standing to standing."""
 
-    def __init__(
-        self,
-        body: Mannequin,
-        seconds: float,
-        rng: np.random.Generator,
-        jogging: bool = False,
-        speed: float | None = None,
-        path: PathName = "circle",
-        size: float = 1.2,
-    ) -> None:
+    def __init__(self, body: Mannequin, seconds: float, rng: np.random.Generator, jogging: bool = False, speed: float | None = None,
+                 path: PathName = "circle", size: float = 1.2) -> None:
         """speed: m/s, or None for a comfortable one; path, size: see `Path`."""
         hip = body.rest()["pelvis"][2]
         if speed is None:
@@ -151,16 +143,10 @@ class Walk:
         rest = table.copy()
         for name, value in STANDING.items():
             rest[:, of[name]] = value
-        values = {
-            "pelvis_bow": np.radians(gait.bow) + 0 * t,
-            "pelvis_side": tilt,
-            "pelvis_twist": turn,
-            "spine_bow": lean + np.radians(1.0) * np.cos(4 * np.pi * phase),
-            "spine_side": -0.85 * tilt,
-            "spine_twist": -(1.9 if self.jogging else 1.7) * turn,
-            "head_turn": 0.75 * turn,
-            "head_nod": -0.8 * lean - 0.5 * np.radians(gait.bow) + 0 * t,
-        }
+        values = {"pelvis_bow": np.radians(gait.bow) + 0 * t, "pelvis_side": tilt, "pelvis_twist": turn,
+                  "spine_bow": lean + np.radians(1.0) * np.cos(4 * np.pi * phase), "spine_side": -0.85 * tilt,
+                  "spine_twist": -(1.9 if self.jogging else 1.7) * turn, "head_turn": 0.75 * turn,
+                  "head_nod": -0.8 * lean - 0.5 * np.radians(gait.bow) + 0 * t}
         for n, side in enumerate(SIDES):
             values |= {f"{side}_{name}": value for name, value in self._arm(phase - 0.5 * n).items()}
         for name, value in values.items():

@@ -77,9 +77,7 @@ def _swings(seconds: float, rng: np.random.Generator, ends: Sequence[Posture], b
     each = (seconds - 1.2) / count
     for n in range(count):
         vary = rng.uniform(0.85, 1.1)
-        end = {
-            name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()
-        }
+        end = {name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()}
         keys.append((0.8 + (n + rng.uniform(0.45, 0.6)) * each, between | end))
     return [*keys, (seconds - 0.3, between)]
 
@@ -106,13 +104,7 @@ def reach(seconds: float, rng: np.random.Generator) -> Keys:
     arms = (left, right, both)[-int(np.clip(seconds / 1.9, 1, 3)) :]
     each, keys = seconds / len(arms), []
     for n, chosen in enumerate(arms):
-        aim = chosen(
-            front=rng.uniform(74, 90),
-            side=rng.uniform(-4, 14),
-            elbow=rng.uniform(4, 22),
-            supination=rng.uniform(0, 40),
-            curl=15,
-        )
+        aim = chosen(front=rng.uniform(74, 90), side=rng.uniform(-4, 14), elbow=rng.uniform(4, 22), supination=rng.uniform(0, 40), curl=15)
         turn = trunk(spine_twist={left: -8, right: 8, both: 0}[chosen], spine_bow=3)
         keys += [(each * (n + 0.44), aim | turn), (each * (n + 0.62), {**aim, **turn}), (each * (n + 0.98), {})]
     return keys
@@ -129,24 +121,10 @@ def overhead(seconds: float, rng: np.random.Generator) -> Keys:
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
-RANDOM_LIMITS = {
-    "spine_bow": (-5, 24),
-    "spine_side": (-17, 17),
-    "spine_twist": (-26, 26),
-    "pelvis_bow": (-2, 12),
-    "pelvis_twist": (-10, 10),
-    "head_nod": (-15, 22),
-    "head_tilt": (-10, 10),
-    "head_turn": (-35, 35),
-    "side": (2, 130),
-    "front": (-18, 100),
-    "roll": (-25, 75),
-    "elbow": (6, 125),
-    "supination": (-30, 70),
-    "wrist_flex": (-30, 35),
-    "wrist_side": (-12, 15),
-    "curl": (0, 40),
-}
+RANDOM_LIMITS = {"spine_bow": (-5, 24), "spine_side": (-17, 17), "spine_twist": (-26, 26), "pelvis_bow": (-2, 12),
+                 "pelvis_twist": (-10, 10), "head_nod": (-15, 22), "head_tilt": (-10, 10), "head_turn": (-35, 35), "side": (2, 130),
+                 "front": (-18, 100), "roll": (-25, 75), "elbow": (6, 125), "supination": (-30, 70), "wrist_flex": (-30, 35),
+                 "wrist_side": (-12, 15), "curl": (0, 40)}
 """Ranges of `random` motion, degrees: inside what healthy adults reach (Boone & Azen 1979)."""
 
 
@@ -181,9 +159,7 @@ def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
         for side in ("left", "right"):
             elbow, wrist, hand = (joint[f"{side}_{name}"] for name in ("elbow", "wrist", "hand"))
             points = [elbow + 0.5 * (wrist - elbow), wrist, wrist + 4.0 * (hand - wrist)]
-            inside = [
-                np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points
-            ]
+            inside = [np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points]
             excess = np.maximum(np.max(inside, 0), 0)
             push = np.maximum(excess, np.convolve(np.pad(excess, 2, "edge"), [0.1, 0.25, 0.3, 0.25, 0.1], "valid"))
             table[:, CHANNELS.index(f"{side}_side")] += 1.0 * push

@@ -55,15 +55,8 @@ class Hop(NamedTuple):
 class KeyframeMotion:
     """Key postures over stepping feet."""
 
-    def __init__(
-        self,
-        body: Mannequin,
-        seconds: float,
-        keys: Keys,
-        steps: Sequence[Step] = (),
-        hops: Sequence[Hop] = (),
-        rounding: float = 0.16,
-    ) -> None:
+    def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
+                 rounding: float = 0.16) -> None:
         """keys: of `CHANNELS` and `GROUND_CHANNELS`, between 0 and `seconds`; others stand; `rounding`: see `interpolate_keys`."""
         self.body, self.seconds, self.hops, self.rounding = body, seconds, tuple(hops), rounding
         self.leg, self.sole = body.length("thigh") + body.length("shank"), Sole.of(body)

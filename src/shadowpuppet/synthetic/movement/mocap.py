@@ -97,11 +97,8 @@ def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
     return _on_the_floor(body, assemble_figure(joint, frame, np.full((len(table.times), 2), 0.35)))
 
 
-TRUNK_AXES = {
-    "pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"),
-    "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
-    "head": ("head", "crown", "crown", "face"),
-}
+TRUNK_AXES = {"pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"), "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
+              "head": ("head", "crown", "crown", "face")}
 """How a segment of the trunk is turned: up from the first joint to the second; from the third to the fourth, left or ahead."""
 
 
@@ -132,18 +129,11 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
     wrist = elbow + bare @ (at["wrist"] - at["elbow"])
     joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist}
     joint[f"{side}_hand"] = wrist + hand @ (at["hand"] - at["wrist"])
-    frame |= {
-        f"{side}_clavicle": (clavicle, sternum),
-        f"{side}_upper_arm": (upper_arm, shoulder),
-        f"{side}_forearm": (forearm, elbow),
-        f"{side}_hand": (hand, wrist),
-        f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], np.zeros(len(wrist))),
-    }
+    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper_arm, shoulder), f"{side}_forearm": (forearm, elbow),
+              f"{side}_hand": (hand, wrist), f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], np.zeros(len(wrist)))}
 
 
-def _leg(
-    body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict
-) -> None:
+def _leg(body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict) -> None:
     """Thigh, shank, foot, toes."""
     hip, knee, ankle = (p[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))
     ahead = _steady_normals(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
@@ -155,12 +145,8 @@ def _leg(
     joint[f"{side}_knee"] = joint[f"{side}_hip"] - thigh @ np.array([0, 0, body.length("thigh")])
     joint[f"{side}_ankle"] = joint[f"{side}_knee"] - shank @ np.array([0, 0, body.length("shank")])
     at = joint[f"{side}_ankle"]
-    frame |= {
-        f"{side}_thigh": (thigh, joint[f"{side}_hip"]),
-        f"{side}_shank": (shank, joint[f"{side}_knee"]),
-        f"{side}_foot": (foot, at),
-        f"{side}_toes": (foot @ rotations(-bend, 0 * bend, 0 * bend), at + foot @ body.ball()),
-    }
+    frame |= {f"{side}_thigh": (thigh, joint[f"{side}_hip"]), f"{side}_shank": (shank, joint[f"{side}_knee"]), f"{side}_foot": (foot, at),
+              f"{side}_toes": (foot @ rotations(-bend, 0 * bend, 0 * bend), at + foot @ body.ball())}
 
 
 def _bend(p: Points, side: str) -> Array:

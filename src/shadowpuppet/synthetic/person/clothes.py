@@ -32,19 +32,8 @@ class Clothes:
 
         tone, shade = rng.uniform(0, 1), rng.uniform(0.3, 1.4)
         skin = tuple(a + tone * (b - a) for a, b in zip((0.86, 0.66, 0.55), (0.42, 0.27, 0.20)))
-        colours = {
-            "skin": skin,
-            "hair": (0.30 * shade, 0.20 * shade, 0.13 * shade),
-            "eyes": (0.12, 0.10, 0.09),
-            "lips": (0.85 * skin[0], 0.6 * skin[1], 0.6 * skin[2]),
-            "shirt": colour(0.25, 0.85, 0.8),
-            "trousers": colour(0.1, 0.45, 0.5),
-            "shoes": colour(0.1, 0.4, 0.3),
-        }
-        return cls(
-            rng.uniform(0.006, 0.022),
-            float(rng.choice([0.28, 0.36, 0.9])),
-            rng.uniform(0.004, 0.022),
-            float(rng.choice([0, 0, 0.35])),
-            colours,
-        )
+        colours = {"skin": skin, "hair": (0.30 * shade, 0.20 * shade, 0.13 * shade), "eyes": (0.12, 0.10, 0.09),
+                   "lips": (0.85 * skin[0], 0.6 * skin[1], 0.6 * skin[2]), "shirt": colour(0.25, 0.85, 0.8),
+                   "trousers": colour(0.1, 0.45, 0.5), "shoes": colour(0.1, 0.4, 0.3)}
+        return cls(rng.uniform(0.006, 0.022), float(rng.choice([0.28, 0.36, 0.9])), rng.uniform(0.004, 0.022),
+                   float(rng.choice([0, 0, 0.35])), colours)

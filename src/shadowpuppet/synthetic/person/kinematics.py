@@ -10,21 +10,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.person.mannequin import HAND_POINT, JOINTS, KNUCKLES, Mannequin
 
 ARM = ("side", "front", "roll", "elbow", "supination", "wrist_flex", "wrist_side", "shrug", "protract", "curl")
-CHANNELS = (
-    "turn",
-    "sway_x",
-    "sway_y",
-    "pelvis_bow",
-    "pelvis_side",
-    "pelvis_twist",
-    "spine_bow",
-    "spine_side",
-    "spine_twist",
-    "head_nod",
-    "head_tilt",
-    "head_turn",
-    *(f"{side}_{name}" for side in ("left", "right") for name in ARM),
-)
+CHANNELS = ("turn", "sway_x", "sway_y", "pelvis_bow", "pelvis_side", "pelvis_twist", "spine_bow", "spine_side", "spine_twist", "head_nod",
+            "head_tilt", "head_turn", *(f"{side}_{name}" for side in ("left", "right") for name in ARM))
 """Columns of a posture array, rad (sway: m; curl: 0 open, 1 fist).
 
 `*_bow`, `*_side`, `*_twist` are components of a joint's rotation vector: forward, to the person's left, turning left. An upper
@@ -37,11 +24,7 @@ SEGMENTS = (
     "thorax",
     "neck",
     "head",
-    *(
-        f"{side}_{name}"
-        for side in ("left", "right")
-        for name in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-    ),
+    *(f"{side}_{name}" for side in ("left", "right") for name in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")),
     "left_toes",
     "right_toes",
     "left_fingers",
@@ -144,12 +127,8 @@ def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.
 
 def assemble_figure(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
     """A `Figure` of joints (T, 3) by name and of segments' frames and origins by name; fingers bent by `curl` (T, 2)."""
-    return Figure(
-        np.stack([joint[name] for name in JOINTS], 1),
-        np.stack([frame[name][0] for name in SEGMENTS], 1),
-        np.stack([frame[name][1] for name in SEGMENTS], 1),
-        curl,
-    )
+    return Figure(np.stack([joint[name] for name in JOINTS], 1), np.stack([frame[name][0] for name in SEGMENTS], 1),
+                  np.stack([frame[name][1] for name in SEGMENTS], 1), curl)
 
 
 def _yaw(q: dict[str, Array]) -> Array:
@@ -157,9 +136,7 @@ def _yaw(q: dict[str, Array]) -> Array:
     return rotations(0 * q["turn"], 0 * q["turn"], q["turn"])
 
 
-def _arm(
-    rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict
-) -> None:
+def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
     """Clavicle, upper arm, forearm and hand of one side.
 
     The clavicle rises by 0.13 of what the arm is raised beyond 25 degrees and protracts by 0.12 of its forward swing (after
@@ -184,19 +161,10 @@ def _arm(
     shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
     elbow = shoulder + upper @ (at["elbow"] - at["shoulder"])
     wrist = elbow + fore @ (at["wrist"] - at["elbow"])
-    joint |= {
-        f"{side}_shoulder": shoulder,
-        f"{side}_elbow": elbow,
-        f"{side}_wrist": wrist,
-        f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"]),
-    }
-    frame |= {
-        f"{side}_clavicle": (clavicle, sternum),
-        f"{side}_upper_arm": (upper, shoulder),
-        f"{side}_forearm": (half, elbow),
-        f"{side}_hand": (hand, wrist),
-        f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], arm["curl"]),
-    }
+    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist,
+              f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"])}
+    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (half, elbow),
+              f"{side}_hand": (hand, wrist), f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], arm["curl"])}
 
 
 def fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
@@ -223,12 +191,8 @@ def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: di
         knee, ahead = _bent(hip, ankle, ahead, thigh, shank)
         toes = foot @ rotations(-stance.toes[:, n], np.zeros(1), np.zeros(1))
         joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
-        frame |= {
-            f"{side}_thigh": (_upright(hip - knee, ahead), hip),
-            f"{side}_shank": (_upright(knee - ankle, ahead), knee),
-            f"{side}_foot": (foot, ankle),
-            f"{side}_toes": (toes, ankle + foot @ body.ball()),
-        }
+        frame |= {f"{side}_thigh": (_upright(hip - knee, ahead), hip), f"{side}_shank": (_upright(knee - ankle, ahead), knee),
+                  f"{side}_foot": (foot, ankle), f"{side}_toes": (toes, ankle + foot @ body.ball())}
     return centre
 
 

@@ -86,17 +86,11 @@ class Surface(NamedTuple):
     def of(cls, lofts: list[Loft]) -> Surface:
         """The arrays of `lofts`."""
         lofts = sorted(lofts, key=lambda loft: GROUPS.index(loft.group))
-        return cls(
-            segment=np.array([SEGMENTS.index(p.segment) for p in lofts]),
-            start=np.stack([p.start for p in lofts]),
-            frame=np.stack([p.frame for p in lofts]),
-            table=np.stack([p.sampled() for p in lofts]),
-            length=np.array([np.ptp(p.stations[:, 0]) for p in lofts]),
-            caps=np.array([p.caps for p in lofts]),
-            blend=np.array([p.blend for p in lofts]),
-            change=np.array([p.change for p in lofts]),
-            code=np.array([(GROUPS.index(p.group), *map(MATERIALS.index, p.materials)) for p in lofts]),
-        )
+        return cls(segment=np.array([SEGMENTS.index(p.segment) for p in lofts]), start=np.stack([p.start for p in lofts]),
+                   frame=np.stack([p.frame for p in lofts]), table=np.stack([p.sampled() for p in lofts]),
+                   length=np.array([np.ptp(p.stations[:, 0]) for p in lofts]), caps=np.array([p.caps for p in lofts]),
+                   blend=np.array([p.blend for p in lofts]), change=np.array([p.change for p in lofts]),
+                   code=np.array([(GROUPS.index(p.group), *map(MATERIALS.index, p.materials)) for p in lofts]))
 
     @property
     def radius(self) -> Array:

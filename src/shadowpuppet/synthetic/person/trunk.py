@@ -45,16 +45,8 @@ def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
     for segment, joint in (("pelvis", "pelvis"), ("abdomen", "lumbar"), ("thorax", "thoracic")):
         start = np.array([0, 0, rows[segment][0][0] * H]) - joints[joint]
         parts.append(
-            Loft(
-                segment,
-                start,
-                np.eye(3),
-                stations_of(rows[segment], H),
-                (0.04, 0.03),
-                0.03,
-                ("trousers" if segment == "pelvis" else "shirt", "shirt"),
-                (0.545 - crotch) * H,
-            )
+            Loft(segment, start, np.eye(3), stations_of(rows[segment], H), (0.04, 0.03), 0.03,
+                 ("trousers" if segment == "pelvis" else "shirt", "shirt"), (0.545 - crotch) * H)
         )
     return parts
 
@@ -77,15 +69,7 @@ def shoulders(body: Mannequin, clothes: Clothes) -> list[Loft]:
         inside = np.array([0.046 * H, -0.56 * breast, 0.715 * H])
         rows = [(0, 0.070 * size, 0.068 * size), (1, 0.051 * size, 0.049 * size)]
         left.append(
-            loft_between(
-                "thorax",
-                joints["thoracic"],
-                inside,
-                inside + np.array([0.008, -0.024, -0.006]),
-                rows,
-                caps=(0.03, 0.026),
-                blend=0.06,
-                **shirt,
-            )
+            loft_between("thorax", joints["thoracic"], inside, inside + np.array([0.008, -0.024, -0.006]), rows, caps=(0.03, 0.026),
+                         blend=0.06, **shirt)
         )
     return [*left, *(loft.mirrored() for loft in left)]
