@@ -1,4 +1,4 @@
-"""From labelled pixels to one person: specks and small holes removed, the largest part kept, the outline drawn by contrast."""
+"""From labelled pixels to one person: specks removed, the largest part kept, the outline placed by contrast, small holes filled."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfil
 Window = tuple[slice, slice]
 """Rows and columns."""
 MIN_PART_SHARE = 0.02
-"""Least share of the largest part's pixels that another part has which belongs to it: a hand..."""
+"""Least size, over the largest part's, of another part that belongs to the person: a hand."""
 MAX_PART_GAP = 0.06
-"""... and how near it must be, over the root of the largest part's area (half a neck)."""
+"""Greatest distance of such a part, over the root of the largest part's area: half a neck."""
 MAX_HOLE_SHARE = 0.004
 """Holes of up to this share of the person's area are filled."""
 
 
 def clean(label: Labels, contrast: Callable[[Window], Contrast], outline: EdgeProfile) -> Labels:
-    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely); empty where nobody is."""
+    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely); empty if there is none."""
     mask = coarse_person(label)
     out = np.zeros_like(mask)
     if mask.any():
@@ -31,7 +31,7 @@ def clean(label: Labels, contrast: Callable[[Window], Contrast], outline: EdgePr
 
 
 def coarse_person(label: Labels) -> Labels:
-    """Pixels labelled 1 or 2, without specks, that hang together with the most that are labelled 2."""
+    """The connected part, without specks, with the most pixels labelled 2."""
     import cv2
 
     likely = cv2.medianBlur((label > 0).astype(np.uint8), 3)
@@ -43,9 +43,9 @@ def coarse_person(label: Labels) -> Labels:
 
 
 def main_part(mask: Labels, sure: NDArray[np.bool_]) -> Labels:
-    """The connected part with the most `sure` pixels, and parts that nearly touch it, as a head does where the neck is lost.
+    """The connected part with the most `sure` pixels, and parts that nearly touch it, such as a head if the neck is lost.
 
-    Empty where no pixel is sure.
+    Empty if no pixel is sure.
     """
     import cv2
 
@@ -67,7 +67,7 @@ def main_part(mask: Labels, sure: NDArray[np.bool_]) -> Labels:
 
 
 def bounding_window(mask: Labels, margin: int) -> Window:
-    """The box around what is set, with a margin (pixels)."""
+    """Bounding box of the set pixels, with a margin (pixels)."""
     import cv2
 
     x, y, width, height = cv2.boundingRect(mask)
@@ -75,10 +75,10 @@ def bounding_window(mask: Labels, margin: int) -> Window:
 
 
 def fill_small_holes(mask: Labels) -> Labels:
-    """The mask with its small holes filled; what touches the border is no hole."""
+    """The mask with its small holes filled; background that touches the border is no hole."""
     import cv2
 
-    # Of OpenCV's functions the one that counts pixels too takes ten times as long.
+    # OpenCV's function that counts pixels as well takes ten times as long.
     _, labels = cv2.connectedComponents(1 - mask, connectivity=4)
     parts = np.asarray(labels, np.intp)
     filled = np.bincount(parts.ravel()) <= MAX_HOLE_SHARE * np.count_nonzero(mask)

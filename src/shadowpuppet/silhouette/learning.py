@@ -1,4 +1,4 @@
-"""From pictures of the empty scene, and some of the film, to a segmenter."""
+"""From pictures of the empty scene, and some frames of the film, to a segmenter."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 DARKEST_SHADOW = 0.5
-"""Least share of its light that a background keeps in a shadow; dark clothes are darker."""
+"""Least share of its light that a background keeps in shadow; dark clothes are darker."""
 COLOUR_FLOOR = 0.75
-"""Floor under the standard deviation of colours over that of brightness: codecs average colours over four pixels."""
+"""Noise floor of colours over that of brightness: codecs average colours over four pixels."""
 NOISE_TAIL_FACTOR = 1.8
-"""Standard deviation assumed over the film's own: errors of compression have longer tails than a normal distribution."""
+"""Factor on the film's measured noise: compression errors have longer tails than a normal distribution."""
 FILM_SAMPLE = 12
-"""Frames (to twice as many) of the film in which its noise and the blur of its outlines are measured."""
+"""Number of frames (at most twice as many) in which the film's noise and the blur of its outlines are measured."""
 MIN_EDGE_CONTRAST = 1.5
-"""Contrast on an outline, over that of a pixel that may be foreground."""
+"""Least contrast on an outline, over that of a pixel that may be foreground."""
 EDGE_JITTER = 0.05
-"""Standard deviation added at the background's own edges, over the change of its value across a pixel: cameras tremble."""
+"""Standard deviation added at the background's edges, over the change of its value across a pixel: cameras tremble."""
 MAX_GREY_CHROMA = 2
-"""Grey levels by which colours may stray in a film without colour."""
+"""Greatest deviation of colours from neutral in a film without colour, grey levels."""
 
 
 def learn_background(images: Iterable[Image], settings: SilhouetteSettings | None = None, *,
@@ -94,11 +94,11 @@ def _choose(background: Background, frames: list[Image], channels: ChannelClassi
 
 
 def _coloured(background: Background, frames: list[Image]) -> bool:
-    """Whether any colour is seen anywhere; pictures of three equal channels are grey."""
+    """Whether there is colour anywhere; pictures of three equal channels are grey."""
     if not background.colour:
         return False
-    seen = [background.mean, *(scene.to_planes(f) for f in frames)]
-    return any(np.abs(planes[::2, ::2, 1:].astype(np.float32) - 128).max() > MAX_GREY_CHROMA for planes in seen)
+    samples = [background.mean, *(scene.to_planes(f) for f in frames)]
+    return any(np.abs(planes[::2, ::2, 1:].astype(np.float32) - 128).max() > MAX_GREY_CHROMA for planes in samples)
 
 
 def _outline_width(segmenter: Segmenter, frames: list[Image]) -> int:

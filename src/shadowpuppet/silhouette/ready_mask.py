@@ -1,4 +1,4 @@
-"""Silhouettes that somebody else has made."""
+"""Silhouettes made by other programs."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from shadowpuppet.errors import SilhouetteError
 
 THRESHOLD = 128
-"""From this value on a pixel is the person's."""
+"""Least value of the person's pixels."""
 MAX_GREY_SHARE = 0.1
-"""Share of pixels that may be neither dark nor bright: smooth outlines and compression."""
+"""Greatest share of pixels neither dark nor bright: smooth outlines and compression."""
 
 
 def ready_mask(image: NDArray[np.uint8] | NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A silhouette (H, W) from a picture (H, W), or (H, W, 3) of equal channels, dark outside and bright (from 128 on) inside.
+    """A mask (H, W) from a picture (H, W), or (H, W, 3) of equal channels, dark outside and bright (128 or more) inside the person.
 
     Raises `SilhouetteError` for a picture that is no silhouette.
     """

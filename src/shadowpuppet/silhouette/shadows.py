@@ -1,8 +1,8 @@
-"""Dark skin or clothes before a background of the same hue, told from that background in shadow.
+"""Distinguishes dark skin or clothes from a shadow on a background of the same hue.
 
-Pixel by pixel they are alike: less light, the same colour. Part by part they are not. A limb hangs broadly together with the rest of the
-person, ends at an edge as sharp as the film shows edges, and is shaded as round things are, or slightly of another hue; a shadow fades
-out, touches the person at the feet, or lies evenly on what it falls on.
+Single pixels are alike: less light, the same colour. Connected parts differ. A limb is broadly connected to the rest of the person, ends
+at an edge as sharp as the film shows edges, and is shaded like a round object or of a slightly different hue. A shadow fades out,
+touches the person at the feet, or darkens its surface evenly.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ if TYPE_CHECKING:
     from shadowpuppet.silhouette.boundary import Labels
 
 MAYBE_SHADOW = 3
-"""The label of pixels that may be either."""
+"""Label of pixels that may be either."""
 MAX_SHADE = 0.92
-"""Share of its light that a background must have lost some of for the question to be asked: shadows' faint borders have more."""
+"""Share of the background's light below which a pixel gets that label: faint borders of shadows have more."""
 MIN_PART_PIXELS = 12
-"""Pixels that a part must have; smaller ones are shadow, and closed or filled if they lie in a person."""
+"""Least size of a limb, pixels; smaller parts are shadow, and closed or filled if they lie inside a person."""
 MAX_LIMB_LIGHT = 0.8
-"""Share of the light that a limb has at most. Soft shadows in well-lit rooms leave more."""
+"""Greatest share of the background's light in a limb. Soft shadows in well-lit rooms leave more."""
 NECK_CONTACT, BROAD_CONTACT, ENCLOSED_CONTACT = 0.1, 0.35, 0.7
-"""Share of a limb's edge that lies along the rest of the person: as that of a head at the neck; as that of most; and from which on nothing
-is asked of the rest of the edge."""
+"""Share of a part's edge along the rest of the person: that of a head at the neck; that of most limbs; and the share from which on the
+rest of the edge does not matter."""
 SHARP_EDGE, VERY_SHARP_EDGE = 0.3, 0.5
-"""Share of the lost light that is there again across a sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
+"""Share of the lost light regained across a sharp, and a very sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
 MAX_EVEN_SPREAD, MAX_NEUTRAL_HUE, MIN_UNEVEN_SPREAD = 0.6, 0.4, 1.0
-"""Standard deviation of brightness, and difference of hue, both over the standard deviation assumed, under which a part is only
-background with less light; and the deviation from which on it surely is not."""
+"""Standard deviation of brightness and difference of hue, over the assumed standard deviation, below which a part is only darkened
+background; and the deviation of brightness from which on it surely is a limb."""
 OUTWARD_STEP, INWARD_STEP = 2, 1
-"""Pixels from an edge between which light is compared across it."""
+"""Distances from an edge, pixels, between which light is compared."""
 
 
 def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats) -> Labels:
-    """Labels (H, W) in which those that are `MAYBE_SHADOW` have become 1, a person's perhaps, or 0, background.
+    """Labels (H, W) in which `MAYBE_SHADOW` is replaced by 1, perhaps a person, or 0, background.
 
-    `planes`, `mean` and `inverse_sigma` are (H, W, 3): smoothed Y, Cr, Cb, the background's, and one over its standard deviation.
+    planes, mean, inverse_sigma: smoothed Y, Cr, Cb of frame and background and the inverse standard deviation, of shape (H, W, 3).
     """
     import cv2
 
@@ -60,7 +60,7 @@ def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: F
 
 
 def _limbs(sums: np.ndarray) -> Labels:
-    """Which of the parts (K, 11) that `_part_sums` measured are a person's."""
+    """Which parts are limbs, of shape (K,); sums: `_part_sums` (K, 11)."""
     size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
@@ -76,9 +76,9 @@ def _limbs(sums: np.ndarray) -> Labels:
 def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
     """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 11).
 
-    Pixels; and of those well within a part: their number, light (the share of the background's brightness), its square, what colour differs
-    from the background in that light (Cr, Cb, in standard deviations), and the background's brightness in standard deviations. Sides
-    of pixels on the edge; and of those: along the person; others; and how much more light there is across these.
+    Columns: 0 pixels. Over pixels well inside: 1 their number, 2 light (share of the background's brightness), 3 its square, 4 and 5
+    difference of Cr and Cb from the darkened background, 6 the background's brightness, 4 to 6 in standard deviations. Sides of pixels
+    on the edge: 7 their number, 8 those along the person, 9 others, 10 gain of light across those others.
     """
     out = np.zeros((number, 11))
     height, width = label.shape
@@ -118,7 +118,7 @@ def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
 
 @compiled(nogil=True)
 def _well_inside(parts, row, column, part):
-    """Whether a pixel's neighbours but one are of its part, too: nearer to the edge its light is blurred with that beyond."""
+    """Whether the part reaches two pixels to every side: nearer to the edge its light is mixed with that beyond."""
     if row < 2 or column < 2 or row + 2 >= parts.shape[0] or column + 2 >= parts.shape[1]:
         return False
     return (parts[row - 2, column] == part and parts[row + 2, column] == part and parts[row, column - 2] == part
