@@ -147,14 +147,14 @@ def test_shoulders_rise_with_the_arms_but_the_arms_stay_level():
 # Motions
 
 
-@pytest.mark.parametrize("name", sorted(gestures.MOTIONS))
+@pytest.mark.parametrize("name", sorted(gestures.GESTURES))
 def test_gestures_stay_in_their_time_and_are_smooth(name, rng):
     for seconds in (2.0, 7.0):
-        times = [when for when, _ in gestures.MOTIONS[name](seconds, rng)]
+        times = [when for when, _ in gestures.GESTURES[name](seconds, rng)]
         assert all(b > a for a, b in itertools.pairwise(times))
         assert 0 < times[0] <= times[-1] < seconds
     t = np.arange(0, gestures.duration([(name, 6.0)]), 1 / 60)
-    figure = pose(Mannequin(), gestures.compose([(name, 6.0)], t, rng))
+    figure = pose(Mannequin(), gestures.gesture_postures([(name, 6.0)], t, rng))
     speed = np.linalg.norm(np.diff(figure.joints, axis=0), axis=-1) * 60
     assert speed.max() < 5.0
     assert (np.abs(np.diff(speed, axis=0)) * 60).max() < 90.0
@@ -171,7 +171,7 @@ def test_motion_does_not_depend_on_the_frame_rate():
 
 def test_recordings_begin_and_end_standing(rng):
     t = np.array([0.0, gestures.duration([("wave_hands", 4.0)])])
-    ends = gestures.compose([("wave_hands", 4.0)], t, rng, still=0.0)
+    ends = gestures.gesture_postures([("wave_hands", 4.0)], t, rng, still=0.0)
     wanted = gestures.posture(**gestures.STANDING)
     np.testing.assert_allclose(ends, np.broadcast_to(wanted, ends.shape), atol=0.01)
 
@@ -195,12 +195,12 @@ def test_arms_are_kept_out_of_the_trunk():
     assert gap(cleared)[3] > gap(keys)[3] + 0.03
     np.testing.assert_array_equal(cleared[[0, 6]], keys[[0, 6]])
     assert (gestures.clear_of_trunk(level) == level).all()
-    assert gap(gestures.compose([("random", 19.0)], np.arange(0, 20, 0.1), np.random.default_rng(15))).min() > 0.2
+    assert gap(gestures.gesture_postures([("random", 19.0)], np.arange(0, 20, 0.1), np.random.default_rng(15))).min() > 0.2
 
 
 def test_reach_goes_toward_the_camera_one_arm_after_the_other(rng):
     t = np.arange(0, 7.5, 0.1)
-    figure = pose(Mannequin(), gestures.compose([("reach", 6.0)], t, rng))
+    figure = pose(Mannequin(), gestures.gesture_postures([("reach", 6.0)], t, rng))
     ahead = {side: -(at(figure, f"{side}_hand") - at(figure, f"{side}_shoulder"))[:, 1] > 0.4 for side in ("left", "right")}
     assert (ahead["left"] & ~ahead["right"]).any()
     assert (ahead["right"] & ~ahead["left"]).any()
@@ -214,7 +214,7 @@ def test_distance_kernel_against_plain_numpy(rng, monkeypatch):
     from shadowpuppet.synthetic import _ray_marching
 
     body, clothes = Mannequin.draw(rng, "woman"), Clothes.draw(rng)
-    figure = pose(body, gestures.compose([("random", 3.0)], np.array([1.5]), rng))
+    figure = pose(body, gestures.gesture_postures([("random", 3.0)], np.array([1.5]), rng))
     renderer = PersonRenderer(VIEW.camera(), dressed(body, clothes), clothes, LIGHTS)
     seen = {}
     trace = _ray_marching.find_surface
@@ -241,7 +241,7 @@ def test_leaving_out_parts_that_a_tile_cannot_see_changes_nothing(rng, monkeypat
         span[:] = 0.3, 6.0
 
     body, clothes = Mannequin.draw(rng), Clothes.draw(rng)
-    figure = pose(body, gestures.compose([("random", 6.0)], np.array([3.0, 5.0]), rng))
+    figure = pose(body, gestures.gesture_postures([("random", 6.0)], np.array([3.0, 5.0]), rng))
     camera = replace(VIEW, size=(160, 120), distortion=(-0.2, 0.05, 0, 0)).camera()
     renderer = PersonRenderer(camera, dressed(body, clothes), clothes, LIGHTS)
     culled = [renderer.draw(figure, index) for index in range(2)]
@@ -484,7 +484,7 @@ def test_the_proving_ground_is_varied_and_fixed():
     assert len({spec.name for spec in specs}) == len(specs)
     assert specs == proving_ground()
     used = {gesture.motion for spec in specs for gesture in spec.motion}
-    assert used >= set(gestures.MOTIONS) - {"stand"}
+    assert used >= set(gestures.GESTURES) - {"stand"}
     cameras = [spec.cameras[0] for spec in specs]
     assert min(c.distance for c in cameras) <= 1.8
     assert max(c.distance for c in cameras) >= 3.5

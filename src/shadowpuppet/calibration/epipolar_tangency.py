@@ -1,6 +1,6 @@
-"""Outermost planes through two cameras that touch a silhouette: both cameras' must be the same (epipolar tangency).
+"""Epipolar tangency: the outermost planes through two camera centres that touch the silhouettes must be the same for both cameras.
 
-After Wong & Cipolla 2001, "Structure and motion from silhouettes". Distances are told in pixels.
+After Wong & Cipolla 2001, "Structure and motion from silhouettes". Distances are in pixels.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 
 MAX_ANGULAR_EXTENT = 2.6
-"""Radians that a silhouette may cover around the line from camera to camera: beyond, that line runs through or along it."""
+"""Greatest angle (rad) of a silhouette about the baseline: beyond it, the baseline runs through or along the person."""
 
 
 def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Row]) -> Array:
@@ -32,21 +32,23 @@ def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Row]) -> Array:
 
 
 class Tangents(NamedTuple):
-    """The outermost planes through two cameras that touch their silhouettes."""
+    """The outermost planes through two camera centres that touch their silhouettes."""
 
     angles: Array
-    """About the line from the first camera to the second (2 cameras, 2 planes), radians; not a number at a picture's border."""
+    """Angles about the baseline, of shape (2 cameras, 2 planes), radians; NaN at a picture's border."""
     levers: Array
-    """Pixels a radian is (2 planes,)."""
+    """Pixels per radian, of shape (2 planes,)."""
     lever: float
-    """Of both, mean."""
+    """Mean of `levers`."""
     reference: Array
-    """Where angles count from (3,)."""
+    """Direction of angle 0, of shape (3,)."""
 
 
 def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outline], reference: Array | None = None) -> Tangents | None:
-    """Where the tangent planes of two outlines lie; None where cameras stand at one place, or a silhouette lies about the line from one to
-    the other. `reference`: a direction (3,) to count from; if left out, the middle of both silhouettes."""
+    """The tangent planes of two outlines; None if the cameras stand at one place or a silhouette surrounds the baseline.
+
+    reference: direction (3,) of angle 0; by default the middle of both silhouettes.
+    """
     line = cameras[1].centre - cameras[0].centre
     length = float(np.linalg.norm(line))
     if length < 1e-9:
@@ -69,7 +71,7 @@ def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outl
 
 
 def _apart(first: Camera, a: Outline, second: Camera, b: Outline) -> tuple[float, float]:
-    """Distances (pixels) of both pairs of outermost tangents; not a number at the border, or where they cannot be told."""
+    """Distances (pixels) of both pairs of outermost tangents; NaN at the border, or if unknown."""
     found = tangent_angles((first, second), (a, b))
     if found is None:
         return np.nan, np.nan

@@ -1,6 +1,6 @@
-"""How far silhouettes reach beyond what the other cameras leave room for: every place on a person's outline must be seen by all.
+"""How far silhouettes reach beyond what the other cameras allow: every ray of an outline must meet all silhouettes.
 
-What tangents of two cameras cannot tell, a shift along the lines on which they see each other, three cameras can.
+Three cameras reveal what tangents of two cannot: a shift along the baseline.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 
 RAYS_PER_OUTLINE, DEPTHS_PER_RAY = 24, 32
-"""Pixels of each outline that are looked at, and places along the ray of each."""
+"""Number of outline pixels tested, and of places along the ray of each."""
 DEPTH_RANGE = 0.3
-"""How far before and behind the middle of the person places are taken, over its distance."""
+"""Range of these places before and behind the person's middle, over its distance."""
 COVERAGE_PERCENTILE = 75
-"""Percentile over an outline: a camera that looks elsewhere is off along a side of it, a limb missing in another camera is less."""
+"""Percentile over an outline: a misdirected camera is off along a whole side of it, a limb missing in another camera affects less."""
 
 
 def pixels_beyond(cameras: Sequence[Camera], row: Row) -> Array:
@@ -47,7 +47,7 @@ def pixels_beyond(cameras: Sequence[Camera], row: Row) -> Array:
 
 
 def triangulated_centre(cameras: Sequence[Camera], outlines: Sequence[Outline | None]) -> Array | None:
-    """The place (3,) nearest to the rays through the outlines' middles; None where there are not two."""
+    """The point (3,) nearest to the rays through the outlines' middles; None for fewer than two outlines."""
     A, b, count = np.zeros((3, 3)), np.zeros(3), 0
     for camera, outline in zip(cameras, outlines):
         if outline is not None:
@@ -58,7 +58,7 @@ def triangulated_centre(cameras: Sequence[Camera], outlines: Sequence[Outline | 
 
 
 def _sampled(distance: NDArray[np.float32], pixels: Array) -> Array:
-    """Values at the nearest pixels (..., 2); 0 outside the picture, of which it says nothing."""
+    """Values at the nearest pixels (..., 2); 0 outside the picture, where nothing is known."""
     height, width = distance.shape
     x, y = np.moveaxis(np.rint(np.clip(np.nan_to_num(pixels, nan=-9), -9, 1e6)).astype(int), -1, 0)
     inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
@@ -66,7 +66,7 @@ def _sampled(distance: NDArray[np.float32], pixels: Array) -> Array:
 
 
 def _percentiles(away: Array) -> Array:
-    """Of the least over depths of the greatest over cameras (C, P, Z): without each camera, and without none, of shape (C + 1,)."""
+    """Percentile over rays of the least over depths of the greatest over cameras (C, P, Z): without each camera, with all, (C + 1,)."""
     order = np.sort(away, axis=0)
     most, next_most, which = order[-1], order[-2], away.argmax(0)
     without = [np.where(which == n, next_most, most) for n in range(len(away))]
