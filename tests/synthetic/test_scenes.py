@@ -234,7 +234,7 @@ def test_an_obstacle_takes_exactly_its_pixels_from_the_mask(kind):
     spec = replace(SMALL, cameras=(replace(VIEW, distance=3.0, height=1.2),))
     obstacle = Obstacle(kind=kind, ahead=0.8, left=0.15, turn_deg=20)
     plain, hidden = shot(spec, standing()), shot(with_scene(spec, obstacles=(obstacle,)), standing())
-    thing = Furniture([obstacle]).met(spec.cameras[0].camera().centre, nobody(spec.cameras[0].camera()).rays)[0] < FAR
+    thing = Furniture([obstacle]).intersect(spec.cameras[0].camera().centre, nobody(spec.cameras[0].camera()).rays)[0] < FAR
     lost = (plain.mask > 0) & (hidden.mask == 0)
     np.testing.assert_array_equal(hidden.mask > 0, (plain.mask > 0) & ~thing)
     assert hidden.hidden == lost.sum() > 5

@@ -1,4 +1,4 @@
-"""Made recordings with known truth: a person by published proportions, motions, cameras and noise as data."""
+"""Synthetic recordings with known truth: body, motions, cameras and noise are data."""
 
 from __future__ import annotations
 

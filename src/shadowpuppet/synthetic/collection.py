@@ -1,4 +1,4 @@
-"""Specs that the project uses again and again: the demo's, and the proving ground on which settings are chosen."""
+"""Named specs: the demo's, and the proving grounds on which settings are chosen."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def demo_spec() -> Spec:
 
 
 def demo_ring_spec() -> Spec:
-    """The recording of several cameras of `shadowpuppet demo`: somebody walks and turns before four small cameras, 5.6 s."""
+    """The recording of several cameras of `shadowpuppet demo`: a person walks and turns before four small cameras, 5.6 s."""
     ring = Ring(count=4, radius=3.8, start_deg=35, jitter=0.5, fov_deg=42, seed=5)
     scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), parse_gestures("walk 2, turn_around 2")
     return Spec(name="demo_ring", body=Mannequin(stature=1.70, build=0.2), motion=gestures, ring=ring, scene=scene, rate=20)
@@ -51,10 +51,10 @@ PROVING = (
 
 
 def proving_ground() -> tuple[Spec, ...]:
-    """Recordings of one camera, bodies x motions x cameras x noise, each of about ten seconds, to choose settings by.
+    """Recordings of one camera on which settings are chosen: bodies x motions x cameras x noise, about ten seconds each.
 
-    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, for which its own seed is (0, n). Cameras stand
-    at 0.9 of the stature when level, so that the picture cuts the legs; higher or lower when pitched, so that the person stays in it.
+    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, its own seed being (0, n). Level cameras stand at 0.9 of the
+    stature, so that the picture cuts the legs; pitched ones higher or lower, so that the person stays in the picture.
     """
     return tuple(_proof(n, *row) for n, row in enumerate(PROVING))
 
@@ -67,9 +67,8 @@ def _proof(n: int, name: str, kind, seed: int, gestures: str, distance: float, f
                 turn_deg=turn, seed=(0, n))
 
 
-def _person(kind: Kind, seed: int, **told: float) -> Mannequin:
-    """A body drawn, with a body mass index or an age where they are told."""
-    return Mannequin.draw(np.random.default_rng(seed), kind, bmi=told.get("bmi"), age=told.get("age"))
+def _person(kind: Kind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
+    return Mannequin.draw(np.random.default_rng(seed), kind, bmi=bmi, age=age)
 
 
 AROUND = (
@@ -82,7 +81,7 @@ AROUND = (
 
 
 def around() -> tuple[Spec, ...]:
-    """Recordings of seven cameras around a person, 640 x 480 at 60 pictures a second, of the length of those of HumanEva."""
+    """Recordings of seven cameras around a person, 640 x 480 at 60 frames/s, as long as those of HumanEva."""
     specs = []
     for n, (name, kind, seed, gestures, radius) in enumerate(AROUND):
         body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
@@ -100,15 +99,15 @@ HUMANEVA: tuple[tuple[str, Kind, int, str, float, int, float, float, tuple[int, 
     ("humaneva_boxing", "man", 23, "box 10", 1.2, 377, 4.2, 42, (91, 92)),
 )
 TRAINING_FRAMES = 100
-"""Frames that Ni 2008 learns from (Table I)."""
+"""Number of training frames in Ni 2008, Table I."""
 
 
 def humaneva() -> tuple[Spec, ...]:
-    """Recordings as those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 pictures a second, 433, 393 and 377 pictures of
-    somebody who walks, jogs and boxes from the first to the last, and 100 frames of the same person's joints to learn from.
+    """Recordings like those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 frames/s; 433 frames of walking, 393 of jogging
+    and 377 of boxing; and 100 training frames of the same person's joints.
 
-    HumanEva itself needs a licence (`io.humaneva`). Here people move by published angles, not by motion capture, and what is learnt from is
-    another performance of the same motion.
+    HumanEva itself needs a licence (`io.humaneva`). Here people move by published angles, not by motion capture, and the training motion
+    is another performance of the same gestures.
     """
     return tuple(_humaneva(n, *row) for n, row in enumerate(HUMANEVA))
 
@@ -126,7 +125,7 @@ Row = tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float]
 
 
 def _rings() -> tuple[Row, ...]:
-    """A row a recording; a function, because a ring with a lens loads OpenCV when it is checked."""
+    """One row per recording; a function, because checking a ring with a distorted lens loads OpenCV."""
     return (
         # name, body, gestures, those of the training (None: the same, "": none), cameras, scene, pictures a second
         ("rings_walk", _person("woman", 41), "walk 4", None, Ring(count=5, radius=4.4, fov_deg=48, size=(480, 360)), {}, 60),
@@ -153,11 +152,11 @@ def _rings() -> tuple[Row, ...]:
 
 
 def proving_rings() -> tuple[Spec, ...]:
-    """Recordings of 3 to 8 cameras around a person, of four to six seconds, to choose the settings of the several-camera tracker by.
+    """Recordings of 3 to 8 cameras, four to six seconds each, on which the settings of the several-camera tracker are chosen.
 
     Bodies (thin to heavy, a child of seven to tall men) x motions x rings (near and far, high and low, irregular, cutting the person,
-    fisheyes) x noise and rooms. The motion to learn from is another performance of the same gestures, or of others, or there is
-    none. They are fixed; the n-th is made with its own seed, (2, n).
+    fisheyes) x noise and rooms. The training motion is another performance of the same gestures, of other gestures, or absent. They are
+    fixed; the n-th is made with its own seed, (2, n).
     """
     return tuple(
         Spec(name=name, body=body, motion=parse_gestures(gestures), ring=replace(ring, seed=n),
@@ -168,5 +167,5 @@ def proving_rings() -> tuple[Spec, ...]:
 
 
 def named_specs() -> dict[str, Spec]:
-    """All of them by name: the demo's, the proving ground's, and those of several cameras."""
+    """All specs by name."""
     return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *proving_ground(), *around(), *humaneva(), *proving_rings())}

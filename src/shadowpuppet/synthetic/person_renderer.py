@@ -1,4 +1,4 @@
-"""Pictures of the mannequin: exact silhouettes and shaded, anti-aliased images by sphere tracing."""
+"""Images of the mannequin: exact silhouettes and shaded, anti-aliased pictures by sphere tracing."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import GROUPS, MATERIALS, Surface
 
 EDGE_SAMPLES = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
-"""Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
+"""Sample positions in a pixel at an edge, a rotated grid, pixels from its centre."""
 
 
 class PersonRenderer:
-    """Draws one person with one camera: rays and tiles are prepared once."""
+    """Draws one person with one camera; rays and tiles are prepared once."""
 
     def __init__(self, camera: Camera, surface: Surface, clothes: Clothes, lights: Array) -> None:
-        """lights: (3, 4), unit directions toward the two lamps and their strength; the third row's is the ambient light."""
+        """lights: (3, 4), unit directions toward the two lamps and their strengths; the third row holds the ambient light's."""
         from shadowpuppet.synthetic._ray_marching import TILE
 
         width, height = camera.size
@@ -32,7 +32,7 @@ class PersonRenderer:
         self.rays = _unit(camera.rays(np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)) @ R.T)
         self.across, down = -(-width // TILE), -(-height // TILE)
         corner = np.stack(np.meshgrid(np.arange(self.across + 1), np.arange(down + 1)), -1) * float(TILE) - 0.5
-        if camera.fisheye:  # beyond the border of its picture it may see nothing
+        if camera.fisheye:  # beyond the border of its picture there may be no rays
             corner = np.minimum(corner, np.array([width, height]) - 0.5)
         corners = _unit(camera.rays(corner) @ R.T)
         corners = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]])
@@ -41,7 +41,7 @@ class PersonRenderer:
         self.sine, self.cosine = np.sin(angle), np.cos(angle)
 
     def fine_rays(self) -> Array:
-        """Unit rays (2H, 2W, 3), world, four to a pixel: for what is drawn once."""
+        """Unit rays (2H, 2W, 3), world, four per pixel: for what is drawn once."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         return _unit(self.camera.rays(grid) @ inverse(self.camera.T_camera_world)[:3, :3].T)
@@ -67,7 +67,7 @@ class PersonRenderer:
         return Layer(picture, alpha, depth)
 
     def _joins(self, figure: Figure, index: int) -> Array:
-        """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""
+        """Where each of `GROUPS` blends into the trunk, and the radius, of shape (5, 4), metres."""
         names = [JOINTS.index(name) for name in ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")]
         assert len(names) == len(GROUPS)
         elbow, wrist = (figure.joints[index, JOINTS.index(name)] for name in ("left_elbow", "left_wrist"))

@@ -1,4 +1,4 @@
-"""The place: a textured room, its lamps, the person's soft shadow on floor and wall, and the camera's noise."""
+"""The room: textured walls and floor, lamps, soft shadows of people, and the camera's exposure and noise."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ SHADOW_PARTS = (
         for a, b, radius in (("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.055))
     ),
 )
-"""What casts the shadow: round sticks between joints, and their radius (m)."""
+"""Shadow casters: round sticks between two joints, and their radius (m)."""
 
 SHADOW_CELL = 4
-"""Pixels along a cell of the grid on which shadows are computed; they are soft."""
+"""Cell size (pixels) of the grid on which the soft shadows are computed."""
 
 
 class Room:
-    """A floor at z = 0, walls around, one of them behind the person, with their texture, and two lamps; all drawn from `rng`."""
+    """A floor at z = 0, four walls, one of them behind the person, their texture, and two lamps; all drawn from `rng`."""
 
     def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float, least: float = 0.0, background: walls.WallStyle = "room",
                  furniture: Furniture | None = None) -> None:
-        """shadow: how dark shadows are, 0 to 1; least: the wall is at least so far behind the person, metres."""
+        """shadow: darkness of shadows, 0 to 1; least: least distance of the wall behind the person, metres."""
         self.camera, self.shadow = camera, shadow
         self.distance = max(rng.uniform(1.2, 3.5), least)
         side = rng.choice([-1, 1])
@@ -55,7 +55,7 @@ class Room:
         self._seen = self._points(SHADOW_CELL * coarse + (SHADOW_CELL - 1) / 2)[0] @ self._from_lamp
 
     def _points(self, pixels: ArrayLike) -> tuple[Array, Array]:
-        """Where the rays of pixels (..., 2) meet floor or wall, (..., 3), and the place along the walls, (...), metres."""
+        """Points (..., 3) where the rays of pixels (..., 2) meet floor or wall, and places (...) along the walls, metres."""
         eye, ray = self.camera.centre, self.camera.rays(pixels) @ inverse(self.camera.T_camera_world)[:3, :3].T
         half = max(self.distance, 6.0, 1.2 * float(np.hypot(*eye[:2])))
         ends = [(0, half, 20.0), (0, -half, -20.0), (1, self.distance, 0.0), (1, -half, 40.0), (2, 0.0, 0.0)]
@@ -68,7 +68,7 @@ class Room:
         return points, along
 
     def _paint(self, rng: np.random.Generator, background: walls.WallStyle, furniture: Furniture | None) -> Array:
-        """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of four rays."""
+        """Picture of the empty room (H, W, 3), RGB, 0 to 1; each pixel is the mean of four rays."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         points, along = self._points(grid)
@@ -84,7 +84,7 @@ class Room:
         return picture.reshape(height, 2, width, 2, 3).mean((1, 3))
 
     def shaded(self, figure: Figure, index: int, *others: Figure) -> Array:
-        """The room's picture with the shadow of the figure and of `others`, (H, W, 3)."""
+        """The room's picture (H, W, 3) with the shadows of the figure and of `others`."""
         import cv2
 
         if self.shadow == 0:
@@ -99,10 +99,10 @@ class Room:
         )
 
     def _shade(self, people: list[Array]) -> Array:
-        """How far the key lamp is hidden, 0 to 1, on the coarse grid; people: joints (17, 3) of each.
+        """Share of the key lamp that is hidden, 0 to 1, on the coarse grid; people: joints (17, 3) of each.
 
-        The lamp is distant: seen from it, floor and wall points and sticks are points and lines of a plane. The edge softens
-        with the distance between stick and shadow.
+        The lamp is distant: projected along its direction, points of floor and wall and sticks become points and lines of a plane. The
+        edge softens with the distance between stick and shadow.
         """
         clear = np.ones(self._seen.shape[:2])
         for joints, (a, b, radius) in itertools.product(people, SHADOW_PARTS):
@@ -117,9 +117,9 @@ class Room:
 
 
 def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
-    """How bright the lamps are, 1 as they are meant, `seconds` after the film's first picture; before it in the empty scene.
+    """Relative brightness of the lamps `seconds` after the film's first frame; negative in the film of the empty scene.
 
-    length: of the film, seconds, over which `scene.drift` builds up, slow at both ends.
+    length: of the film, seconds, over which `scene.drift` builds up, slowly at both ends.
     """
     share = np.clip(seconds / max(length, 1e-9), 0, 1)
     drift = scene.drift * (0.5 - 0.5 * np.cos(np.pi * share))
@@ -127,9 +127,9 @@ def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
 
 
 def expose(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
-    """What the sensor makes of light (H, W, 3), 0 to 1: slight blur of the lens, display gamma, noise; RGB uint8.
+    """The sensor's picture, RGB uint8, of light (H, W, 3), 0 to 1: slight blur of the lens and noise.
 
-    noise: standard deviation in grey levels at middle grey; it grows with brightness as photon noise does.
+    noise: standard deviation in grey levels at middle grey; it grows with brightness like photon noise.
     """
     import cv2
 

@@ -1,4 +1,4 @@
-"""One camera of a recording, with everything that it sees: takes pictures."""
+"""Frames of one camera of a recording: the person, bystanders, obstacles and the room."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from shadowpuppet.synthetic.spec import Bystander, Spec
 
 
 class RenderedFrame(NamedTuple):
-    """A picture with what is exactly known of it."""
+    """A frame with its exact masks."""
 
     image: np.ndarray
     """Of shape (H, W, 3), blue green red, uint8."""
     mask: np.ndarray
-    """The visible part of the person who is tracked, of shape (H, W), uint8, 0 or 255."""
+    """Visible part of the tracked person, of shape (H, W), uint8, 0 or 255."""
     people: np.ndarray
-    """The visible parts of everybody, of shape (H, W), uint8, 0 or 255; the mask itself where nobody else is."""
+    """Visible parts of all people, of shape (H, W), uint8, 0 or 255; `mask` itself if there are no bystanders."""
     hidden: int
-    """How many pixels of the person obstacles and other people hide."""
+    """Number of the person's pixels hidden by obstacles and bystanders."""
 
 
 class SceneRenderer:
-    """One camera with the person, their clothes and the room; others, and things, where the spec has them."""
+    """Renders the scene of a spec as one camera sees it."""
 
     def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator, others: Sequence[Figure] = (), least: float = 0.0) -> None:
-        """rng: of the noise; clothes and room have their own seeds in the spec.
+        """rng: for the noise; clothes and room have their own seeds in the spec.
 
-        others: figures of `spec.scene.bystanders`, at the same times as the person's; least: how far behind the person (m)
-        the wall must be.
+        others: figures of `spec.scene.bystanders`, at the same times as the person's; least: least distance (m) of the wall behind the
+        person.
         """
         scene = spec.scene
         least = max([least, *(view.distance + 1 for view in spec.views() if abs(view.azimuth_deg) > 60)])
@@ -66,20 +66,20 @@ class SceneRenderer:
         return PersonRenderer(camera, dressed(bystander_body(bystander), clothes), clothes, self.room.lights)
 
     def empty(self, index: int = 0, count: int = 1) -> np.ndarray:
-        """Picture `index` of `count` without anybody, (H, W, 3) BGR, before the film begins."""
+        """Frame `index` of `count` of the empty scene, (H, W, 3) BGR, before the film begins."""
         return self._exposed(composite(self.room.picture, self.things), (index - count) / self.spec.rate)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255; nobody else is there."""
+        """A frame (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255, without bystanders."""
         light, mask, *_ = self._lit(figure, index)
         return self._exposed(light, 0.0), mask
 
     def hides(self, figure: Figure) -> bool:
-        """Whether things hide anything of the figure in its first posture."""
+        """Whether obstacles hide a part of the figure in its first posture."""
         return bool(self.things) and self._lit(figure, 0)[3] > 0
 
     def film(self, figure: Figure, workers: int | None = None) -> Iterator[RenderedFrame]:
-        """Pictures of all postures, one after another; `workers` threads draw ahead (2 to 8 by the processor), noise is drawn in order."""
+        """Frames of all postures in order; `workers` threads (by default 2 to 8) draw ahead, the noise is drawn in order."""
         from concurrent.futures import ThreadPoolExecutor
 
         workers = workers or min(max(os.cpu_count() or 2, 2), 8)
@@ -94,7 +94,7 @@ class SceneRenderer:
                 yield RenderedFrame(self._exposed(light, index / self.spec.rate), mask, people, hidden)
 
     def _lit(self, figure: Figure, index: int, company: bool = False) -> tuple[Array, np.ndarray, np.ndarray, int]:
-        """Light, mask, everybody's mask and how much is hidden; `company`: with the bystanders."""
+        """Light, mask, mask of all people and number of hidden pixels; company: whether to include the bystanders."""
         person = self.renderer.draw(figure, index)
         others = self.others if company else []
         room = self.room.shaded(figure, index, *(other for other, _ in others))
@@ -116,13 +116,13 @@ class SceneRenderer:
 
 
 def bystander_body(bystander: Bystander) -> Mannequin:
-    """The body that a bystander's seed draws."""
+    """The body drawn by a bystander's seed."""
     kind = None if bystander.kind == "random" else bystander.kind
     return Mannequin.draw(np.random.default_rng([bystander.seed, 0]), kind)
 
 
 def _camouflaged(clothes: Clothes, wall: Array, share: float) -> Clothes:
-    """Clothes whose shirt and trousers are by `share` of the wall's colour."""
+    """Clothes with shirt and trousers blended by `share` with the wall's colour."""
     near = {name: tuple((1 - share) * np.array(clothes.colours[name]) + share * wall) for name in ("shirt", "trousers")}
     return replace(clothes, colours=clothes.colours | near, stripes=(1 - share) * clothes.stripes)
 
