@@ -1,4 +1,4 @@
-"""Paint of walls and floors: what stands behind the person, from a bare wall to a full shelf."""
+"""Textures of walls and floors, from a bare wall to full shelves."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def paint_floor(kind: WallStyle, x: Array, y: Array, rng: np.random.Generator) -
 
 
 def wall_colour(rng: np.random.Generator) -> Array:
-    """The colour (3,) that `paint_wall` draws first."""
+    """The wall's colour (3,), which `paint_wall` draws first."""
     return np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.05, 0.4), rng.uniform(0.45, 0.85)))
 
 
@@ -62,7 +62,7 @@ def _posters(x: Array, z: Array, rng: np.random.Generator) -> Array:
 
 
 def _shelves(paint: Array, x: Array, z: Array, rng: np.random.Generator) -> None:
-    """Book shelves and boxes over the paint of the walls, some two thirds of them."""
+    """Paint book shelves over the walls; some places stay empty."""
     for left, own in zip(np.arange(-27, 47, 1.1), rng.spawn(68)):
         wide, high = own.uniform(0.8, 1.05), own.uniform(1.3, 2.3)
         unit = (x > left) & (x < left + wide) & (z < high)

@@ -1,4 +1,4 @@
-"""Acts of the whole body: boxing, lifting, squatting, jumping and others, each some seconds long."""
+"""Whole-body actions: boxing, lifting, squatting, jumping and others, each some seconds long."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GUARD = both(front=38, side=12, roll=6, elbow=122, supination=10, curl=85, wrist
 
 
 def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
-    """Guard with the left foot before the right, then jabs, crosses, hooks and uppercuts, weight shifting, a few steps."""
+    """Boxing: guard with the left foot forward, then jabs, crosses, hooks and uppercuts, weight shifts and a few steps."""
     begin, end = 0.9, seconds - 0.9
     stand: Posture = GUARD | trunk(turn=-22, spine_twist=-8, pelvis_bow=4, spine_bow=8, head_turn=24, head_nod=4)
     stand |= {"drop": 0.045, "right_heel": np.radians(12), "ahead": 0.03}
@@ -52,11 +52,11 @@ PUNCHES: dict[str, Posture] = {
     "uppercut": right(front=48, side=6, roll=0, elbow=96, supination=60, curl=85)
     | trunk(spine_twist=22, pelvis_twist=14, spine_bow=-2, head_turn=-14) | {"right_heel": np.radians(28), "drop": 0.02, "ahead": 0.07},
 }  # fmt: skip
-"""What each punch changes of the guard at its far end."""
+"""Changes of the guard at the far end of each punch."""
 
 
 def lift(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
-    """Bending the knees and the back, lifting something from the floor before the feet, holding it, and putting it back."""
+    """Lifting something from the floor with bent knees and back, holding it, and putting it back."""
     deep, bow = rng.uniform(0.3, 0.42), rng.uniform(-6, 6)
     down = both(front=74, side=6, roll=-8, elbow=12, supination=20, curl=30) | trunk(pelvis_bow=46 + bow, spine_bow=36, head_nod=-20)
     down |= {"drop": deep, "ahead": -0.10}
@@ -80,7 +80,7 @@ def squat(body: Mannequin, seconds: float, rng: np.random.Generator) -> Keyframe
 
 
 def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
-    """Sitting down on something that is not shown, the hands on the thighs, and standing up again."""
+    """Sitting down on an invisible seat, the hands on the thighs, and standing up again."""
     lean = both(front=22, side=10, elbow=45, curl=15, supination=-10) | trunk(pelvis_bow=40, spine_bow=16, head_nod=-14)
     seat = both(front=20, side=10, elbow=62, curl=15, supination=-20) | trunk(pelvis_bow=-4, spine_bow=8)
     deep = rng.uniform(0.40, 0.46)
@@ -153,4 +153,4 @@ def random_body(body: Mannequin, seconds: float, rng: np.random.Generator) -> Ke
 ACTIONS: dict[str, Callable[[Mannequin, float, np.random.Generator], KeyframeMotion]] = {
     f.__name__: f for f in (box, lift, squat, sit, march, jump, turn_around, random_body)
 }
-"""All acts by name."""
+"""All actions by name."""

@@ -1,7 +1,7 @@
-"""Walking and jogging along a path: footprints first, feet that stay on them, and the published cycle (`gait_cycle.py`) between.
+"""Walking and jogging along a path: footprints on which the feet stay, and the published gait cycle (`gait_cycle.py`) between them.
 
-Arms swing against the legs: by some 30 degrees with nearly straight elbows in walking (Murray et al. 1967), with elbows near a
-right angle in jogging (Yegian et al. 2019). Strides vary by some 2 % (Hausdorff 2005).
+Arms swing opposite to the legs: by some 30 degrees with nearly straight elbows in walking (Murray et al. 1967), with elbows near a right
+angle in jogging (Yegian et al. 2019). Strides vary by some 2 % (Hausdorff 2005).
 """
 
 from __future__ import annotations
@@ -18,35 +18,35 @@ from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, S
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 CLOCK_STEP = 0.002
-"""Seconds between the times at which speed and cadence are summed up."""
+"""Step of the integration of speed and cadence, seconds."""
 TRACK_HALF_WIDTH = {False: 0.055, True: 0.03}
-"""Half the distance of the feet's tracks in leg lengths, walking and jogging."""
+"""Half the distance between the feet's tracks, leg lengths, walking and jogging."""
 MAX_LEAN = np.radians(13)
-"""Most that a person leans into a turn, rad; small leans are those at which weight and centrifugal force agree."""
+"""Greatest lean into a turn, rad; small leans balance weight and centrifugal force."""
 COMFORTABLE_SPEED = {False: 1.35, True: 2.6}
 """Comfortable speeds of an adult, m/s; others at equal Froude number."""
 HEEL_RISE_PHASE, FLAT_PHASE = 0.3, 0.22
-"""Phases of the leg at which the heel begins to rise, and at which the foot lies flat again."""
+"""Phases of the leg at which the heel begins to rise and the foot lies flat again."""
 
 
 class Footprints(NamedTuple):
-    """Where one foot stands, one after another; the first is at stride `first` of its leg."""
+    """Footprints of one foot in order, from stride `first` of its leg on."""
 
     first: int
     along: Array
-    """Along the path, metres."""
+    """Place along the path, metres."""
     aside: Array
-    """To the left of it, metres."""
+    """Place to the left of the path, metres."""
     size: Array
-    """How large the step is that follows, 0 (none) to 1 (whole)."""
+    """Size of the following step, 0 (none) to 1 (full)."""
 
 
 class Walk:
-    """Going along a path from standing to standing."""
+    """Walking or jogging along a path, from standing to standing."""
 
     def __init__(self, body: Mannequin, seconds: float, rng: np.random.Generator, jogging: bool = False, speed: float | None = None,
                  path: PathName = "circle", size: float = 1.2) -> None:
-        """speed: m/s, or None for a comfortable one; path, size: see `Path`."""
+        """speed: m/s, by default a comfortable one; path, size: see `Path`."""
         hip = body.rest()["pelvis"][2]
         if speed is None:
             speed = float(COMFORTABLE_SPEED[jogging] * np.sqrt(hip / 0.93) * np.clip(1 + 0.04 * rng.standard_normal(), 0.9, 1.1))
@@ -58,12 +58,12 @@ class Walk:
         self.prints = [self._prints(n, rng) for n in (0, 1)]
 
     def _clock(self, rng: np.random.Generator) -> None:
-        """Phase of the left leg, length gone, how fully the person goes (0 to 1), and how far they lean inward, at every tick."""
+        """Set, at every tick: phase of the left leg, distance covered, fraction of full gait (0 to 1) and inward lean."""
         from scipy.ndimage import gaussian_filter1d
 
         self.ticks = np.arange(-1.0, self.seconds + 1.0 + CLOCK_STEP, CLOCK_STEP)
         period = self.cycle.stride / self.speed
-        stops = self.seconds - 0.8 * period  # the feet come beside each other after it
+        stops = self.seconds - 0.8 * period  # after it the feet come to stand side by side
         ramp = min(1.7 * period, 0.45 * stops)
         starts = smoothstep(self.ticks / ramp)
         self.fully = starts * smoothstep((self.seconds - self.ticks) / (ramp + 0.5 * period))
@@ -71,7 +71,7 @@ class Walk:
         self.phase = 0.5 + np.cumsum(cadence * CLOCK_STEP) - np.sum(cadence[self.ticks < 0] * CLOCK_STEP)
         slow = 1 / (1 + 0.2 * self.path.bend**2 * (self.cycle.leg / 0.86) ** 2)
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
-        short = min(1.0, stops / (3.0 * period))  # who has no time for more than a step or two does not get up to speed
+        short = min(1.0, stops / (3.0 * period))  # with time for a step or two only, full speed is not reached
         pace = short * self.speed * starts * smoothstep((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
         self.gone = np.interp(np.cumsum(pace) * CLOCK_STEP, due, self.path.samples)
         quick = np.gradient(self.gone, CLOCK_STEP)
@@ -115,7 +115,7 @@ class Walk:
         return postures, Stance(pelvis - shift, ankles - np.reshape(shift, (-1, 1, 3)), frames, toes, ahead)
 
     def _foot(self, side: int, phase: Array) -> tuple[Array, Array, Array]:
-        """Ankle (T, 3), the foot's frame (T, 3, 3) and how far its toes are bent (T,) at phases of its leg."""
+        """Ankle (T, 3), frame of the foot (T, 3, 3) and bend of its toes (T,) at phases of its leg."""
         prints, stride = self.prints[side], np.floor(phase).astype(int)
         part, k = phase - stride, stride - prints.first
         swings, out = part > self.cycle.gait.carries, TOE_OUT * (1 - 2 * side)
@@ -134,7 +134,7 @@ class Walk:
         return np.column_stack([place, up + hangs + self.cycle.lift(part) * prints.size[k]]), frame, toes
 
     def _postures(self, t: Array, phase: Array, fully: Array) -> Array:
-        """Pelvis, trunk, arms and head: from standing, as `fully` as the person goes."""
+        """Postures of pelvis, trunk, arms and head, blended from standing to full gait by `fully`."""
         gait, of = self.cycle.gait, {name: n for n, name in enumerate(CHANNELS)}
         right_phase, wide = phase - 0.5, np.clip(self.cycle.amplitude, 0.6, 1.3)
         tilt, turn = (np.radians(wide * angle(right_phase)) for angle in (gait.obliquity, gait.rotation))
@@ -154,7 +154,7 @@ class Walk:
         return rest + fully[:, None] * (table - rest)
 
     def _arm(self, phase: Array) -> dict[str, Array]:
-        """Channels of the arm on the side of the leg whose phase is given: back when the leg is before."""
+        """Channels of the arm on the side of a leg with this phase; it swings back when the leg is forward."""
         swing = -np.cos(2 * np.pi * (phase - 0.02))  # -1 back, 1 before
         bend = 0.5 - 0.5 * np.cos(2 * np.pi * (phase - 0.1))
         if self.jogging:

@@ -1,7 +1,7 @@
-"""Motions as data: key postures over time, joined smoothly, with what no person can suppress on top.
+"""Gestures of arms and trunk: key postures over time, interpolated smoothly, plus involuntary motion.
 
-A gesture is a function of its length (s) and a generator that returns key postures `(time, {channel: value})`; channels it
-does not name rest. All time is continuous: the same spec at another frame rate is the same motion.
+A gesture is a function of its length (s) and a generator that returns key postures `(time, {channel: value})`; channels it does not name
+stay as in standing. Time is continuous: the same spec at another frame rate is the same motion.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def wave_hands(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def _swings(seconds: float, rng: np.random.Generator, ends: Sequence[Posture], between: Posture, period: float) -> Keys:
-    """From one end to the other and back through `between`, as often as the time allows."""
+    """Swings from end to end through `between`, as often as the time allows."""
     keys = [(0.8, between)]
     count = max(1, round((seconds - 1.2) / period)) * len(ends)
     each = (seconds - 1.2) / count
@@ -100,7 +100,7 @@ def twist(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def reach(seconds: float, rng: np.random.Generator) -> Keys:
-    """The left hand toward the camera, then the right, then both; fewer where there is no time (some 2 s each)."""
+    """The left hand toward the camera, then the right, then both; fewer if there is no time (some 2 s each)."""
     arms = (left, right, both)[-int(np.clip(seconds / 1.9, 1, 3)) :]
     each, keys = seconds / len(arms), []
     for n, chosen in enumerate(arms):
@@ -117,7 +117,7 @@ def forearms_up(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def overhead(seconds: float, rng: np.random.Generator) -> Keys:
-    """Arms raised over the sides above the head and lowered again."""
+    """Arms raised sideways above the head and lowered again."""
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
@@ -147,9 +147,9 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
-    """Key postures (n, `CHANNELS`) with the arms moved outward and straightened where forearm or hand would enter trunk or head.
+    """Key postures (n, `CHANNELS`) with the arms moved outward and straightened if forearm or hand would enter trunk or head.
 
-    Judged on the mean body: trunk and head as round sticks; shared with the neighbouring keys, so that the motion stays smooth.
+    Tested on the mean body with trunk and head as round sticks; the change is spread over neighbouring keys to keep the motion smooth.
     """
     table, body = table.copy(), Mannequin()
     for _ in range(rounds):
@@ -169,7 +169,7 @@ def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
 
 
 def _off(points: Array, start: Array, end: Array) -> Array:
-    """Distances (n,) of points (n, 3) from the sticks between `start` and `end`, (n, 3) each."""
+    """Distances (n,) of points (n, 3) from the line segments between `start` and `end`, (n, 3) each."""
     along = end - start
     t = np.clip(((points - start) * along).sum(1) / (along**2).sum(1), 0, 1)
     return np.linalg.norm(points - start - t[:, None] * along, axis=1)
@@ -183,8 +183,8 @@ GESTURES: dict[str, Callable[[float, np.random.Generator], Keys]] = {
 def gesture_postures(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
     """Postures (T, `CHANNELS`) at times `t` (s) of gestures `(name, seconds)` one after another.
 
-    Key postures are joined by shape-preserving cubics and rounded over 0.1 s; the first stands `LEAD_SECONDS` seconds, and the arms are
-    lowered `TAIL_SECONDS` seconds after the last. still: factor on the involuntary part (0: a robot).
+    Key postures are joined by shape-preserving cubics and smoothed. The person stands `LEAD_SECONDS` before the first gesture and lowers
+    the arms in the `TAIL_SECONDS` after the last. still: factor on involuntary motion.
     """
     return clamp_joints(interpolate_keys(key_postures(gestures, rng), t) + still * involuntary_motion(t, rng))
 
@@ -199,7 +199,7 @@ def key_postures(gestures: Sequence[tuple[str, float]], rng: np.random.Generator
 
 
 def interpolate_keys(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
-    """Values (T, names) at times `t` (s) on the way through `keys`; what a key does not name stands, or is 0.
+    """Values (T, names) at times `t` (s) interpolated through `keys`; channels that a key does not name are as in standing, or 0.
 
     rounding: seconds before and after a time that are averaged.
     """
@@ -232,12 +232,12 @@ def clamp_joints(postures: Array) -> Array:
 
 
 def duration(gestures: Sequence[tuple[str, float]]) -> float:
-    """Seconds from the first to the last picture of gestures `(name, seconds)`."""
+    """Seconds from the first to the last frame of gestures `(name, seconds)`."""
     return LEAD_SECONDS + sum(seconds for _, seconds in gestures) + TAIL_SECONDS
 
 
 def posture(**named: float) -> Array:
-    """One posture (1, `CHANNELS`) of named channels, rad; all others 0: the reference postures hold still."""
+    """One posture (1, `CHANNELS`) of named channels, rad; all others 0, without involuntary motion."""
     q = np.zeros((1, len(CHANNELS)))
     for name, value in named.items():
         q[0, CHANNELS.index(name)] = value

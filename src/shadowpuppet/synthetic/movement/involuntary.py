@@ -1,4 +1,4 @@
-"""What no person can suppress: sway, breathing, restlessness, tremor; and the smooth noise that they are made of."""
+"""Involuntary motion (sway, breathing, restlessness, tremor), and the band-limited noise that it is made of."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ RESTLESSNESS = {"sway_x": (0.006, 0.35), "sway_y": (0.006, 0.35), "spine_bow": (
                 "spine_twist": (1.0, 0.4), "head_nod": (2.5, 0.4), "head_tilt": (2.0, 0.4), "head_turn": (4.0, 0.35), "side": (1.2, 0.7),
                 "front": (1.2, 0.7), "roll": (1.5, 0.7), "elbow": (1.8, 0.7), "supination": (4.0, 0.5), "wrist_flex": (4.0, 0.6),
                 "wrist_side": (2.0, 0.6), "shrug": (1.0, 0.3), "protract": (1.5, 0.3), "curl": (5.0, 0.4)}
-"""Size (degrees; sway in metres) and highest frequency (Hz) of involuntary motion by channel."""
+"""Standard deviation (degrees; sway in metres) and highest frequency (Hz) of involuntary motion by channel."""
 TREMOR = {"side": 0.25, "front": 0.25, "elbow": 0.35, "wrist_flex": 0.5, "head_nod": 0.15, "spine_side": 0.08}
-"""Size, degrees, of the faster part, up to 5 Hz."""
+"""Standard deviation, degrees, of the faster part, up to 5 Hz."""
 
 
 def band_noise(t: Array, highest: float, rng: np.random.Generator, terms: int = 14) -> Array:

@@ -1,7 +1,7 @@
-"""Motions of the whole body as data: key postures, and steps of the feet.
+"""Whole-body motion from key postures and steps of the feet.
 
-An act begins and ends standing, in its own frame: the person's place is the origin, they face -Y. Lengths are in leg lengths, so
-that children do the same as adults.
+A motion begins and ends standing, in its own frame: the person stands at the origin facing -Y. Lengths are in leg lengths, so that
+motions fit children and adults.
 """
 
 from __future__ import annotations
@@ -18,42 +18,42 @@ from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, 
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 HALF_STANCE = 0.13
-"""Half the distance of a standing person's ankles."""
+"""Half the distance between a standing person's ankles, leg lengths."""
 GROUND_CHANNELS = ("drop", "aside", "ahead", "left_heel", "right_heel")
-"""What keys may name besides `CHANNELS`: how far the pelvis is lowered from standing, and moved to the left and forward, in leg
-lengths; how far the heels are raised, rad. A leg that would not reach lowers the pelvis further."""
+"""Channels of key postures besides `CHANNELS`: lowering of the pelvis, its shift to the left and forward, leg lengths; raising of the
+heels, rad. A leg that would not reach its foot lowers the pelvis further."""
 
 
 class Step(NamedTuple):
-    """A foot goes elsewhere."""
+    """A step of one foot."""
 
     foot: int
     """0 left, 1 right."""
     begin: float
-    """Seconds."""
+    """Start, seconds."""
     seconds: float
-    """How long it is in the air."""
+    """Time in the air."""
     aside: float
-    """Where it goes to: to the left, leg lengths."""
+    """Its goal to the left, leg lengths."""
     ahead: float
-    """Forward, leg lengths."""
+    """Its goal forward, leg lengths."""
     turn: float = 0.0
-    """Heading, rad to the left; toes point outward of it."""
+    """Heading, rad to the left; the toes point outward from it."""
     height: float = 0.08
-    """How high it is lifted, leg lengths."""
+    """Greatest height, leg lengths."""
 
 
 class Hop(NamedTuple):
-    """Both feet leave the floor and fall freely."""
+    """A jump: both feet leave the floor."""
 
     begin: float
-    """Seconds."""
+    """Start, seconds."""
     seconds: float
-    """How long they are in the air."""
+    """Time in the air."""
 
 
 class KeyframeMotion:
-    """Key postures over stepping feet."""
+    """A motion through key postures over stepping feet."""
 
     def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
                  rounding: float = 0.16) -> None:
@@ -81,12 +81,12 @@ class KeyframeMotion:
         return postures, Stance(pelvis, ankles, frames, toes, looks)
 
     def _flight(self, t: Array) -> Array:
-        """How high the hops have brought both feet, metres."""
+        """Height of both feet by hops, metres."""
         spans = [(np.clip(t - h.begin, 0, h.seconds), h.seconds) for h in self.hops]
         return sum((0.5 * GRAVITY * past * (whole - past) for past, whole in spans), 0.0 * t)
 
     def _foot(self, n: int, t: Array, heel: Array) -> tuple[Array, Array, Array, Array]:
-        """Ankle (T, 3), frame (T, 3, 3), bent toes (T,) and where the foot points (T, 3), at times `t` (T,)."""
+        """Ankle (T, 3), frame (T, 3, 3), bend of the toes (T,) and direction of the foot (T, 3) at times `t` (T,)."""
         out = TOE_OUT * (1 - 2 * n)
         place = np.array([HALF_STANCE * (1 - 2 * n), 0.0, 0.0])
         values, up = np.repeat(place[None], len(t), 0), 0 * t
@@ -104,7 +104,7 @@ class KeyframeMotion:
 
 
 def _last(steps: Sequence[Step], what: str) -> float:
-    """Where the pelvis ends up: between the places of both feet."""
+    """Final place of the pelvis: midway between the feet."""
     places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):
         places[step.foot] = getattr(step, what)

@@ -1,8 +1,7 @@
-"""Motion capture on the mannequin: each segment points where the measured one points, on the mannequin's own lengths.
+"""Retargets motion capture to the mannequin: directions of the measured segments, lengths of the mannequin.
 
-Limbs take directions from the measured joints, so the swing of a segment is exact; how it is turned about itself comes from the
-planes of elbow and knee, and from thumbs and toes. Trunk, head and feet take over how far they are turned from the capture's
-posture at rest.
+Limbs take their directions from the measured joints, so that their swing is exact; their axial rotation follows from the planes of elbow
+and knee, and from thumbs and toes. Trunk, head and feet take their rotation from the capture's rest posture.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ Points = dict[str, Array]
 
 
 def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
-    """The figure of `body` at times `t` (T,), s, moving as in the one file of `gestures`; at first it faces -Y turned by `turn`.
+    """The figure of `body` at times `t` (T,), s, moving as in the file of `gestures`; it begins facing -Y rotated by `turn`.
 
-    The middle of the area it covers lies at the origin. Raises `FormatError` where a file cannot be used.
+    The middle of the area it covers lies at the origin. Raises `FormatError` if the file cannot be used.
     """
     gesture, capture = _one(gestures)
     table = capture.joints(gesture.file_rate)
@@ -43,7 +42,7 @@ def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: 
 
 
 def mocap_seconds(gestures: Sequence[Gesture]) -> float:
-    """How long the file of `gestures` plays."""
+    """Seconds of the file of `gestures`."""
     gesture, capture = _one(gestures)
     there = (len(capture.root) - 1) / gesture.file_rate - gesture.start
     if there <= 0:
@@ -60,7 +59,7 @@ def _one(gestures: Sequence[Gesture]) -> tuple[Gesture, Capture]:
 
 
 def _at(table: JointTable, t: Array) -> JointTable:
-    """The table at other times, by cubics."""
+    """The table at other times, interpolated by cubics."""
     from scipy.interpolate import CubicSpline
 
     t = np.clip(t, table.times[0], table.times[-1])
@@ -70,10 +69,10 @@ def _at(table: JointTable, t: Array) -> JointTable:
 
 
 def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
-    """`body` in the postures of `table`, one a row; `rest` has one row: the same skeleton upright, arms level, facing -Y.
+    """`body` in the postures of `table`, one per row; rest: one row, the same skeleton upright, arms level, facing -Y.
 
-    Both have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. Where the body stands follows the measured pelvis in proportion to
-    the legs; its soles are brought to the floor where they are lowest.
+    Both have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. The pelvis follows the measured one, scaled by the length of the
+    legs; the lowest soles are brought to the floor.
     """
     p: Points = dict(zip(table.names, table.positions.swapaxes(0, 1)))
     calm: Points = dict(zip(rest.names, rest.positions.swapaxes(0, 1)))
@@ -99,11 +98,11 @@ def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
 
 TRUNK_AXES = {"pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"), "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
               "head": ("head", "crown", "crown", "face")}
-"""How a segment of the trunk is turned: up from the first joint to the second; from the third to the fourth, left or ahead."""
+"""Axes of the trunk's segments: up from the first joint to the second; left or ahead from the third to the fourth."""
 
 
 def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
-    """Frames (T, 3, 3) whose z points from joint to joint, and whose x, or any fixed direction, is as near as can be to another."""
+    """Frames (T, 3, 3) with z from `low` to `high` and x as near as possible to the direction from `start` to `end`."""
     z = _unit(p[high] - p[low])
     x = p[end] - p[start]
     x = _unit(x - (x * z).sum(1, keepdims=True) * z)
@@ -121,7 +120,7 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
     hand_axis = _unit(p[f"{side}_hand"] - p[f"{side}_wrist"])
     thumb = p[f"{side}_thumb"] - p[f"{side}_wrist"]
     hand = _along_x(sign * hand_axis, np.cross(sign * hand_axis, -thumb))
-    forearm = _between(bare, _swing(hand[..., 0], bare[..., 0]) @ hand)  # turned about itself by half of what the hand is
+    forearm = _between(bare, _swing(hand[..., 0], bare[..., 0]) @ hand)  # half of the hand's axial rotation
     at = {name: bones[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
     sternum = thoracic + thorax @ (at["clavicle"] - bones["thoracic"])
     shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
@@ -150,14 +149,14 @@ def _leg(body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pel
 
 
 def _bend(p: Points, side: str) -> Array:
-    """How far the toes are bent up against the foot, rad, of shape (T,)."""
+    """Upward bend of the toes against the foot, rad, of shape (T,)."""
     foot, toes = _unit(p[f"{side}_ball"] - p[f"{side}_ankle"]), _unit(p[f"{side}_toes"] - p[f"{side}_ball"])
     across = np.cross(foot, _unit(p[f"{side}_knee"] - p[f"{side}_ankle"]))
     return np.arctan2((np.cross(foot, toes) * _unit(across)).sum(1), (foot * toes).sum(1))
 
 
 def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
-    """Raised or lowered as a whole so that the lowest ankle or ball is as high as in standing, save for the lowest 2 %."""
+    """The figure shifted vertically so that the lowest ankle or ball is as high as in standing (2nd percentile over time)."""
     from shadowpuppet.synthetic.person.kinematics import SEGMENTS
 
     lowest = []
@@ -169,7 +168,7 @@ def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
 
 
 def _steady_normals(plane: Array, usual: Array) -> Array:
-    """Normals of planes (T, 3), long where they are sure; where they are short the neighbours and at last `usual` decide."""
+    """Normals (T, 3) of elbow or knee planes; those of a nearly straight limb follow their neighbours in time, or else `usual`."""
     from scipy.ndimage import gaussian_filter1d
 
     size = np.linalg.norm(plane, axis=1).max(initial=1e-9)
@@ -178,13 +177,13 @@ def _steady_normals(plane: Array, usual: Array) -> Array:
 
 
 def _along_x(x: Array, z: Array) -> Array:
-    """Frames (T, 3, 3) with x along unit vectors `x` and z as near to `z` as can be."""
+    """Frames (T, 3, 3) with x along unit vectors `x` and z as near to `z` as possible."""
     z = _unit(z - (z * x).sum(1, keepdims=True) * x)
     return np.stack([x, np.cross(z, x), z], -1)
 
 
 def _along_z(z: Array, y: Array) -> Array:
-    """Frames (T, 3, 3) with z along unit vectors `z` and y as near to `y` as can be."""
+    """Frames (T, 3, 3) with z along unit vectors `z` and y as near to `y` as possible."""
     y = _unit(y - (y * z).sum(1, keepdims=True) * z)
     return np.stack([np.cross(y, z), y, z], -1)
 

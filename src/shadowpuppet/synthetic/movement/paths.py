@@ -1,4 +1,4 @@
-"""Ways over the floor: place and heading along their length."""
+"""Paths over the floor: place and heading by length."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from shadowpuppet.geometry import Array
 
 PathName = Literal["line", "circle", "ellipse", "spot"]
 TURN_RADIUS = 0.42
-"""Radius, metres, of the turn at the ends of a line."""
+"""Radius of the turn at the ends of a line, metres."""
 PATH_STEP = 0.01
-"""Distance of a path's samples, metres."""
+"""Distance between a path's samples, metres."""
 
 
 class Path:
-    """A way that begins at the origin facing -Y; `circle`, `ellipse` and `line` go on for ever, `spot` stays (a treadmill)."""
+    """A path from the origin facing -Y; `circle`, `ellipse` and `line` repeat, `spot` stays in place (a treadmill)."""
 
     def __init__(self, name: PathName, size: float, length: float) -> None:
         """size: radius of the circle, half the longer axis of the ellipse (the other: 0.6 of it), length of the line; metres.
 
-        length: how much of it is needed, metres. Circle, ellipse and the turns of the line go left.
+        length: needed length, metres. Circle, ellipse and the turns of the line go left.
         """
         from scipy.interpolate import CubicSpline
 

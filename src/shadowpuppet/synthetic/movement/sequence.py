@@ -1,4 +1,4 @@
-"""A whole performance: gestures, acts and walks one after another, joined where the person stands."""
+"""The motion of a spec: gestures, actions and walks one after another, joined in standing."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from shadowpuppet.synthetic.movement.script import Gesture
 
 BLEND_SECONDS = 0.4
-"""Seconds before and after the change from one part to the next over which trunk and arms go from one to the other."""
+"""Seconds before and after a change of parts over which trunk and arms are blended."""
 SOFT_LIMIT = 0.015
-"""Metres below the height that the legs allow from which on the pelvis is held down."""
+"""Metres below the legs' limit from which on the pelvis is held down smoothly."""
 
 
 class MotionPart(Protocol):
-    """Something the person does, beginning and ending upright with the feet beside each other."""
+    """A part of the motion, beginning and ending upright with the feet side by side."""
 
     seconds: float
 
@@ -47,7 +47,7 @@ class PlantedGestures:
     """Gestures of `gestures.GESTURES` over planted feet."""
 
     def __init__(self, body: Mannequin, gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> None:
-        """Of gestures `(name, seconds)` one after another."""
+        """gestures: `(name, seconds)` one after another."""
         self.body, self.seconds = body, sum(seconds for _, seconds in gestures)
         self.keys = key_postures(gestures, rng)
 
@@ -58,7 +58,7 @@ class PlantedGestures:
 
 
 class FloorPose(NamedTuple):
-    """Where the person stands, and their heading, rad to the left of -Y."""
+    """Place on the floor, metres, and heading, rad to the left of -Y."""
 
     x: float = 0.0
     y: float = 0.0
@@ -66,7 +66,7 @@ class FloorPose(NamedTuple):
 
 
 def sequence_seconds(gestures: Sequence[Gesture]) -> float:
-    """Seconds from the first to the last picture."""
+    """Seconds from the first to the last frame."""
     if any(gesture.motion == "mocap" for gesture in gestures):
         from shadowpuppet.synthetic.movement.mocap import mocap_seconds as played
 
@@ -77,10 +77,10 @@ def sequence_seconds(gestures: Sequence[Gesture]) -> float:
 def animate(
     body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.random.Generator, still: float = 1.0, turn: float = 0.0
 ) -> Figure:
-    """The figure of `body` at times `t` (T,), s, `LEAD_SECONDS` of which it stands before the first of `gestures`.
+    """The figure of `body` at times `t` (T,), s; it stands for `LEAD_SECONDS` before the first of `gestures`.
 
-    still: factor on sway and tremor. turn: heading at the beginning, rad to the left of -Y. Who goes somewhere does so about the
-    origin: the middle of the area they cover lies there. A motion from a file stands alone (see `mocap.animate_mocap`).
+    still: factor on sway and tremor. turn: initial heading, rad to the left of -Y. The area covered in walking is centred at the origin.
+    A motion from a file cannot be combined with others (see `mocap.animate_mocap`).
     """
     if any(gesture.motion == "mocap" for gesture in gestures):
         from shadowpuppet.synthetic.movement.mocap import animate_mocap
@@ -101,19 +101,19 @@ def animate(
 
 
 def _middle(parts: Sequence[MotionPart], turn: float) -> Array:
-    """The middle (3,) of the area that the person covers, whatever times are shown."""
+    """The middle (3,) of the area that the person covers in the whole motion."""
     whole = np.arange(0, LEAD_SECONDS + sum(part.seconds for part in parts), 0.05)
     places = _joined(parts, whole, turn)[1].pelvis[:, :2]
     return np.append((places.max(0) + places.min(0)) / 2, 0.0)
 
 
 def _goes(gestures: Sequence[Gesture]) -> bool:
-    """Whether the person leaves their place."""
+    """Whether the person walks or jogs."""
     return any(gesture.motion in ("walk", "jog") for gesture in gestures)
 
 
 def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generator) -> list[MotionPart]:
-    """The parts of a performance: gestures over planted feet that follow each other are one."""
+    """The parts of the motion; consecutive gestures over planted feet are one part."""
     parts: list[MotionPart] = []
     waiting: list[tuple[str, float]] = []
     for gesture in (*gestures, None):
@@ -132,7 +132,7 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
 
 
 def _joined(parts: Sequence[MotionPart], t: Array, turn: float) -> tuple[Array, Stance]:
-    """Postures and stance of `parts`, each from where the one before ended; trunk and arms go over from one to the next."""
+    """Postures and stance of `parts`, each starting where the one before ended, with trunk and arms blended."""
     begin, place = LEAD_SECONDS, FloorPose(turn=turn)
     postures, pieces, of = np.zeros((len(t), len(CHANNELS))), [], np.zeros(len(t), int)
     for n, part in enumerate(parts):
@@ -151,7 +151,7 @@ def _joined(parts: Sequence[MotionPart], t: Array, turn: float) -> tuple[Array, 
 
 
 def _placed(postures: Array, stance: Stance, place: FloorPose) -> tuple[Array, Stance]:
-    """The same, done at `place`."""
+    """Postures and stance moved to `place`."""
     R = rotations(*np.zeros((2, 1)), np.array([place.turn]))[0]
     shift = np.array([place.x, place.y, 0.0])
     postures = postures.copy()

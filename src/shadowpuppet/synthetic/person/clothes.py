@@ -1,4 +1,4 @@
-"""What the person wears."""
+"""Clothes, hair and skin of a person."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ class Clothes:
     """A shirt, trousers, shoes, hair and a skin."""
 
     looseness: float = 0.012
-    """Of the shirt and trousers, metres."""
+    """Looseness of shirt and trousers, metres."""
     sleeve: float = 0.35
-    """Where the sleeves end, fraction of the arm down to the wrist."""
+    """End of the sleeves, fraction of the arm from shoulder to wrist."""
     hair: float = 0.012
     """Thickness of the hair, metres."""
     stripes: float = 0.0
-    """How dark the shirt's stripes are."""
+    """Darkness of the shirt's stripes."""
     colours: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """RGB, 0 to 1, by material."""
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Clothes:
-        """Everyday clothes in any colour."""
+        """Random everyday clothes."""
 
         def colour(low: float, high: float, saturation: float) -> tuple[float, ...]:
             return colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.1, saturation), rng.uniform(low, high))

@@ -11,7 +11,7 @@ from shadowpuppet.synthetic.person.surface import Loft, Rows, ellipsoid, loft_be
 
 
 def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
-    """Neck, skull, jaw, nose, ears, hair, and what marks a face."""
+    """Neck, skull, jaw, nose, ears, eyes, lips and hair."""
     m, joints, H = body.measure, body.rest(), body.stature
     wide, deep, high = m("head_breadth") / 2, m("head_length") / 2, m("head_height")
     neck, unit, joint = m("neck") / (2 * np.pi), m("head_height") / 0.232, joints["head"]

@@ -1,4 +1,4 @@
-"""From postures to joints and segment frames: the mannequin's own kinematics, ball joints turned by rotation vectors."""
+"""The mannequin's kinematics: from postures (rotation vectors of ball joints) to joints and segment frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CHANNELS = ("turn", "sway_x", "sway_y", "pelvis_bow", "pelvis_side", "pelvis_twi
 
 `*_bow`, `*_side`, `*_twist` are components of a joint's rotation vector: forward, to the person's left, turning left. An upper
 arm starts hanging; (`front`, `side`) is its swing as a rotation vector, `roll` turns it about itself (positive outward),
-`elbow` bends it, `supination` turns the palm up. `turn` turns the whole figure to its left.
+`elbow` bends it, `supination` turns the palm up. `turn` rotates the whole figure to its left.
 """
 SEGMENTS = (
     "pelvis",
@@ -32,11 +32,11 @@ SEGMENTS = (
 )
 SIDES = ("left", "right")
 TOE_OUT = 0.12
-"""How far the feet of a standing person point outward, rad."""
+"""Outward angle of a standing person's feet, rad."""
 MAX_LEG_SPAN = 0.999
-"""Share of its length that a leg may stretch to: knees are never quite straight."""
+"""Greatest extension of a leg over its length: knees are never quite straight."""
 FIST_CURL = (1.0, 1.5)
-"""Curls, rad, between which the fingers close from open to a fist; less is left to the fingers' own slight bend."""
+"""Curl (rad) at which fingers begin to close, and at which they form a fist."""
 MIRROR = np.array([1.0, -1.0, -1.0])
 HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
@@ -50,24 +50,24 @@ class Figure(NamedTuple):
     rotation: Array
     """Segment frames in the order of `SEGMENTS`, of shape (T, S, 3, 3), segment to world; identity in the T-pose."""
     origin: Array
-    """Where each segment's proximal joint lies, of shape (T, S, 3), metres, world."""
+    """Proximal joint of each segment, of shape (T, S, 3), metres, world."""
     curl: Array
-    """How far the fingers of the left and right hand are bent, of shape (T, 2), 0 to 1."""
+    """Curl of the left and right fingers, of shape (T, 2), 0 to 1."""
 
 
 class Stance(NamedTuple):
-    """Where pelvis and feet are in T postures; legs follow from it by two-bone inverse kinematics."""
+    """Pelvis and feet in T postures; the legs follow by two-bone inverse kinematics."""
 
     pelvis: Array
-    """The pelvis' centre, of shape (T, 3), metres, world; lowered where a leg would not reach its ankle."""
+    """Centre of the pelvis, of shape (T, 3), metres, world; lowered if a leg would not reach its ankle."""
     ankles: Array
     """Left and right ankle, of shape (T, 2, 3), metres, world."""
     feet: Array
     """Left and right foot to world, of shape (T, 2, 3, 3); identity stands flat, facing -Y."""
     toes: Array
-    """How far the left and right toes are bent up against the foot, of shape (T, 2), rad."""
+    """Upward bend of the left and right toes against the foot, of shape (T, 2), rad."""
     ahead: Array
-    """Where left and right knee look, of shape (T, 2, 3)."""
+    """Directions in which left and right knee point, of shape (T, 2, 3)."""
 
 
 def rotations(*vector: Array) -> Array:
@@ -80,14 +80,14 @@ def rotations(*vector: Array) -> Array:
 def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     """The figure of `body` in `postures` (T, `CHANNELS`), its feet planted about the world's origin.
 
-    stance: half the distance between the ankles, as a fraction of the leg's length. Feet stay where they are: the pelvis sinks
-    as far as both legs need, and hips and knees follow from its place.
+    stance: half the distance between the ankles over the leg's length. The feet stay in place: the pelvis sinks as far as both legs
+    need, and hips and knees follow.
     """
     return pose_over(body, postures, planted_stance(body, postures, stance))
 
 
 def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
-    """The `Stance` of `pose`: feet beside each other about the origin, the pelvis above them as high as the legs allow."""
+    """The `Stance` of `pose`: feet side by side about the origin, the pelvis as high as the legs allow."""
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
     yaw = _yaw(q)
     half, height = stance * (body.length("thigh") + body.length("shank")), body.rest()["left_ankle"][2]
@@ -99,7 +99,7 @@ def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> St
 
 
 def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
-    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`; its pelvis and feet count, not `sway` in the postures.
+    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`, whose pelvis and feet replace `sway` of the postures.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
     """
@@ -126,7 +126,7 @@ def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.
 
 
 def assemble_figure(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
-    """A `Figure` of joints (T, 3) by name and of segments' frames and origins by name; fingers bent by `curl` (T, 2)."""
+    """A `Figure` from joints (T, 3) and from segments' frames and origins, by name; fingers bent by `curl` (T, 2)."""
     return Figure(np.stack([joint[name] for name in JOINTS], 1), np.stack([frame[name][0] for name in SEGMENTS], 1),
                   np.stack([frame[name][1] for name in SEGMENTS], 1), curl)
 
@@ -139,8 +139,8 @@ def _yaw(q: dict[str, Array]) -> Array:
 def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
     """Clavicle, upper arm, forearm and hand of one side.
 
-    The clavicle rises by 0.13 of what the arm is raised beyond 25 degrees and protracts by 0.12 of its forward swing (after
-    Ludewig et al. 2009): shoulders are not fixed to the chest.
+    The clavicle rises by 0.13 of the arm's elevation beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig et al.
+    2009).
     """
     mirror = np.ones(3) if side == "left" else MIRROR
 
@@ -168,14 +168,14 @@ def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, 
 
 
 def fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
-    """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: of the hand, from the wrist, in its frame."""
+    """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: the joint `hand` from the wrist in the hand's frame."""
     close = np.clip((curl - FIST_CURL[0]) / (FIST_CURL[1] - FIST_CURL[0]), 0, 1)
     bend = np.radians(115) * np.sign(base[0]) * close
     return hand @ rotations(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
 
 
 def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: dict, frame: dict) -> Array:
-    """The pelvis' centre (T, 3), no higher than both legs reach; fills in both legs."""
+    """Centre of the pelvis (T, 3), no higher than both legs reach; adds the legs to `joint` and `frame`."""
     thigh, shank = body.length("thigh"), body.length("shank")
     rest = body.rest()
     hips = [pelvis @ (rest[f"{side}_hip"] - rest["pelvis"]) for side in SIDES]
@@ -208,14 +208,14 @@ def _bent(hip: Array, ankle: Array, ahead: Array, thigh: float, shank: float) ->
 
 
 def soft_minimum(a: Array, b: Array, soft: float) -> Array:
-    """The smaller of `a` and `b`, rounded off where they come closer than `soft`."""
+    """The smaller of `a` and `b`, smoothed if they are closer than `soft`."""
     if soft == 0:
         return np.minimum(a, b)
     return np.minimum(a, b) - np.maximum(soft - np.abs(np.where(np.isinf(b), a + soft, b) - a), 0) ** 2 / (4 * soft)
 
 
 def _upright(up: Array, ahead: Array) -> Array:
-    """Frames (T, 3, 3) whose z points along `up` and whose -y looks `ahead`, both (T, 3)."""
+    """Frames (T, 3, 3) with z along `up` and -y as near to `ahead` as possible, both (T, 3)."""
     z = up / np.linalg.norm(up, axis=1, keepdims=True)
     x = np.cross(-ahead, z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)

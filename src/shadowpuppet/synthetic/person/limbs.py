@@ -1,4 +1,4 @@
-"""Arms, hands and legs of the left side as lofts, after the measured girths; the right side is their mirror image."""
+"""Arm, hand and leg of the left side as lofts with the measured girths; the right side is mirrored."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The person in a made recording: body measures from published surveys, and where the joints lie.
+"""The person in a synthetic recording: body measures from published surveys, and joint centres.
 
-Nothing here is shared with the bodies that trackers fit: joints, lengths and shapes come from anthropometry, the surface
-(`surface.py`) is lofted and blended, and postures turn ball joints by rotation vectors (`kinematics.py`).
+Nothing is shared with the bodies that trackers fit: joints, lengths and shapes come from anthropometry, the surface (`surface.py`) is
+made of blended lofts, and postures are rotation vectors of ball joints (`kinematics.py`).
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ FRACTIONS = {"upper_arm": (0.1586, 0.1618), "forearm": (0.1523, 0.1545), "hand":
 hand and leg by Drillis & Contini (1966) as given by Winter (2009, fig. 4.1)."""
 
 HAND_POINT = 0.18
-"""Where `*_hand` lies, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
-recordings (0.019 of stature beyond the wrist). The knuckles lie at 0.46."""
+"""Place of the joint `*_hand`, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
+recordings (0.019 of stature beyond the wrist)."""
 KNUCKLES = 0.46
-"""Where the fingers bend, likewise."""
+"""Place of the knuckles, where the fingers bend, likewise."""
 
 BODY_MASS = (25.6, 27.8)
 """Mean body mass index (kg/m2) of the same women and men."""
@@ -61,7 +61,7 @@ Factor = Annotated[float, Field(ge=0.7, le=1.4)]
 
 @dataclass(frozen=True, config=STRICT)
 class Mannequin:
-    """A person: stature, build, and factors on what the mean person of that stature and build measures."""
+    """A person: stature, build, and factors on the mean measures of that stature and build."""
 
     stature: Annotated[float, Field(ge=0.9, le=2.2)] = 1.75
     """Height of the crown over the floor, metres."""
@@ -78,17 +78,17 @@ class Mannequin:
     head_size: Annotated[float, Field(ge=0.85, le=1.15)] = 1.0
     """Factor on the head."""
     leg_length: Annotated[float, Field(ge=0.88, le=1.08)] = 1.0
-    """Factor on thigh and shank; the trunk makes up for it."""
+    """Factor on thigh and shank; the trunk compensates for it."""
 
     @classmethod
     def draw(cls, rng: np.random.Generator, kind: Kind | None = None, *, stature: float | None = None, bmi: float | None = None,
              age: float | None = None) -> Mannequin:
-        """A plausible person; `kind` is drawn too where it is not given (children every sixth).
+        """A random plausible person; by default of a random kind (every sixth a child).
 
-        stature: metres; bmi: body mass index, kg/m2, told by girths; age: years, 4 to 14, of a child. What is not given is drawn: standard
-        deviations follow ANSUR II (stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %), children are 6 to 12 years old
-        (Snyder et al. 1977). A child whose age or stature is given has a child's legs and girths (`GROWTH`).
-        Raises `SettingsError` where there is no such person.
+        stature: metres; bmi: body mass index, kg/m2, which sets the girths; age: of a child, 4 to 14 years. What is not given is drawn:
+        standard deviations follow ANSUR II (stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %), children are 6 to 12 years
+        old (Snyder et al. 1977). A child of given age or stature has a child's legs and girths (`GROWTH`).
+        Raises `SettingsError` if there is no such person.
         """
         kind = kind or ("woman", "man", "child")[rng.choice(3, p=[5 / 12, 5 / 12, 1 / 6])]
         mean, spread, build = {"woman": (1.629, 0.064, 0.0), "man": (1.756, 0.069, 1.0), "child": (1.34, 0.11, 0.5)}[kind]
@@ -110,7 +110,7 @@ class Mannequin:
         return person if bmi is None else replace(person, girth=person.girth_of(bmi))
 
     def girth_of(self, bmi: float) -> float:
-        """The factor on girths that makes up a body mass index (kg/m2). Raises `SettingsError` beyond the possible factors.
+        """The factor on girths that gives a body mass index (kg/m2). Raises `SettingsError` beyond the possible factors.
 
         Mass goes as stature and the square of girths, but for the head, whose mass goes as the stature alone.
         """
@@ -167,7 +167,7 @@ class Mannequin:
 
 
 def _within(name: str, value: float, low: float, high: float) -> float:
-    """The value. Raises `SettingsError` where it is not between `low` and `high`."""
+    """The value. Raises `SettingsError` if it is not between `low` and `high`."""
     if not low <= value <= high:
         raise SettingsError(f"{name}: found {value:g}, expected {low:.3g} to {high:.3g}")
     return float(value)

@@ -18,7 +18,7 @@ MATERIALS = ("skin", "shirt", "trousers", "hair", "shoes", "eyes", "lips")
 GROUPS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Parts blend within a group, and limbs with the trunk only close to shoulder or hip: a hanging arm does not melt into it."""
 Rows = list[tuple[float, ...]]
-"""Cross-sections as they are written down: (place along the axis, half width, half depth[, centre's width, centre's depth])."""
+"""Cross-sections: (place along the axis, half width, half depth[, centre's width, centre's depth])."""
 LOFT_SAMPLES = 33
 """Cross-sections of a loft."""
 
@@ -30,24 +30,24 @@ class Loft:
     segment: str
     """The segment that carries it, of `SEGMENTS`."""
     start: Array
-    """Where the axis starts, of shape (3,), metres, in the segment's frame, from its joint."""
+    """Start of the axis, of shape (3,), metres, in the segment's frame, from its joint."""
     frame: Array
     """Columns width, depth, axis, of shape (3, 3), in the segment's frame."""
     stations: Array
     """Rows of (along, half width, half depth, centre's width, centre's depth), of shape (n, 5), metres."""
     caps: tuple[float, float]
-    """How far the rounded ends stand out, metres."""
+    """Height of the rounded ends, metres."""
     blend: float
-    """Width of the smooth union with what came before it in its group, metres."""
+    """Width of the smooth union with the parts before it in its group, metres."""
     materials: tuple[str, str] = ("skin", "skin")
-    """Before and after `change`."""
+    """Materials before and after `change`."""
     change: float = 9.0
-    """Where along the axis the second material begins, metres."""
+    """Place along the axis where the second material begins, metres."""
     group: str = "trunk"
     """Of `GROUPS`."""
 
     def mirrored(self) -> Loft:
-        """The same part on the right: everything with its x reversed."""
+        """The mirrored part on the right."""
         flip = np.array([-1.0, 1.0, 1.0])
         segment, group = (name.replace("left", "right") for name in (self.segment, self.group))
         return replace(self, segment=segment, group=group, start=self.start * flip, frame=self.frame * flip[:, None])
@@ -94,7 +94,7 @@ class Surface(NamedTuple):
 
     @property
     def radius(self) -> Array:
-        """How far each part reaches from its axis at most, of shape (P,), metres."""
+        """Greatest reach of each part from its axis, of shape (P,), metres."""
         return (np.maximum(self.table[..., 0], self.table[..., 1]) + np.hypot(self.table[..., 2], self.table[..., 3])).max(1)
 
 
@@ -108,7 +108,7 @@ def loft_between(segment: str, joint: Array, start: Array, end: Array, rows: Row
 
 
 def frame_of(axis: Array, depth: Array) -> Array:
-    """Columns width, depth, axis, (3, 3), with the depth as near to `depth` as it can be."""
+    """Columns width, depth, axis, (3, 3), with the depth as near to `depth` as possible."""
     depth = depth - (depth @ axis) * axis
     depth = depth / np.sqrt(depth @ depth)
     return np.stack([np.cross(depth, axis), depth, axis], 1)

@@ -1,4 +1,4 @@
-"""The trunk as lofts: the measured breadths and depths at the heights where they are taken, and what lies between by eye."""
+"""The trunk as lofts: breadths and depths at the heights where they are measured; sections between are set by eye."""
 
 from __future__ import annotations
 
