@@ -17,6 +17,7 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 FovDeg = Annotated[float, Field(ge=10, le=170)]
 Height = Annotated[float, Field(ge=0.05, le=6)]
+Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # `Viewpoint` itself refuses them, with all its numbers
 Distance = Annotated[float, Field(ge=0.8, le=20)]
 MAX_PINHOLE_FOV = 120.0
 """Greatest horizontal field of view of a pinhole lens, degrees."""
@@ -48,7 +49,7 @@ class Viewpoint:
     """Direction from the person to the camera, degrees: 0 before the person, 90 on their left."""
     pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
     """Angle below the horizontal, degrees."""
-    distortion: tuple[float, ...] = ()
+    distortion: tuple[Coefficient, ...] = ()
     """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]], or a fisheye's k1 k2 k3 k4; empty for no distortion."""
     yaw_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
     """Angle by which it looks past the person to its right, degrees."""
@@ -110,7 +111,7 @@ class Ring:
     """Width and height of the pictures, pixels."""
     fov_deg: FovDeg = 60.0
     """Horizontal field of view, degrees, before distortion."""
-    distortion: tuple[float, ...] = ()
+    distortion: tuple[Coefficient, ...] = ()
     """As in `Viewpoint`."""
     fisheye: bool = False
     """As in `Viewpoint`."""
