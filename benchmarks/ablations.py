@@ -5,7 +5,7 @@
 Each run is what `shadowpuppet track` does, through `shadowpuppet.pipeline.batch`: a second start does what is missing. Recordings are
 those of the proving grounds (`synthetic.proving_ground`, `synthetic.proving_rings`), made where they are missing. The error is that of
 joints in millimetres, a frame that is lost counting 500; `se` is the standard error of its difference from the study's first row, in pairs
-of recording and seed: what is within two of them is not told apart. Tables go into docs/ablations.md, and, once all studies are done,
+of recording and seed: differences within two of them are not significant. Tables go into docs/ablations.md, and, once all studies are done,
 pictures into docs/assets.
 """
 
@@ -22,6 +22,7 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
+import smallest
 from distance_cost import by_distance
 from multiview import made as made_rings
 from proving_ground import made as made_one
@@ -212,13 +213,13 @@ def table(found: Mapping[str, Result], axis: str) -> str:
 def said(found: Mapping[str, Result]) -> str:
     """What is told apart from the first row, in a sentence."""
     first, *others = found.items()
-    kinds: dict[str, list[str]] = {"better": [], "worse": [], "not told apart": []}
+    kinds: dict[str, list[str]] = {"better": [], "worse": [], "not significant": []}
     for name, one in others:
         if np.isfinite(se := _se(one, first[1])):
             apart = one.errors.mean() - first[1].errors.mean()
-            kinds["not told apart" if abs(apart) <= 2 * se else "better" if apart < 0 else "worse"].append(name)
+            kinds["not significant" if abs(apart) <= 2 * se else "better" if apart < 0 else "worse"].append(name)
     told = [f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names]
-    return f"Beside {first[0]}: {'; '.join(told)}." if told else ""
+    return f"Compared with {first[0]}: {'; '.join(told)}." if told else ""
 
 
 def write_page(results: Mapping[str, Mapping[str, Result]], page: Path = PAGE) -> None:
@@ -296,6 +297,13 @@ def _se(one: Result, first: Result) -> float:
     return float(apart.std(ddof=1) / np.sqrt(len(apart))) if len(apart) > 1 else float("nan")
 
 
+def _smallest(folder: Path) -> list[object]:
+    for name, parent in ((ONE[0], "one"), (RINGS[0], "rings")):
+        smallest.make(folder / parent / name, smallest.RING if parent == "rings" else smallest.ONE)
+    return ["cost", "noise", "rings_cameras", "--seeds", 1, "--workers", 0, "--recordings", 1, "--one", folder / "one",
+            "--rings", folder / "rings", "--output", folder / "out", "--page", smallest.copy(PAGE, folder)]
+
+
 def main() -> None:
     """Parse, run, write the page."""
     names = [study.name for study in STUDIES]
@@ -306,17 +314,19 @@ def main() -> None:
     parser.add_argument("--one", type=Path, default=BUILD / "proving_ground", help="where recordings of one camera are, or are made")
     parser.add_argument("--rings", type=Path, default=BUILD / "rings", help="where those of several are, or are made")
     parser.add_argument("-o", "--output", type=Path, default=BUILD / "ablations")
-    args = parser.parse_args()
+    parser.add_argument("--recordings", type=int, default=len(ONE), help="how many of each at most")
+    parser.add_argument("--page", type=Path, default=PAGE, help="where the tables are written")
+    args = smallest.parse(parser, _smallest)
     if unknown := set(args.studies) - set(names):
         parser.error(f"found {min(unknown)!r}, expected some of {', '.join(names)}")
     results = {}
     for study in STUDIES:
         if args.studies and study.name not in args.studies:
             continue
-        recordings = made_rings(args.rings, RINGS) if study.rings else made_one(args.one, ONE)
+        recordings = made_rings(args.rings, RINGS[: args.recordings]) if study.rings else made_one(args.one, ONE[: args.recordings])
         results[study.name] = run(study, recordings, args.output, args.seeds, args.workers)
         print(f"{study.title}\n\n{table(results[study.name], study.axis)}\n\n{said(results[study.name])}\n", flush=True)
-    write_page(results)
+    write_page(results, args.page)
     for rings, name in ((False, "one"), (True, "rings")):
         if all(study.name in results for study in STUDIES if study.rings == rings):
             draw(results, rings, ASSETS / f"ablations_{name}.png")

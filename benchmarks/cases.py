@@ -12,17 +12,17 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.motion.metrics import UPPER, joint_errors
+from shadowpuppet.motion.metrics import UPPER_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.footage import Footage, Mask, Sample, Silhouettes
 from shadowpuppet.pipeline.look import prepare
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import find
-from shadowpuppet.tracking.monocular.initialization import Guess
+from shadowpuppet.tracking.monocular.initialization import PersonEstimate
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
-ALIGNED = [name.replace("hand", "wrist") for name in UPPER]
+ALIGNED = [name.replace("hand", "wrist") for name in UPPER_JOINTS]
 COLUMNS = ("mean", "sd", "plane", "depth", "far", "aligned", "shoulder", "elbow", "hand", "cost", "jitter", "ms")
 """Measures in the order of the tables; `sd` is the standard deviation of the mean error over seeds."""
 
@@ -60,11 +60,11 @@ class Case:
         """The recording's one camera."""
         return self.footage.camera
 
-    def person(self, options: Options, rng: np.random.Generator) -> Guess:
+    def person(self, options: Options, rng: np.random.Generator) -> PersonEstimate:
         """Sizes and place, as `shadowpuppet track` finds them."""
         return find(self.footage, self.sample, self.seen, options, rng).fit.guess
 
-    def track(self, person: Guess, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
+    def track(self, person: PersonEstimate, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
         """Run a tracker and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a frame."""
         picture = person.picture(self.camera, settings.body)
         tracker = MonocularTracker(picture, settings)
@@ -79,7 +79,7 @@ class Case:
 
     def measure(self, table: JointTable) -> dict[str, float]:
         """Errors of joints against the truth, and how much the hands shake."""
-        errors = joint_errors(table, self.truth, UPPER, camera=self.camera).summary()
+        errors = joint_errors(table, self.truth, UPPER_JOINTS, camera=self.camera).summary()
         aligned = joint_errors(table, self.truth, ALIGNED, camera=self.camera).summary()
         per = {part: float(np.mean([errors["joints"][f"{side}_{part}"]["mean_mm"] for side in ("left", "right")]))
                for part in ("shoulder", "elbow", "hand")}

@@ -14,15 +14,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import smallest
 from cases import Case
 from proving_ground import HERE, made
 
-from shadowpuppet.body.upper_body import SIDES
+from shadowpuppet.body.segments import dofs_of
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER_JOINTS
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.tracking.monocular.pose_search import arm_dofs
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
@@ -69,11 +70,11 @@ def sample(rng: np.random.Generator, cost: Callable[[Array], Array], side: int, 
 
 
 def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose: Array, weight: float, temperature: float) -> Array:
-    """Mean places (6, 3) of the joints of `metrics.UPPER`, world: both arms sampled in turn, the torso as in `pose` (D,)."""
+    """Mean places (6, 3) of the joints of `metrics.UPPER_JOINTS`, world: both arms sampled in turn, the torso as in `pose` (D,)."""
     skeleton, pose = picture.body.skeleton, pose.copy()
     observation, places = Observation.without_legs(mask, picture, pose), {}
     for sweep, side in ((sweep, side) for sweep in range(SWEEPS) for side in SIDES):
-        dofs = arm_dofs(skeleton, side)
+        dofs = dofs_of(skeleton, f"{side}_arm")
         silhouette = PartialCost(picture, dofs).costs(observation, pose)
 
         def put(arms: Array, dofs=dofs) -> Array:
@@ -82,25 +83,25 @@ def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose
             return poses
 
         def cost(arms: Array, put=put, silhouette=silhouette) -> Array:
-            return silhouette(put(arms)) + weight * skeleton.strain(put(arms))
+            return silhouette(put(arms)) + weight * skeleton.posture_penalty(put(arms))
 
         sign = 1 if side == "left" else -1
         arms = sample(rng, cost, sign, skeleton.limits[0][dofs], skeleton.limits[1][dofs], temperature)
         if sweep == SWEEPS - 1:
             points = picture.points_world(put(arms)).mean(0)
-            places |= {name: points[picture.body.landmark_names.index(name)] for name in UPPER if name.startswith(side)}
+            places |= {name: points[picture.body.landmark_names.index(name)] for name in UPPER_JOINTS if name.startswith(side)}
         middle = to_arms(to_directions(arms, sign).mean(0)[None], sign)[0]
         pose[dofs] = np.clip(middle, skeleton.limits[0][dofs], skeleton.limits[1][dofs])
-    return np.array([places[name] for name in UPPER])
+    return np.array([places[name] for name in UPPER_JOINTS])
 
 
 def compare(path: Path, every: int, temperature: float, seed: int) -> tuple[float, float]:
-    """Mean errors, mm, of the tracker and of the posterior means in every so manieth frame."""
+    """Mean errors, mm, of the tracker and of the posterior means in every `every`-th frame."""
     case, options = Case.read(path, masks=True), Options(masks=True)
     for_fit, for_track, for_sample = np.random.default_rng(seed).spawn(3)
     picture = case.person(options, for_fit).picture(case.camera, options.tracker.body)
-    tracker, truth = MonocularTracker(picture, options.tracker), case.truth.select(UPPER).positions
-    columns = [picture.body.landmark_names.index(name) for name in UPPER]
+    tracker, truth = MonocularTracker(picture, options.tracker), case.truth.select(UPPER_JOINTS).positions
+    columns = [picture.body.landmark_names.index(name) for name in UPPER_JOINTS]
     state, errors = tracker.start(for_track, case.masks[0]), []
     for n, mask in enumerate(case.masks):
         state = tracker.step(for_track, state, mask) if n else state
@@ -112,6 +113,10 @@ def compare(path: Path, every: int, temperature: float, seed: int) -> tuple[floa
     return float(own), float(mean)
 
 
+def _smallest(folder: Path) -> list[object]:
+    return [smallest.make(folder / "tiny"), "--every", 20]
+
+
 def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -119,7 +124,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=9, help="frames from one that is sampled to the next")
     parser.add_argument("--temperature", type=float, default=20.0, help="pixels: of the last level")
     parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     print("| recording | tracker | posterior mean |\n|---|---|---|")
     found = []
     for path in args.recordings or made(HERE):

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import smallest
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
@@ -23,7 +24,7 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.inverse_kinematics import fit_poses
-from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.video import open_frames, write_image
 
@@ -33,13 +34,13 @@ FOUND, TRUE, EXACT, TILE, MARGIN = (0, 0, 255), (0, 255, 0), (255, 255, 255), 40
 
 def worst(run: JointTable, truth: JointTable, count: int, apart: float = 0.5) -> list[int]:
     """Frames of the truth with the greatest mean error, `apart` seconds or more from one another, in order of time; tells them."""
-    errors = 1000 * joint_errors(run, truth, LIMBS).distance
+    errors = 1000 * joint_errors(run, truth, LIMB_JOINTS).distance
     chosen: list[int] = []
     for n in np.argsort(-np.nan_to_num(errors.mean(1), nan=-1)):
         if len(chosen) < count and all(abs(truth.times[n] - truth.times[m]) >= apart for m in chosen):
             chosen.append(int(n))
     for n in sorted(chosen):
-        far = ", ".join(f"{name} {error:.0f}" for name, error in zip(LIMBS, errors[n]) if error > 50)
+        far = ", ".join(f"{name} {error:.0f}" for name, error in zip(LIMB_JOINTS, errors[n]) if error > 50)
         print(f"frame {n}, {truth.times[n]:.2f} s: {errors[n].mean():.0f} mm; over 50 mm: {far or 'none'}")
     return sorted(chosen)
 
@@ -83,6 +84,11 @@ def draw(recording: Recording, folder: Path, count: int, cameras: int) -> np.nda
     return np.vstack([np.hstack(tiles(view, fitted.body, poses)) for view in recording.views[:cameras]])
 
 
+def _smallest(folder: Path) -> list[object]:
+    recording, run = smallest.track(folder, smallest.RING)
+    return [recording, run, "--output", folder / "worst.png", "--frames", 2, "--cameras", 2]
+
+
 def main() -> None:
     """Parse, draw, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -91,7 +97,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("worst.png"))
     parser.add_argument("--frames", type=int, default=5)
     parser.add_argument("--cameras", type=int, default=4)
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     write_image(args.output, draw(read_recording(args.recording), args.run, args.frames, args.cameras))
 
 

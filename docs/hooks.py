@@ -1,11 +1,11 @@
-"""What the documentation takes from the code when it is built, so that it cannot grow old.
+"""Parts of the documentation that are generated from the code when it is built.
 
-In a page, a line of its own is replaced:
+A line of one of these forms is replaced in a page:
 
-    <!-- settings: TABLE -->   a table of `Options` ([tracker.torso]), a row a setting; without TABLE those that are in none
-    <!-- spec: TABLE -->       the same of a made recording's spec; without TABLE those that are in none
-    <!-- help: COMMAND -->     what `shadowpuppet COMMAND --help` prints
-    <!-- presets -->           what each preset changes
+    <!-- settings: TABLE -->   a table of `Options` ([tracker.torso]), one row per setting; without TABLE the settings outside tables
+    <!-- spec: TABLE -->       the same for the spec of a synthetic recording
+    <!-- help: COMMAND -->     the output of `shadowpuppet COMMAND --help`
+    <!-- presets -->           the settings that each preset changes
     <!-- example: FILE -->     the code of examples/FILE
 """
 
@@ -36,12 +36,12 @@ WORDS = {bool: "true, false", int: "whole number", float: "number", str: "text"}
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Called by MkDocs for every page."""
+    """The page with all markers replaced; called by MkDocs for every page."""
     return MARKER.sub(lambda found: MAKERS[found[1]](*(found[2] or "").split()), markdown)
 
 
 def settings_table(table: str = "") -> str:
-    """A row for each setting of a table of options, `tracker` or `tracker.torso`; the defaults are the default preset's."""
+    """Markdown table of the settings of a table of options, `tracker` or `tracker.torso`, with the default preset's values."""
     of = Options()
     for name in table.split(".") if table else ():
         of = getattr(of, name)
@@ -58,7 +58,7 @@ def settings_table(table: str = "") -> str:
 
 
 def spec_table(table: str = "") -> str:
-    """A row for each setting of a spec, or of one of its tables."""
+    """Markdown table of the settings of a spec, or of one of its tables."""
     rows = ["| setting | default | possible | what it is |", "|---|---|---|---|"]
     for field, kind, told in settings_of(TABLES[table] if table else Spec):
         default = default_of(field)
@@ -71,7 +71,7 @@ def spec_table(table: str = "") -> str:
 
 
 def help_text(*command: str) -> str:
-    """The help of a command, as a terminal of 80 columns shows it."""
+    """The help of a command in a terminal of 80 columns, as a code block."""
     environment = os.environ | {"COLUMNS": "80", "NO_COLOR": "1", "TERM": "dumb"}
     shown = subprocess.run([sys.executable, "-m", "shadowpuppet", *command, "--help"], capture_output=True, text=True, env=environment)
     if shown.returncode:
@@ -80,7 +80,7 @@ def help_text(*command: str) -> str:
 
 
 def presets() -> str:
-    """What each preset changes, as TOML."""
+    """The settings that each preset changes, as TOML."""
     parts = ["**`default`**: the defaults above."]
     for table, known in (("tracker", PRESETS), ("multiview", MULTIVIEW_PRESETS)):
         for name, values in known.items():
@@ -90,7 +90,7 @@ def presets() -> str:
 
 
 def example(name: str) -> str:
-    """An example's code, without what it says of itself."""
+    """The code of an example without its docstring."""
     code = (Path(__file__).parents[1] / "examples" / name).read_text("utf-8")
     return f"```python\n{code.split(QUOTES, 2)[2].strip()}\n```"
 
@@ -111,7 +111,7 @@ def _number(value: float) -> str:
 
 
 def _possible(kind: Any) -> str:
-    """The values that a type allows, in words."""
+    """Description of the values that a type allows."""
     return ", ".join(dict.fromkeys(_words(kind)))
 
 

@@ -22,15 +22,15 @@ from shadowpuppet.video import open_frames, read_image, write_frames, write_imag
 
 TARGET = Path(__file__).parent / "assets" / "live.png"
 SHOWN_AFTER = 21.0
-"""Seconds after the person is found: waving."""
+"""Time of the screenshot (s): the person is waving."""
 STAND = 18.0
-"""Seconds that the person stands first; to be measured takes some of them."""
+"""Seconds for which the person stands first, to be measured."""
 SIZE, GREYS, LARGEST = (1280, 760), 6, 300_000
 """Pixels, the step of the grey levels, bytes."""
 
 
 def film(folder: Path) -> Path:
-    """The empty scene for a while, then a person who stands, then waves."""
+    """Film of the empty scene, then of a person who stands and then waves."""
     spec = demo_spec()
     motion = (Gesture(motion="stand", seconds=STAND), *[Gesture(motion="wave_hands", seconds=4)] * 6)
     spec = replace(spec, motion=motion, cameras=(Viewpoint(size=(640, 480), distance=2.4),), scene=replace(spec.scene, empty_seconds=6))
@@ -43,7 +43,7 @@ def film(folder: Path) -> Path:
 
 
 def photographed(address: str, seconds: float) -> bytes:
-    """The page at an address as Chromium shows it after some seconds, a PNG."""
+    """Screenshot (PNG) of the page at an address, after some seconds in Chromium."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         sys.exit("found no Chromium, which takes the picture of the page")
@@ -76,7 +76,7 @@ def photographed(address: str, seconds: float) -> bytes:
 
 
 def main() -> None:
-    """Play the film as if live, and photograph the page."""
+    """Play the film as if live, and save a screenshot of the page."""
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         command = [sys.executable, "-m", "shadowpuppet", "live", "--camera", str(film(folder)), "--height", "1.78", "--fov", "60",

@@ -19,7 +19,7 @@ ASSETS = Path(__file__).parent / "assets"
 TIMES = (1.9, 7.3, 9.9, 11.6)
 """Seconds: waving, bending aside, bowing, reaching."""
 HEIGHT, GREYS = 560, 6
-"""Pixels, and the step of the grey levels: a picture of noise would not compress."""
+"""Height in pixels, and quantisation step of the grey levels (image noise would not compress)."""
 LARGEST = 300_000
 """Bytes."""
 
@@ -43,7 +43,7 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 """Specs of the second picture."""
 SHOWN, WIDTH = 7, 240
-"""The frame that is shown, and its width, pixels."""
+"""Index of the frame, and its width in pixels."""
 
 
 def scenes(folder: Path) -> np.ndarray:
@@ -64,7 +64,7 @@ def scenes(folder: Path) -> np.ndarray:
 
 
 def main() -> None:
-    """Write the pictures, from a demo that was made or is made now."""
+    """Write the pictures, from an existing or a new demo."""
     with tempfile.TemporaryDirectory() as made:
         folder = Path(sys.argv[1] if len(sys.argv) > 1 else made)
         if len(sys.argv) < 2:

@@ -1,8 +1,7 @@
 """Make docs/assets/puppet.webp, the moving picture of the README: python docs/make_readme_picture.py [FOLDER]. Takes a minute.
 
-Somebody jogs on the spot before four made cameras: their films, the silhouettes with the skeleton that was found, and the puppet with the
-surface points of the silhouettes' hull, from a camera that goes around it once. With a FOLDER the recording and its run are kept there, and
-taken from there the next time.
+A person jogs on the spot in front of four synthetic cameras. Shown are the films, the silhouettes with the estimated skeleton, and the body
+model with the surface points of the visual hull, from a camera that orbits it once. FOLDER keeps the recording and its run for reuse.
 """
 
 from __future__ import annotations
@@ -34,19 +33,19 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import open_frames
 
 TARGET, LARGEST = Path(__file__).parent / "assets" / "puppet.webp", 1_000_000
-"""The picture, and its bytes at most."""
+"""The picture, and its maximum size in bytes."""
 RATE, EVERY, LOOP = 24, 2, (60, 90)
-"""Frames a second of the films, every how many-th is shown, and how many frames the loop may have."""
+"""Frame rate of the films, step between displayed frames, and the least and greatest length of the loop in frames."""
 TILE, PANEL, GAP, FINER = (132, 180), (300, 364), 4, 2
-"""Pixels of a camera's part and of the puppet's, and between the parts; by how much all is drawn larger at first."""
+"""Pixels of a camera's panel, of the body model's panel, and of the gap; oversampling factor."""
 MARGIN, QUALITY = 0.08, 60
-"""What is shown around the person, as a share of the part; how good the coded picture is, of 100."""
+"""Margin around the person, as a share of the panel; WebP quality, of 100."""
 GROUND, GRID, DOT, SHADOW = (34, 29, 26), (66, 58, 52), (170, 160, 150), (236, 236, 236)
-"""Blue, green, red of the ground, the floor's lines, surface points and silhouettes. A dark card reads on light pages and on dark ones."""
+"""Colours (BGR) of the background, the floor's lines, surface points and silhouettes. A dark background works on light and dark pages."""
 CERTAIN = 0.4
-"""Surface points of less weight, as a share of the greatest, are not drawn: few cameras look there."""
+"""Minimum weight of the drawn surface points, as a share of the greatest weight."""
 ROUND = Viewpoint(size=(PANEL[0] * FINER, PANEL[1] * FINER), fov_deg=20, distance=5.2, height=1.5, pitch_deg=7)
-"""The camera that goes around the puppet, from where it begins."""
+"""The first position of the camera that orbits the body model."""
 
 
 class Seen(NamedTuple):
@@ -74,7 +73,7 @@ def made(folder: Path) -> tuple[Path, Path]:
 
 
 def looked_at(recording: Path, run: Path) -> Seen:
-    """The frames between the two poses that are most alike."""
+    """The frames between the two most similar poses."""
     cameras, motion = list(read_calibration(recording / "calibration.toml")), read_run(run).motion
     first, length = loop_of(motion.poses)
     chosen = range(first, first + length, EVERY)
@@ -85,14 +84,14 @@ def looked_at(recording: Path, run: Path) -> Seen:
 
 
 def loop_of(poses: Array) -> tuple[int, int]:
-    """Where a loop begins and how many frames it has: it ends as it begins, in pose and motion."""
+    """First frame and number of frames of a loop whose end matches its beginning in pose and motion."""
     apart = {(a, n): sum(np.abs(poses[a + k] - poses[a + n + k]).max() for k in (0, 1))
              for n in range(*LOOP, EVERY) for a in range(RATE, len(poses) - n - 1)}  # fmt: skip
     return min(apart, key=lambda key: apart[key])
 
 
 def window(masks: list[np.ndarray]) -> Array:
-    """What turns a camera's pixels into those of its part (2, 3): all of the person in all frames, in the middle."""
+    """Affine map (2, 3) from a camera's pixels to its panel: the whole person, in all frames, centred."""
     rows, columns = (np.flatnonzero(np.any(masks, axis=0).any(axis)) for axis in (1, 0))
     wide, high = FINER * TILE[0], FINER * TILE[1]
     scale = min(wide / np.ptp(columns), high / np.ptp(rows)) / (1 + 2 * MARGIN)
@@ -101,7 +100,7 @@ def window(masks: list[np.ndarray]) -> Array:
 
 
 def tiles(seen: Seen, n: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """What each camera saw in a frame; and the silhouettes, the skeleton in them."""
+    """Panels of one frame: the cameras' images; and the silhouettes with the skeleton."""
     films, shadows, size = [], [], (FINER * TILE[0], FINER * TILE[1])
     for camera, images, masks in zip(seen.cameras, seen.images, seen.masks):
         part = window(masks)
@@ -114,7 +113,7 @@ def tiles(seen: Seen, n: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 
 def puppet(seen: Seen, hull: VisualHull, n: int) -> np.ndarray:
-    """The puppet on the floor, with the hull's points, from somewhere around it."""
+    """Panel of the body model on the floor with the hull's points, from the orbiting camera."""
     azimuth = (360 * n / len(seen.poses) + 205) % 360 - 180
     camera, pose = replace(ROUND, azimuth_deg=azimuth).camera(), seen.poses[n]
     out = np.full((*camera.size[::-1], 3), GROUND, np.uint8)
@@ -150,7 +149,7 @@ def dots(out: np.ndarray, camera: Camera, points: Array) -> None:
 
 
 def frame(seen: Seen, hull: VisualHull, n: int) -> np.ndarray:
-    """One picture of the film: films, silhouettes, puppet."""
+    """One frame of the animation: films, silhouettes, body model."""
     films, shadows = tiles(seen, n)
     parts = [*(beside([stacked(each[:2]), stacked(each[2:])]) for each in (films, shadows)), puppet(seen, hull, n)]
     for part, what in zip(parts, ("films", "silhouettes", "puppet")):
@@ -160,13 +159,13 @@ def frame(seen: Seen, hull: VisualHull, n: int) -> np.ndarray:
 
 
 def beside(images: list[np.ndarray]) -> np.ndarray:
-    """Pictures of one height side by side, a gap between them."""
+    """Images of equal height side by side, with gaps."""
     gap = np.full((images[0].shape[0], GAP * FINER, 3), GROUND, np.uint8)
     return np.concatenate([piece for image in images for piece in (gap, image)][1:], axis=1)
 
 
 def stacked(images: list[np.ndarray]) -> np.ndarray:
-    """Pictures of one width, one below the other, a gap between them."""
+    """Images of equal width, one below the other, with gaps."""
     return beside([image.transpose(1, 0, 2) for image in images]).transpose(1, 0, 2).copy()
 
 

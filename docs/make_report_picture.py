@@ -21,11 +21,11 @@ from shadowpuppet.video import read_image
 
 TARGET = Path(__file__).parent / "assets" / "report.png"
 WIDTH, HEIGHT, SCALE, COLOURS, LARGEST = 1120, 1240, 0.52, 200, 150_000
-"""Pixels of the page's two parts, by what they are made smaller, how many colours the picture has, and its bytes at most."""
+"""Pixels of the page's two parts, downscaling factor, number of colours, and maximum size in bytes."""
 
 
 def photographed(page: Path, picture: Path, height: int) -> np.ndarray:
-    """The page as Chromium shows it, so many pixels of it."""
+    """Screenshot of the page in Chromium, of a given height in pixels."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         sys.exit("found no Chromium, which takes the picture of the page")

@@ -1,4 +1,4 @@
-"""Make the table of docs/speed.md and its picture: python docs/make_speed.py [FIGURES.json]; without figures, they are measured first."""
+"""Make the tables of docs/speed.md: python docs/make_speed.py [FIGURES.json]; without a file of figures, they are measured first."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.cli.plots import plot_curves
 from shadowpuppet.cli.tables import BENCHED, BENCHED_SEVERAL
 from shadowpuppet.evaluation.bench.run import run_bench
 
 PAGE = Path(__file__).parent / "speed.md"
-PICTURE = PAGE.parent / "assets" / "speed.png"
 PLACE = re.compile(r"(<!-- figures -->\n).*?(<!-- end of figures -->)", re.DOTALL)
 KEYS = {
     "mono.ratio_opencv_full": ("OpenCV's time over ours, all cards", ".1f"),
@@ -27,10 +25,10 @@ KEYS = {
     "mono.segment_ms": ("segmentation, ms a frame", ".2f"),
     "mono.track_ms": ("filter, ms a frame", ".2f"),
     "mono.write_ms": ("writing, ms a frame", ".2f"),
-    "mono.peak_mb": ("memory at most, MB", ".0f"),
-    "mono.growth_mb": ("memory's growth over the film, MB", ".1f"),
-    "mono.compile_s": ("start to first pose, all kernels compiled anew, s", ".1f"),
-    "mono.start_s": ("start to first pose, kernels there, s", ".1f"),
+    "mono.peak_mb": ("peak memory, MB", ".0f"),
+    "mono.growth_mb": ("memory growth over the film, MB", ".1f"),
+    "mono.compile_s": ("start to first pose, empty kernel cache, s", ".1f"),
+    "mono.start_s": ("start to first pose, kernels cached, s", ".1f"),
     "multi.points": ("seven cameras: surface points of a frame", ".0f"),
     "multi.hull_ms": ("visual hull, ms a frame", ".1f"),
     "multi.force_us": ("forces, us a particle and iteration", ".1f"),
@@ -40,12 +38,12 @@ KEYS = {
     "multi.forces_fps": ("frames/s from masks, `hybrid` with forces, one core", ".0f"),
     "multi.fps": ("frames/s from masks, default preset, one core", ".0f"),
     "multi.chain_fps": ("frames/s from film to pose, default preset, two cores", ".0f"),
-    "multi.peak_mb": ("memory at most, MB", ".0f"),
+    "multi.peak_mb": ("peak memory, MB", ".0f"),
 }
 
 
 def tables(found: dict[str, Any]) -> str:
-    """What was found, as tables in Markdown."""
+    """The results as Markdown tables."""
     here, raw = found["environment"], found["raw"]
     lines = [f"{here['cpu']} ({here['llvm_cpu']}), {here['cores']} cores, {here['vectors']}; Python {here['python']}, "
              f"NumPy {here['numpy']}, Numba {here['numba']}, OpenCV {here['opencv-python-headless']}.",
@@ -60,13 +58,12 @@ def tables(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Write the tables into the page, and the picture beside it."""
+    """Write the tables into the page."""
     found = json.loads(Path(sys.argv[1]).read_text("utf-8")) if len(sys.argv) > 1 else run_bench()
     text, number = PLACE.subn(lambda match: match[1] + tables(found) + match[2], PAGE.read_text("utf-8"))
     if number != 1:
         sys.exit(f"{PAGE}: found no place for the figures")
     PAGE.write_text(text, encoding="utf-8")
-    plot_curves(found["curves"], PICTURE)
 
 
 if __name__ == "__main__":

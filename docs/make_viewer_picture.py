@@ -26,15 +26,15 @@ from shadowpuppet.viewer.web.stage import Wish
 
 ASSETS = Path(__file__).parent / "assets"
 SIZE, COLOURS, LARGEST = (1280, 760), (255, 160, 96, 64), 150_000
-"""Pixels; and how many colours a picture has, the first number with which its file is small enough, bytes."""
+"""Pixels; numbers of colours to try until the file is small enough; maximum size in bytes."""
 FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage")
 SETTLED = 6000
-"""Milliseconds after which all is drawn."""
+"""Milliseconds until everything is drawn."""
 
 
 def photographed(browser: Browser, show: Show, wish: Wish, name: str, second: float, then: Callable[[Panel], None] = lambda panel: None,
                  size: tuple[int, int] = SIZE) -> None:
-    """A picture of the page at a second of the show."""
+    """Screenshot of the page at a given time (s) of the show."""
     with served(show, wish, width=480) as (address, panel):
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.goto(address)
@@ -58,12 +58,12 @@ def photographed(browser: Browser, show: Show, wish: Wish, name: str, second: fl
 
 
 def through(name: str) -> Callable[[Panel], None]:
-    """Looks through a camera."""
+    """Set the view to that of a camera."""
     return lambda panel: setattr(panel.through, "value", name)
 
 
 def main() -> None:
-    """Make the pictures that are named, or all."""
+    """Make the named pictures, or all."""
     arguments = [argument for argument in sys.argv[1:] if not argument.startswith("viewer")]
     wanted = [argument for argument in sys.argv[1:] if argument.startswith("viewer")]
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

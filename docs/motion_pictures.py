@@ -21,9 +21,9 @@ ROWS = (
     ("child", Gesture(motion="box", seconds=8), 2.4, 0.31),
     ("woman", Gesture(motion="lift", seconds=6), 1.2, 0.42),
 )
-"""Who does what, from when on, every how many seconds."""
+"""Body, motion, first time (s) and time step (s) of each row."""
 COUNT, SIZE, GREYS = 9, (136, 186), 6
-"""Pictures in a row, the size of each, and the step of the grey levels."""
+"""Images per row, the size of each, and the quantisation step of the grey levels."""
 LAMPS = np.array([[0.5, -0.5, 0.7, 0.5], [0.6, 0.5, 0.2, 0.25], [0, 0, 0, 0.55]])
 
 

@@ -33,13 +33,13 @@ from shadowpuppet.video import open_frames, write_image
 
 ASSETS = Path(__file__).parent / "assets"
 FRAME, TIMES = 34, (0.3, 0.55)
-"""The frame that is looked at, and the shares of the film that the overlay is shown of."""
+"""Index of the frame, and the times of the overlay frames as shares of the film."""
 LARGE, GREYS, PAPER = 3, 6, 235
-"""By how much a picture is enlarged; the step of the grey levels; the ground of drawings."""
+"""Magnification; quantisation step of the grey levels; background of drawings."""
 NORMAL, NEAREST = 0.045, 2.0
-"""Length of a normal, and the distance from which on points are drawn (m)."""
+"""Length of a normal, and minimum distance of the drawn points (m)."""
 TAU = 0.06
-"""Where forces are bounded (m)."""
+"""Bound of the forces (m)."""
 PALETTE = [(180, 119, 31), (14, 127, 255), (44, 160, 44), (40, 39, 214), (189, 103, 148), (75, 86, 140), (194, 119, 227), (34, 189, 188),
            (207, 190, 23), (120, 60, 20), (0, 0, 160), (0, 110, 0), (160, 0, 160), (160, 120, 0), (60, 60, 60), (0, 160, 220),
            (200, 80, 80)]  # fmt: skip
@@ -57,7 +57,7 @@ class Scene(NamedTuple):
 
 
 def scene(folder: Path) -> Scene:
-    """Pictures, exact silhouettes' surface points, and the pose that was found, of one frame of the demo."""
+    """Images, surface points of the exact silhouettes, and estimated pose of one frame of the demo."""
     recording, run = folder / "recording-ring", read_run(folder / "run-ring")
     cameras = tuple(read_calibration(recording / "calibration.toml"))
     images, masks = ([list(open_frames(recording / kind / f"{camera.name}{ending}"))[FRAME].image for camera in cameras]
@@ -67,7 +67,7 @@ def scene(folder: Path) -> Scene:
 
 
 def enlarged(camera: Camera, image: np.ndarray | None = None) -> tuple[Camera, np.ndarray]:
-    """A camera of larger pictures, and one of them."""
+    """A camera with enlarged images, and one of these."""
     size = camera.size[0] * LARGE, camera.size[1] * LARGE
     ground = np.full((*size[::-1], 3), PAPER, np.uint8) if image is None else cv2.resize(image, size, interpolation=cv2.INTER_CUBIC)
     return camera.resized(size), np.asarray(ground, np.uint8)
@@ -85,13 +85,13 @@ def lines(out: np.ndarray, camera: Camera, starts: Array, ends: Array, colour: t
 
 
 def facing(camera: Camera, points: Array, normals: Array) -> np.ndarray:
-    """Which points look toward a camera, and are not just before it."""
+    """Mask (P,) of the points that face a camera and are not close in front of it."""
     away = camera.centre - points
     return ((away * normals).sum(1) > 0) & (np.linalg.norm(away, axis=1) > NEAREST)
 
 
 def hull(found: Scene) -> np.ndarray:
-    """Points with normals over two pictures; and over the body that was found."""
+    """Points with normals over two images, and over the fitted body."""
     tiles, (points, normals) = [], found.surface[:2]
     for n in (0, 1):
         camera, image = enlarged(found.cameras[n], found.images[n])
@@ -105,7 +105,7 @@ def hull(found: Scene) -> np.ndarray:
 
 
 def nearest(body: Body, pose: Array, points: Array, normals: Array, epsilon: float = 0.3) -> tuple[np.ndarray, Array, Array]:
-    """The part (P,) that each point is nearest to, where on it (P, 3), and the cosine of the normals (P,)."""
+    """The nearest part (P,) of each point, the closest point on it (P, 3), and the cosine of the normals (P,)."""
     assert body.limbs is not None
     T, _ = naive.place(body.skeleton, pose)
     each = [naive.closest(body.limbs, s, T[joint], points) for s, joint in enumerate(body.limbs.joints)]
@@ -116,7 +116,7 @@ def nearest(body: Body, pose: Array, points: Array, normals: Array, epsilon: flo
 
 
 def parts(found: Scene) -> np.ndarray:
-    """Points in the colour of the part that they belong to."""
+    """Points in the colour of their body part."""
     which = nearest(found.body, found.pose, *found.surface[:2])[0]
     tiles = []
     for n in range(4):
@@ -129,7 +129,7 @@ def parts(found: Scene) -> np.ndarray:
 
 
 def forces(found: Scene) -> np.ndarray:
-    """An arm put beside its points, and the forces on it (eq. 32); after 20 and 100 iterations of them; after 10 of Gauss-Newton."""
+    """A displaced arm and the forces on it (eq. 32); after 20 and 100 iterations; after 10 of Gauss-Newton."""
     skeleton, cloud, refiner = found.body.skeleton, make_cloud(*found.surface[:3]), Refiner(found.body)
     settled = refiner.gauss_newton(found.pose[None], ((cloud, 10, 0.05),), found.pose[None], np.full(len(found.pose), 1e-5))[0]
     side = "left"
@@ -185,7 +185,7 @@ def overlays(folder: Path) -> np.ndarray:
 
 
 def cropped(image: np.ndarray, camera: Camera, points: Array, margin: int = 85) -> np.ndarray:
-    """What lies around points in space."""
+    """The part of an image around projected points (P, 3)."""
     pixels = camera.project(points)
     (x0, y0), (x1, y1) = (pixels.min(0) - margin).astype(int).clip(0), (pixels.max(0) + margin).astype(int)
     return image[y0:y1, x0:x1]
@@ -198,7 +198,7 @@ def row(tiles: list[np.ndarray], height: int = 430) -> np.ndarray:
 
 
 def main() -> None:
-    """Write the pictures, from a demo that was made or is made now."""
+    """Write the pictures, from an existing or a new demo."""
     with tempfile.TemporaryDirectory() as made:
         folder = Path(sys.argv[1] if len(sys.argv) > 1 else made)
         if len(sys.argv) < 2:

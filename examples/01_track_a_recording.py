@@ -1,4 +1,4 @@
-"""From a recording to joints in metres: a folder of yours as the first argument, or a made one."""
+"""Track a recording and read the joints in metres. The first argument is a recording folder; without one, a recording is rendered."""
 
 import sys
 

@@ -1,7 +1,7 @@
-"""Liu 2011's two ways to resample, side by side on one silhouette: the particle filter in its smallest form.
+"""The two resampling schemes of Liu 2011 on one silhouette: a minimal particle filter.
 
-A cardbox in a known pose is drawn; 200 particles look for that pose from its silhouette alone, all 12 degrees of freedom at once. SRS turns
-costs into probabilities, and with the paper's sigma_gamma these hardly differ: the particles spread. DRS ranks, and closes in.
+A cardbox in a known pose is drawn; 200 particles search for that pose from the silhouette alone, in all 12 degrees of freedom at once. SRS
+turns costs into probabilities, which hardly differ for the paper's sigma_gamma: the particles spread. DRS ranks them and converges.
 """
 
 from pathlib import Path
@@ -27,13 +27,13 @@ skeleton = picture.body.skeleton
 truth = skeleton.pose(torso_bend=0.2, left_shoulder_abduction=1.6, left_elbow_roll=1.5, left_elbow_flexion=0.8,
                       right_shoulder_abduction=0.9)  # fmt: skip
 start = skeleton.pose(left_shoulder_abduction=1.0, left_elbow_roll=1.0, left_elbow_flexion=0.4, right_shoulder_abduction=0.6)
-seen = Observation.of(picture.mask(truth))
+observation = Observation.of(picture.mask(truth))
 noise = np.array([0.02 if dof.kind == "translation" else 0.1 for dof in skeleton.dofs])
 
 
 def weigh(poses):
-    """Costs by eq. 2, and log weights by eq. 6."""
-    costs = silhouette_costs(picture, seen, poses)
+    """Costs (N,) by eq. 2 and log weights (N,) by eq. 6."""
+    costs = silhouette_costs(picture, observation, poses)
     return costs, -(costs**2) / (2 * SIGMA_COST**2)
 
 

@@ -1,7 +1,7 @@
-"""A resampling scheme of your own in the tracker: one function from log weights to the indices of those that live on.
+"""Your own resampling scheme in the tracker: a function from log weights to the indices of the surviving particles.
 
-Here a tournament: each place goes to the better of two particles picked at random. It needs only ranks, like DRS, and keeps more variety.
-A recording folder may be given as the first argument; else one is made.
+The example is tournament selection: each survivor is the better of two particles picked at random. It needs only ranks, like DRS, and keeps
+more diversity. The first argument may be a recording folder; otherwise one is rendered.
 """
 
 import sys
@@ -13,7 +13,7 @@ from shadowpuppet.synthetic import Spec, synthesize
 
 
 def tournament(rng, log_weights, number):
-    """Indices (number,) of particles by their log weights (N,)."""
+    """Indices (number,) of the surviving particles, from log weights (N,)."""
     pairs = rng.integers(len(log_weights), size=(number, 2))
     return np.where(log_weights[pairs[:, 0]] > log_weights[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
 

@@ -1,4 +1,4 @@
-"""Silhouettes alone, without tracking: python examples/04_silhouettes_of_a_film.py FILM BACKGROUND (or a made recording)."""
+"""Silhouettes without tracking: python examples/04_silhouettes_of_a_film.py FILM BACKGROUND; without arguments, of a rendered film."""
 
 import sys
 
@@ -20,4 +20,4 @@ print(segment.reason)
 with sp.write_frames("masks.mkv", frames.rate, lossless=True) as masks:
     for frame in frames:
         masks.write(segment(frame.image).astype(np.uint8) * 255)
-print(f"{masks.count} masks in masks.mkv; a recording takes them as masks/<camera>.mkv with --masks")
+print(f"{masks.count} masks in masks.mkv; to track with them, save them as masks/<camera>.mkv in a recording and use --masks")

@@ -1,6 +1,7 @@
-"""Several cameras: from films to joints of the whole body; a recording folder as the first argument, or a made one.
+"""Track a whole body with several cameras. The first argument is a recording folder; without one, a recording is rendered.
 
-A person walks before four small cameras. What is printed is how far each wrist and ankle went, and how well the body fits the silhouettes.
+A person walks in front of four cameras with small images. Printed are the path lengths of wrists and ankles, and the overlap of body and
+silhouettes.
 """
 
 import sys

@@ -1,7 +1,7 @@
-"""A motion prior (Ni 2008, IV): learnt from four seconds of walking, it walks on by itself, frame after frame.
+"""A motion prior (Ni 2008, IV), learnt from four seconds of walking, generates more walking frame by frame.
 
-Files of motion may be given as arguments (.csv, .trc, .bvh, .c3d, or .amc beside its .asf); else a made person walks. The picture shows
-proposals every sixth frame from a pose of the training: what the tracker would try, before it has seen anything.
+Arguments may be motion files (.csv, .trc, .bvh, .c3d, or .amc beside its .asf); otherwise synthetic walking is used. The picture shows
+every sixth proposal, starting from a training pose: what the tracker would propose without observations.
 """
 
 import sys
@@ -17,7 +17,7 @@ from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.video import write_image
 
-SHOWN, EVERY = 8, 6
+TILES, EVERY = 8, 6
 
 rng = np.random.default_rng(1)
 if len(sys.argv) > 1:
@@ -38,7 +38,7 @@ angles, tiles = body.skeleton.dof_indices(trained.prior.names), []
 camera = Spec(ring=Ring(count=2, radius=3.4, height=1.0, fov_deg=28, size=(160, 240))).views()[0].camera()
 picture = sp.Picture(body, camera, camera.T_camera_world)
 region = trained.prior.encode(walk[:, angles]).regions
-for n in range(SHOWN * EVERY):
+for n in range(TILES * EVERY):
     proposal = trained.prior.propose(rng, walk[:, angles], region)
     walk, region = walk.copy(), proposal.regions
     walk[:, angles] = proposal.poses
@@ -48,4 +48,4 @@ for n in range(SHOWN * EVERY):
         upright[body.skeleton.dof_indices(("root_x", "root_y", "root_heading"))] = 0, 0, np.radians(60)
         draw_model(tiles[-1], picture, upright)
 write_image("prior.png", np.concatenate(tiles, axis=1))
-print(f"prior.npz is for track --prior; proposals are drawn in {Path('prior.png').resolve()}")
+print(f"use prior.npz with track --prior; the proposals are drawn in {Path('prior.png').resolve()}")

@@ -1,7 +1,7 @@
-"""Ni 2008's refinement, and Gauss-Newton, on one frame: from silhouettes to surface points to a pose.
+"""Ni 2008's refinement by simulated forces, and Gauss-Newton, on one frame: from silhouettes to surface points to a pose.
 
-A body in a known pose is drawn in five cameras; its silhouettes give the visual hull's surface points. A pose that is off by some degrees
-is then pulled onto them by simulated forces, and by Gauss-Newton: errors of the joints after so many iterations.
+A body in a known pose is drawn in five cameras; its silhouettes give surface points of the visual hull. A perturbed pose is then fitted to
+the points by simulated forces and by Gauss-Newton. Printed are the joint errors after increasing numbers of iterations.
 """
 
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""A body of your own in the tracker: a function from the 18 sizes to shapes on a skeleton.
+"""Your own body in the tracker: a function from the 18 sizes to shapes on a skeleton.
 
-Here the cardbox with two more cards a part, halfway between its two. Two crossed cards look 0.7 times as wide when a limb has rolled by
-45 degrees, four 0.92 times at worst. A recording folder may be given as the first argument; else one is made.
+The example is the cardbox with two more cards per part, halfway between its two. Two crossed cards look 0.7 times as wide when a limb has
+rolled by 45 degrees, four at least 0.92 times. The first argument may be a recording folder; otherwise one is rendered.
 """
 
 import sys
@@ -16,7 +16,7 @@ from shadowpuppet.synthetic import Spec, synthesize
 
 
 def starbox(sizes):
-    """Cards at 0, 45, 90 and 135 degrees about the axis of each part."""
+    """Body with cards at 0, 45, 90 and 135 degrees about the axis of each part."""
     box = cardbox(sizes)
     parts = tuple(dict.fromkeys(box.parts))
     first = np.array([box.parts.index(part) for part in parts])

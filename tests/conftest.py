@@ -7,9 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import made
+import made_rig
 import numpy as np
 import pytest
 
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
 
 
@@ -20,15 +23,39 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The folder of shared recordings beside the checkout (or SHADOWPUPPET_SHARED); its tests are skipped where it is missing."""
+    """The folder of shared recordings beside the checkout (or SHADOWPUPPET_SHARED); tests that use it are skipped if it is missing."""
     path = Path(os.environ.get("SHADOWPUPPET_SHARED", Path(__file__).resolve().parents[2] / "shared"))
     if not (path / "recordings").is_dir():
         pytest.skip("the shared recordings are not here")
     return path
 
 
+@pytest.fixture(scope="session")
+def recording(tmp_path_factory) -> Path:
+    """A small synthetic recording of one camera (`made.SPEC`); not to be changed."""
+    return made.make(tmp_path_factory.mktemp("made") / "tiny")
+
+
+@pytest.fixture(scope="session")
+def rig_recording(tmp_path_factory) -> Path:
+    """A small synthetic recording of four cameras (`made_rig`); not to be changed."""
+    return made_rig.write(tmp_path_factory.mktemp("made") / "rig")
+
+
+@pytest.fixture
+def spoilt(recording, tmp_path) -> Path:
+    """A copy of the module's recording, to be changed."""
+    return made.copied(recording, tmp_path / "spoilt")
+
+
+@pytest.fixture(scope="session")
+def cameras() -> list[Camera]:
+    """The four cameras of `rig_recording`."""
+    return made_rig.cameras()
+
+
 class Said(NamedTuple):
-    """What a command said."""
+    """Exit code and output of a command."""
 
     code: int
     out: str
@@ -37,19 +64,19 @@ class Said(NamedTuple):
 
 @pytest.fixture
 def columns() -> int:
-    """How wide the terminal of `shell` is."""
+    """Width of `shell`'s terminal."""
     return 80
 
 
 @pytest.fixture
 def home(tmp_path) -> Path:
-    """The folder that `shell` is in."""
+    """Working directory of `shell`."""
     return tmp_path
 
 
 @pytest.fixture
 def shell(capsys, monkeypatch, home, columns) -> Callable[..., Said]:
-    """Runs a command as it is typed; gives exit code, standard output and standard error."""
+    """Runs a command line; returns exit code, standard output and standard error."""
     monkeypatch.chdir(home)
     monkeypatch.setenv("COLUMNS", str(columns))
 

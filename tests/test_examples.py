@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from people import shapes_of
 
 from shadowpuppet.camera.rasterize import count
 from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, Viewpoint, synthesize
@@ -73,7 +74,7 @@ def more_cards_keep_their_width(left):
     for body in ("cardbox", left["starbox"]):
         picture = left["fit"].guess.picture(left["footage"].camera, body)
         rolled = [picture.body.skeleton.pose(left_shoulder_abduction=np.pi / 2, left_elbow_roll=roll) for roll in np.radians([0, 22.5, 45])]
-        forearm = picture.body.shapes_of("left_forearm")
+        forearm = shapes_of(picture.body, "left_forearm")
         areas = [count(picture.draw(pose, forearm)) for pose in rolled]
         drawn[picture.body.name] = min(areas) / areas[0]
     assert drawn["cardbox"] < 0.85 < 0.9 < drawn["starbox"]

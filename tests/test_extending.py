@@ -15,7 +15,7 @@ from shadowpuppet.body.upper_body import cardbox, rounded
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.tracking.monocular.initialization import find_person, fit_references
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
-from shadowpuppet.tracking.monocular.size_search import Bodies, Guess
+from shadowpuppet.tracking.monocular.size_search import LinearBodies, PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
@@ -163,7 +163,7 @@ def test_a_body_of_ours_given_as_a_function_is_the_named_one(body):
 
 
 def test_who_wears_a_hat_is_found_and_followed_by_a_body_with_one():
-    guess = Guess(SIZES, 1.75, 2.5, -0.1)
+    guess = PersonEstimate(SIZES, 1.75, 2.5, -0.1)
     view = guess.picture(camera(), hat)
     pose = view.body.skeleton.pose(left_shoulder_abduction=np.pi / 2, right_shoulder_abduction=np.pi / 2)
     mask = view.mask(pose)
@@ -185,6 +185,6 @@ def test_a_body_that_is_not_linear_in_the_sizes_is_refused(change):
         return replace(body, name="bent", shapes=Quads(body.shapes.joints, change(body.shapes.corners, sizes)))
 
     with pytest.raises(ShadowPuppetError, match="body 'bent': its offsets and shapes must be sums of multiples of the sizes"):
-        Bodies(bent)
+        LinearBodies(bent)
     with pytest.raises(ShadowPuppetError, match="body 'bent'"):
         find_person(np.random.default_rng(0), camera(), masks()[:1], height=1.75, body=bent, settings=BRIEF)

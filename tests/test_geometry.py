@@ -1,4 +1,4 @@
-"""Rotations and rigid transforms: group laws, and both directions of every conversion."""
+"""Rotations, rigid transforms, alignment and Euler angles: group laws, both directions of every conversion, nothing nearby is better."""
 
 from __future__ import annotations
 
@@ -6,14 +6,27 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
-from shadowpuppet.geometry import inverse, rigid, rotation_about, rotation_from_vector, transform, vector_from_rotation
+from shadowpuppet.geometry import (
+    ORDERS,
+    align,
+    clear_order,
+    continuous_angles,
+    inverse,
+    rigid,
+    rotation_about,
+    rotation_from_vector,
+    transform,
+    vector_from_rotation,
+)
 
 angles = st.floats(-10, 10)
 vectors = arrays(float, 3, elements=st.floats(-3, 3))
+short_vectors = st.tuples(*[st.floats(-3, 3)] * 3).map(np.array)
 AXES = np.eye(3)
 
 
@@ -72,3 +85,98 @@ def test_transforms_are_batched(rng):
     np.testing.assert_allclose(inverse(T) @ T, np.broadcast_to(np.eye(4), (6, 4, 4)), atol=1e-12)
     assert rigid(np.eye(3), t).shape == (6, 4, 4)
     assert transform(T[0], np.zeros((2, 5, 3))).shape == (2, 5, 3)
+
+
+# Alignment ------------------------------------------------------------------------------------------------------------
+
+
+@given(st.integers(0, 10**6), short_vectors, short_vectors, st.floats(0.2, 4))
+def test_a_rigid_motion_with_a_scale_is_found_again(seed, vector, shift, scale):
+    points = np.random.default_rng(seed).normal(size=(7, 3))
+    R = rotation_from_vector(vector)
+    found = align(points, scale * points @ R.T + shift, scaled=True)
+    np.testing.assert_allclose(found.rotation, R, atol=1e-7)
+    np.testing.assert_allclose(found.translation, shift, atol=1e-7)
+    assert found.scale == pytest.approx(scale)
+    np.testing.assert_allclose(found.apply(points), scale * points @ R.T + shift, atol=1e-7)
+
+
+@given(st.integers(0, 10**6), short_vectors, short_vectors)
+def test_no_other_rigid_motion_is_nearer(seed, vector, shift):
+    rng = np.random.default_rng(seed)
+    points, targets = rng.normal(size=(2, 6, 3))
+    found = align(points, targets)
+    other = points @ (rotation_from_vector(0.1 * vector) @ found.rotation).T + found.translation + 0.05 * shift
+    assert ((found.apply(points) - targets) ** 2).sum() <= ((other - targets) ** 2).sum() + 1e-9
+    scaled = align(points, targets, scaled=True)
+    assert ((scaled.apply(points) - targets) ** 2).sum() <= ((found.apply(points) - targets) ** 2).sum() + 1e-9
+
+
+def test_a_mirror_image_is_turned_not_mirrored(rng):
+    points = rng.normal(size=(8, 3))
+    found = align(points, points * [-1, 1, 1])
+    assert np.linalg.det(found.rotation) == pytest.approx(1)
+    assert np.abs(found.apply(points) - points * [-1, 1, 1]).max() > 0.1
+
+
+def test_each_frame_is_its_own_and_what_is_unknown_does_not_count(rng):
+    points = rng.normal(size=(4, 6, 3))
+    R = rotation_from_vector([0.3, 0.2, 1])
+    targets = points @ R.T + rng.normal(size=(4, 1, 3))
+    targets[1, 2], points[1, 4], targets[2, :4] = np.nan, np.nan, np.nan
+    found = align(points, targets)
+    for n in (0, 1, 3):
+        known = np.isfinite(points[n] + targets[n]).all(1)
+        alone = align(points[n][known], targets[n][known])
+        np.testing.assert_allclose(found.rotation[n], alone.rotation, atol=1e-12)
+        np.testing.assert_allclose(found.apply(points)[n][known], targets[n][known], atol=1e-12)
+    assert np.isnan(found.apply(points)[2]).all()  # two points tell no rotation
+
+
+# Euler angles ---------------------------------------------------------------------------------------------------------
+
+
+def made(order: str, angles) -> np.ndarray:
+    return Rotation.from_euler(order, angles).as_matrix()  # capitals: about the axes as turned before
+
+
+@settings(max_examples=60, deadline=None)
+@given(order=st.sampled_from(ORDERS), seed=st.integers(0, 10_000), frames=st.integers(1, 12))
+def test_angles_make_the_rotations_again(order, seed, frames):
+    R = Rotation.random(frames, random_state=np.random.default_rng(seed)).as_matrix()
+    np.testing.assert_allclose(made(order, continuous_angles(R, order)), R, atol=1e-9)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_angles_that_were_continuous_come_back_even_beyond_a_turn_and_a_quarter(order):
+    t = np.linspace(0, 1, 200)[:, None]
+    angles = t * [9.0, -2.6, 5.0] + [0.2, 0.1, -0.4]  # the second passes -90 degrees between frames, the others go around
+    found = continuous_angles(made(order, angles), order)
+    np.testing.assert_allclose(np.diff(found, axis=0), np.diff(angles, axis=0), atol=1e-9)
+    assert np.abs(np.diff(found, axis=0)).max() < 0.06
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("quarter", [np.pi / 2, -np.pi / 2])
+def test_in_the_singular_posture_the_first_angle_stays(order, quarter):
+    angles = np.array([[0.5, 0.9 * quarter, 0.3]] + [[0.5, quarter, 0.3 + 0.1 * n] for n in range(4)])
+    found = continuous_angles(made(order, angles), order)
+    np.testing.assert_allclose(found, angles, atol=1e-6)
+
+
+def test_limits_choose_between_the_two_triples():
+    angles = np.tile([2.8, 0.3, 2.9], (20, 1)) + 0.01 * np.arange(20)[:, None]
+    R = made("ZXY", angles)
+    wide = np.radians([[90, 270], [-60, 60], [90, 270]])
+    np.testing.assert_allclose(continuous_angles(R, "ZXY", wide), angles, atol=1e-9)
+    narrow = np.radians([[-90, 90], [-200, 200], [-90, 90]])
+    np.testing.assert_allclose(continuous_angles(R, "ZXY", narrow), angles * [1, -1, 1] + [-np.pi, np.pi, -np.pi], atol=1e-9)
+
+
+def test_the_usual_order_is_kept_where_it_is_clear_and_left_where_it_is_not():
+    calm = made("ZXY", np.radians([[10, 20, 30], [170, -40, 90.0]]))
+    assert clear_order(calm) == "ZXY"
+    raised = made("XYZ", np.radians([[a, 3, 2] for a in range(0, 180, 5)]))  # a limb that swings forward through a quarter about x
+    assert clear_order(raised) != "ZXY"
+    steps = np.abs(np.diff(continuous_angles(raised, clear_order(raised)), axis=0)).max()
+    assert steps < np.radians(6)

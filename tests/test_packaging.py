@@ -8,8 +8,8 @@ import re
 import subprocess
 import sys
 import tomllib
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
@@ -125,13 +125,7 @@ def test_the_method_names_what_is_in_the_code():
     names = re.findall(r"`(\w+(?:\.\w+)+)(?:\[.*?\])?`", docs("method.md"))
     assert len(names) > 20
     for name in names:
-        module, *rest = name.split(".")
-        try:
-            found = getattr(import_module(f"shadowpuppet.{module}"), rest[0])
-        except AttributeError:
-            found = import_module(f"shadowpuppet.{module}.{rest[0]}")
-        for part in rest[1:]:
-            found = getattr(found, part)
+        resolve_name(f"shadowpuppet.{name}")
 
 
 def test_every_setting_is_explained():

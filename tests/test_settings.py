@@ -9,8 +9,7 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from shadowpuppet.body.models import ALL
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import MODELS, WHOLE
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.pipeline.options import Options, make_options
@@ -72,7 +71,7 @@ def test_merging_changes_no_preset():
 
 def test_names_that_settings_offer_are_those_there_are():
     hints = get_type_hints(MonocularSettings)
-    assert set(get_args(hints["body"])) == set(ALL)
+    assert set(get_args(hints["body"])) == set(MODELS)
     assert set(get_args(hints["resampling"])) == set(SCHEMES)
 
 

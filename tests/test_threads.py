@@ -1,17 +1,17 @@
 from __future__ import annotations
 
 import cv2
+import made
 import pytest
 
-import made
-from shadowpuppet.threads import LIMIT, limit_threads, thread_limit, usable_cores
+from shadowpuppet.threads import THREADS_VARIABLE, limit_threads, thread_limit, usable_cores
 
 
 @pytest.mark.parametrize(("told", "limit"), [("1", 1), ("3", 3), ("0", None), ("", None), ("many", None), ("-2", None)])
 def test_threads_are_those_that_the_environment_allows(monkeypatch, told, limit):
-    monkeypatch.delenv(LIMIT, raising=False)
+    monkeypatch.delenv(THREADS_VARIABLE, raising=False)
     cores, before = usable_cores(), cv2.getNumThreads()
-    monkeypatch.setenv(LIMIT, told)
+    monkeypatch.setenv(THREADS_VARIABLE, told)
     assert thread_limit() == limit
     assert usable_cores() == min(cores, limit or cores)
     try:
@@ -25,7 +25,7 @@ def test_films_are_the_same_with_any_number_of_threads(monkeypatch, tmp_path, rn
     made.write_film(tmp_path / "film.mp4", rng.integers(0, 255, (12, 48, 64, 3), "u1"))
     found = []
     for limit in ("1", "2", ""):
-        monkeypatch.setenv(LIMIT, limit)
+        monkeypatch.setenv(THREADS_VARIABLE, limit)
         found.append([image.tobytes() for image in made.images(tmp_path / "film.mp4")])
     assert found[0] == found[1] == found[2]
     assert len(found[0]) == 12

@@ -1,8 +1,8 @@
-"""A batch on a cluster that SLURM manages: python batch_on_slurm.py OUT RECORDING...
+"""A batch on a SLURM cluster: python batch_on_slurm.py OUT RECORDING...
 
-To be started on a node from which jobs can be submitted, where it stays until all is done; `tmux` or a small job of its own keeps it alive.
-Needs `pip install 'shadowpuppet[batch]' dask-jobqueue`, the same environment on all nodes, and recordings and OUT in a folder that all
-nodes see. Started again with the same arguments, it does what is missing.
+Start it on a node that can submit jobs, in `tmux` or in a small job; it runs until the batch is finished. It needs
+`pip install 'shadowpuppet[batch]' dask-jobqueue`, the same environment on all nodes, and recordings and OUT in a folder that all nodes can
+access. Started again with the same arguments, it does the missing runs.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 
 
 class Lines(BatchListener):
-    """A line a run, for the log."""
+    """Prints one line per run."""
 
     def ended(self, task, outcome, again):
         print(task.label, outcome["status"], outcome.get("message", ""), "; again" if again else "", flush=True)
 
 
 def main(out: str, *recordings: str) -> int:
-    """One job a core; jobs come and go with the work that is left."""
+    """Run the batch with one job per core; the number of jobs follows the remaining work."""
     cluster = SLURMCluster(
         queue="short",  # the partition's name, as `sinfo` lists it
         cores=1, processes=1, memory="2GB", walltime="04:00:00",

@@ -11,7 +11,7 @@ from papers.liu2011.material import case, made_recording
 from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import told
 from papers.liu2011.sweeps import Measured, measured
-from shadowpuppet.evaluation.bench.mono_cases import Case as Drawn
+from shadowpuppet.evaluation.bench.mono_cases import MonoCase as Drawn
 from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
 from shadowpuppet.evaluation.bench.timing import Contender, in_turns
 from shadowpuppet.threads import one_blas_thread
@@ -96,7 +96,7 @@ def verdicts(times: Times, found: dict[str, Measured]) -> list[Verdict]:
     """The paper's III-A and VI."""
     ratios = {who: times["boxes", who, PAPER] / times["cardbox", who, PAPER] for who in ("ours", "OpenCV")}
     apart = difference(found["cardbox"].error, found["boxes"].error)
-    worse = {True: "the cards' is greater", False: "the cards' is less", None: "not told apart"}[apart.greater]
+    worse = {True: "the cards' is greater", False: "the cards' is less", None: "not significant"}[apart.greater]
     return [
         Verdict("The cardbox has fewer planes to project than a volumetric model, and so costs less to draw", "III-A, Fig. 1, VI",
                 f"{planes('cardbox')} and {planes('boxes')} planes; boxes take {ratios['ours']:.2f} times as long drawn by our kernels, "
@@ -107,5 +107,5 @@ def verdicts(times: Times, found: dict[str, Measured]) -> list[Verdict]:
     ]  # fmt: skip
 
 
-EXPERIMENT = Experiment("cardbox_cost", "Fig. 1, VI: what cards and closed boxes cost to draw, and how well each tracks", "a minute", make,
+EXPERIMENT = Experiment("cardbox_cost", "Fig. 1, VI: drawing cost and tracking error of cards and closed boxes", "a minute", make,
                         runs=20, short_runs=2)

@@ -9,9 +9,9 @@ import numpy as np
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model, write_text
 from shadowpuppet.camera.rasterize import Picture, place
@@ -51,7 +51,7 @@ def subset_of(name: str) -> str:
 
 def model(name: str, sizes: CardboxSizes) -> Image:
     """A body from half aside, with its skeleton and the axes."""
-    body = BODIES[name](sizes)
+    body = make_body(name, sizes)
     camera = Camera.from_fov((TILE, TILE), np.radians(24))
     down, aside = rotation_about((0, 1, 0), 0.22), rotation_about((0, 0, 1), -0.6)
     turned = place(camera, 3.6, -0.28) @ rigid(down @ aside, np.zeros(3))
@@ -96,7 +96,7 @@ def pixels(picture: Picture, points: Array) -> list[tuple[int, int]]:
 
 def draw_sizes(sizes: CardboxSizes) -> object:
     """O1, O2 and O3: the cards from the front, from the side, and an arm, with each size as an arrow."""
-    body = BODIES["cardbox"](sizes)
+    body = make_body("cardbox", sizes)
     level = body.skeleton.pose(left_shoulder_abduction=np.pi / 2, right_shoulder_abduction=np.pi / 2)
     trunk, arm = ("head", "torso", "waist"), ("torso", "left_upper_arm", "left_forearm")
     views = (("O1: front", trunk, 1, front(sizes)), ("O2: side", trunk, 0, side(sizes)), ("O3: an arm, front", arm, 1, arms(sizes)))

@@ -32,8 +32,9 @@ def make(request: Request) -> Outcome:
                                                                  "h xor f": white((model ^ mask) & counted)})
         counts = [int(each.sum()) for each in (model, mask, (model ^ mask) & counted)]
         outcome.tables[stem("figure_4", request, case)] = Table(("frame", "model_px", "silhouette_px", "cost_px"), [[n, *counts]])
-        outcome.said.append(f"Fig. 4, frame {n}: the model has {counts[0]} pixels, the silhouette {counts[1]}, legs and all; {counts[2]} "
-                            "differ, which is the cost of eq. 2. What is seen of the legs, which the model lacks, is not counted.")
+        outcome.said.append(f"Fig. 4, frame {n}: the model has {counts[0]} pixels, the silhouette {counts[1]}, including the legs; "
+                            f"{counts[2]} differ, which is the cost of eq. 2. The visible part of the legs, which the "
+                            "model lacks, is not counted.")
         outcome.settings |= told(case)
     return outcome
 

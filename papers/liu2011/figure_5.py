@@ -36,8 +36,9 @@ def make(request: Request) -> Outcome:
         outcome.pictures[name] = figure
         outcome.tables[name] = Table(("particle", "drawn_from_rank"), [[i + 1, int(a) + 1] for i, a in enumerate(ancestors)])
         outcome.settings |= told(case)
-        outcome.said.append(f"Left: of {NUMBER} particles, ranked by cost, the best stays as it is, the best {SURVIVAL:g} N live on with "
-                            "noise, the rest are the best with noise. Right: where the left arm's particles have the hand, in one frame.")
+        outcome.said.append(f"Left: of {NUMBER} particles, ranked by cost, the best is kept unchanged, the best {SURVIVAL:g} N "
+                            "survive with noise, the rest are copies of the best with noise. Right: "
+                            "the left hands of the left arm's particles in one frame.")
     return outcome
 
 

@@ -105,7 +105,7 @@ def by_motion(case: Case, errors: Errors) -> str:
         during = (case.times >= part.start) & (case.times <= part.end)
         less = [1000 * float(np.nanmean(errors["SRS"][:, during, :, j]) - np.nanmean(errors["DRS"][:, during, :, j])) for j in (1, 2)]
         said.append(f"{part.name}: elbow {less[0]:+.0f}, hand {less[1]:+.0f} mm")
-    return f"What DRS gains over SRS, motion by motion ({case.name}): {'; '.join(said)}."
+    return f"Improvement of DRS over SRS for each motion ({case.name}): {'; '.join(said)}."
 
 
 def verdicts(errors: Errors, runs: dict[str, Runs], shown: str) -> list[Verdict]:
@@ -118,7 +118,7 @@ def verdicts(errors: Errors, runs: dict[str, Runs], shown: str) -> list[Verdict]
     added = difference(of["DRS"]["fist"], of["DRS"]["hand"])
     out.append(Verdict("Taking the hand at the fist's end in the model and at the wrist in the truth adds some 10 cm to its error", "V-A",
                        f"it adds {added.value:.0f} mm (fist's end against wrist {of['DRS']['fist'].mean():.0f} mm, base of the fingers in "
-                       f"both {of['DRS']['hand'].mean():.0f} mm); {HAND[0]} to {HAND[1]} mm are called some 10 cm",
+                       f"both {of['DRS']['hand'].mean():.0f} mm); {HAND[0]} to {HAND[1]} mm count as some 10 cm",
                        bool(HAND[0] <= added.value <= HAND[1]), shown))
     return [*out, stable(errors["DRS"], runs["DRS"], shown)]
 

@@ -28,7 +28,8 @@ def make(request: Request) -> Outcome:
         outcome.tables[f"{name}_dof"] = spreads(case, runs)
         outcome.verdicts += verdicts(case, runs, f"{name}.png")
         outcome.settings |= told(case)
-    outcome.said.append("An elbow's roll is how a forearm that is bent lies about the upper arm: while the arm is straight, it is any.")
+    outcome.said.append("The elbow roll is the rotation of the bent forearm about the upper arm: while the arm is straight, "
+                        "it is undetermined.")
     return outcome
 
 

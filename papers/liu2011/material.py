@@ -30,7 +30,7 @@ from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.spec_file import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.monocular.initialization import Guess
+from shadowpuppet.tracking.monocular.initialization import PersonEstimate
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, make_settings
 from shadowpuppet.video import Image
 
@@ -80,7 +80,7 @@ class Case:
         return self.prepared.footage.camera
 
     @property
-    def guess(self) -> Guess:
+    def guess(self) -> PersonEstimate:
         """The person's sizes and place."""
         return check(self.prepared).fit.guess
 

@@ -62,7 +62,7 @@ def verdicts(found: Sweep, numbers: tuple[int, ...], shown: str) -> list[Verdict
     return [
         Verdict("DRS tracks reliably with few particles (200 a stage)", "V-B-2",
                 f"3D error {paper.error.mean():.0f} mm with N = {PAPER}, {most.error.mean():.0f} mm with N = {numbers[-1]}: "
-                f"{100 * gain:.0f} % less; under {100 * SMALL_GAIN:.0f} % is called enough", bool(gain < SMALL_GAIN), shown),
+                f"{100 * gain:.0f} % less; under {100 * SMALL_GAIN:.0f} % counts as enough", bool(gain < SMALL_GAIN), shown),
         Verdict("With as many particles DRS is better than SRS", "VI",
                 f"2D error with N = {PAPER}: DRS {paper.cost.mean():.0f} px, SRS {found['SRS', PAPER].cost.mean():.0f} px; {reached}",
                 difference(found["SRS", PAPER].cost, paper.cost).greater, shown),

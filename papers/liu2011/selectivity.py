@@ -105,15 +105,15 @@ def verdicts(found: Sweep, readings: Readings, shares: tuple[float, ...], kept: 
     answers = [difference(readings[reading, "SRS"].error, readings[reading, "DRS"].error).greater for reading in READINGS]
     return [
         Verdict("A Gaussian of the cost selects badly, because no model fits a person well", "IV-C-2",
-                f"at Table I's sigma_gamma {100 * kept:.0f} % of an arm's particles count (effective number, median); over "
-                f"{100 * SELECTIVE:.0f} % hardly selects", kept > SELECTIVE, shown),
+                f"at Table I's sigma_gamma {100 * kept:.0f} % of an arm's particles are effective (median); over "
+                f"{100 * SELECTIVE:.0f} % means hardly selective", kept > SELECTIVE, shown),
         Verdict("DRS is better than SRS, whichever way the paper is read", "VI",
                 f"lower 3D error in {answers.count(True)} of {len(answers)} readings", all_of(answers), shown),
-        Verdict("DRS is better than SRS as such", "VI",
+        Verdict("DRS is better than SRS in principle", "VI",
                 f"3D error: DRS {drs.error.mean():.0f} mm, SRS {srs.error.mean():.0f} mm with Table I's sigma_gamma, "
                 f"{tuned.error.mean():.0f} mm with {best:g} of it", difference(tuned.error, drs.error).greater, shown),
     ]  # fmt: skip
 
 
-EXPERIMENT = Experiment("selectivity", "IV-C: how much SRS's weights tell, other sigma_gamma, other readings of the paper", "a minute",
+EXPERIMENT = Experiment("selectivity", "IV-C: selectivity of SRS's weights, other sigma_gamma, other readings of the paper", "a minute",
                         make, runs=10, short_runs=2)

@@ -10,7 +10,7 @@ import numpy as np
 from papers.common.plotting import COLOURS, label
 from papers.liu2011.repeats import FAR, LOST, Runs
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER_JOINTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,7 @@ COLUMNS = tuple(f"{name}{what}" for name in Measured._fields for what in ("", "_
 
 def measured(runs: Runs) -> Measured:
     """What is told of each run."""
-    errors = runs.errors(UPPER)
+    errors = runs.errors(UPPER_JOINTS)
     return Measured(1000 * np.nanmean(errors, axis=(1, 2)), runs.costs.mean(1), 100 * (errors > FAR).mean((1, 2)),
                     100 * (runs.overlaps < LOST).mean(1))
 

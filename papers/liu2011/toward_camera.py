@@ -127,13 +127,13 @@ def verdicts(case: Case, runs: Runs, shown: str) -> list[Verdict]:
     for what, claim in (("neck", "A bow toward the camera is well tracked"), ("hand", "Arms' motion toward the camera is well tracked")):
         those = {name: each for name, each in found.items() if name.endswith(what)}
         if those:
-            got = "; ".join(f"{name}: of {100 * each.reach:.0f} cm {100 * each.share:.0f} % is followed (correlation "
+            got = "; ".join(f"{name}: {100 * each.share:.0f} % of {100 * each.reach:.0f} cm is followed (correlation "
                             f"{each.correlation:.2f}, mean error {100 * each.error:.0f} cm)" for name, each in those.items())
-            out.append(Verdict(claim, "abstract, VI", f"{case.name}, DRS: {got}; tracked is {100 * FOLLOWED[0]:.0f} to "
+            out.append(Verdict(claim, "abstract, VI", f"{case.name}, DRS: {got}; tracked means {100 * FOLLOWED[0]:.0f} to "
                                f"{100 * FOLLOWED[1]:.0f} % with a correlation of {AGREES} or more",
                                all_of([each.tracked for each in those.values()]), shown))
     return out
 
 
-EXPERIMENT = Experiment("toward_camera", "VI: a bow and arms toward the camera, and arms before the trunk", "a minute", make, runs=20,
+EXPERIMENT = Experiment("toward_camera", "VI: a bow and arms toward the camera, and arms in front of the trunk", "a minute", make, runs=20,
                         short_runs=2)

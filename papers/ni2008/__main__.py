@@ -24,7 +24,7 @@ EXPERIMENTS = (
     Experiment("figure_7", "Fig. 7: RMSE of joint angles and positions", "2 minutes", figure_7.make, runs=3),
     Experiment("figure_8", "Fig. 8: RMSE against the number of regions", "10 minutes", figure_8.make, runs=2),
     Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "5 minutes", table_2.make, runs=3),
-    Experiment("particles", "VII: how many particles a plain filter wants", "8 minutes", particles.make),
+    Experiment("particles", "VII: how many particles a plain filter needs", "8 minutes", particles.make),
 )
 
 

@@ -88,9 +88,9 @@ def verdicts(curves: dict[str, Curve]) -> list[Verdict]:
                 + f" (low: under {LOW:.0%} of it)",
                 all(low[motion] < LOW * each.varies for motion, each in curves.items()), "figure_4.png"),
         Verdict(f"The reconstruction error is flat from M = {REGIONS} on", "VI, Fig. 4",
-                f"it falls by each ten regions, before M = {REGIONS} and after: " + "; ".join(
+                f"decrease for every ten regions, before M = {REGIONS} and after: " + "; ".join(
                     f"{motion} {10 * before:.3f}° and {10 * after:.3f}°" for motion, (before, after) in steep.items())
-                + f" (flat: under {FLAT:.0%} of it); of poses not learnt from: {unseen}",
+                + f" (flat: under {FLAT:.0%} of it); for other than training poses: {unseen}",
                 all(after < FLAT * before for before, after in steep.values()), "figure_4.png"),
     ]  # fmt: skip
 

@@ -69,7 +69,7 @@ def verdicts(curves: Curves) -> list[Verdict]:
         Verdict(f"Beyond M = {REGIONS} the tracking error is flat", "VI, Fig. 8", "with more it changes, at most, by "
                 + ", ".join(f"{motion} {share:+.0%}" for motion, share in beyond.items()) + f" (flat: under {LEVEL:.0%})",
                 all(abs(share) < LEVEL for share in beyond.values()) if beyond else None, "figure_8.png"),
-        Verdict("A good choice of M is 10 to 20", "VI, Fig. 8", "over the least error of any M, at worst: "
+        Verdict("A good choice of M is 10 to 20", "VI, Fig. 8", "largest excess over the least error of any M: "
                 + ", ".join(f"{share:+.0%}" for share in worst.values()) + f" (good: under {GOOD:.0%})",
                 all(share < GOOD for share in worst.values()) if worst else None, "figure_8.png"),
     ]  # fmt: skip

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 import shadowpuppet
 from papers.common.experiment import Request
-from shadowpuppet.body.models import make_body
+from shadowpuppet.body.models import make_body, sizes_kind
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import sizes_kind
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array

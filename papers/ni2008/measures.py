@@ -9,9 +9,9 @@ import numpy as np
 
 from papers.ni2008.inputs import Case
 from papers.ni2008.tracks import Track
-from shadowpuppet.body.whole_body import SIDES
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
 
 FAR, OFTEN = 0.2, 0.1
@@ -46,7 +46,7 @@ class Errors(NamedTuple):
 def errors(case: Case, track: Track) -> Errors:
     """A run beside the truth."""
     joints = track.joints(case)
-    distance = joint_errors(joints, case.truth, LIMBS).distance
+    distance = joint_errors(joints, case.truth, LIMB_JOINTS).distance
     known = np.isfinite(distance).all(1)
     by_frame = np.where(known, np.sqrt((distance**2).mean(1)), np.nan)
     angles = angle_differences(case, track)

@@ -109,7 +109,7 @@ def figure_2(request: Request) -> Outcome:
 
 def told_of(away: Array, tau: float, moment: Array) -> str:
     """The force in a sentence."""
-    return (f"P is {1000 * np.linalg.norm(away):.0f} mm from P', the nearest place on the model; the force is bounded at "
+    return (f"P is {1000 * np.linalg.norm(away):.0f} mm from P', the closest point on the model; the force is bounded at "
             f"{1000 * tau:.0f} mm (rho), its moment about the elbow {np.linalg.norm(moment):.4f} m².")
 
 

@@ -164,8 +164,8 @@ def said(found: Found) -> list[str]:
     errors = ", ".join(f"{motion} {value:.0f} mm" for motion, value in alone.items())
     legs = ", ".join(f"{motion} {np.mean([one.exchanged for one in runs.errors]):.0%}" for (motion, name), runs in found.items()
                      if name == "image force")  # fmt: skip
-    return [f"Lost: joints are {1000 * FAR:.0f} mm off on average in over {OFTEN:.0%} of the frames. Nobody who is lost is searched for, "
-            "which `shadowpuppet track` does. Times are of one core, for tracking alone; the paper's are MATLAB's.",
-            "The image force, after the paper's ref. [11], has no normals and no bound. That method's dynamics pass a force on along the "
-            f"limbs, as the sums over what hangs on a joint do here; without them it loses everybody at once ({errors}).",
-            f"The image force has left and right leg exchanged in so many of the frames: {legs}."]  # fmt: skip
+    return [f"Lost: joints are {1000 * FAR:.0f} mm off on average in over {OFTEN:.0%} of the frames. There is no search after a "
+            "loss, unlike in `shadowpuppet track`. Times are on one core, for tracking alone; the paper's are for MATLAB.",
+            "The image force, after the paper's ref. [11], has no normals and no bound. The dynamics of that method propagate forces along "
+            f"the limbs, as the sums over all parts below a joint do here; without them it is lost at once on every motion ({errors}).",
+            f"Share of the frames in which the image force has exchanged left and right leg: {legs}."]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rotations and rigid transforms, batched over leading axes."""
+"""Geometry of space, batched over leading axes: rotations, rigid transforms, alignment of points, Euler angles."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) scaled to length one; not a number for zero vectors."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> Array:
@@ -27,10 +33,8 @@ def rotation_from_vector(vector: ArrayLike) -> Array:
 
 
 def vector_from_rotation(R: ArrayLike) -> Array:
-    """Rotation vector (3,), radians, at most pi long, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`.
-
-    By the quaternion that fits best (Bar-Itzhack 2000), which is exact near half a turn, too, where sines vanish.
-    """
+    """Rotation vector (3,), radians, at most pi long, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`. Uses the
+    best-fitting quaternion (Bar-Itzhack 2000), which stays exact near half a turn, where sines vanish."""
     (a, b, c), (d, e, f), (g, h, i) = np.asarray(R, float)
     K = np.array([[a - e - i, b + d, c + g, h - f], [b + d, e - a - i, f + h, c - g], [c + g, f + h, i - a - e, d - b],
                   [h - f, c - g, d - b, a + e + i]])
@@ -61,48 +65,62 @@ def transform(T: ArrayLike, points: ArrayLike) -> Array:
     return points @ T[:3, :3].T + T[:3, 3]
 
 
-def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) of length one; not a number for those of none."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+MIN_POINTS = 3
+"""Points that determine a rotation."""
+
+
+class Alignment(NamedTuple):
+    """A similarity transform: `scale * rotation @ point + translation`."""
+
+    rotation: Array
+    """Of shape (..., 3, 3)."""
+    translation: Array
+    """Of shape (..., 3)."""
+    scale: Array
+    """Of shape (...)."""
+
+    @property
+    def matrix(self) -> Array:
+        """The rigid transform (..., 4, 4), without the scale."""
+        return rigid(self.rotation, self.translation)
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Points (..., P, 3), transformed."""
+        moved = np.asarray(points, float) @ np.swapaxes(self.rotation, -1, -2)
+        return self.scale[..., None, None] * moved + self.translation[..., None, :]
+
+
+def align(points: ArrayLike, targets: ArrayLike, scaled: bool = False) -> Alignment:
+    """The rotation, translation and, if `scaled`, scale that bring points (..., P, 3) nearest to targets, by least squares (Kabsch
+    1976). Leading axes are aligned independently. Pairs that are not finite are left out; with fewer than three left the result is not a
+    number. The rotation is never a reflection."""
+    points, targets = np.asarray(points, float), np.asarray(targets, float)
+    known = (np.isfinite(points) & np.isfinite(targets)).all(-1, keepdims=True)
+    count = known.sum(-2)
+    middles = [np.where(known, each, 0).sum(-2) / np.maximum(count, 1) for each in (points, targets)]
+    a, b = (np.where(known, each - middle[..., None, :], 0) for each, middle in zip((points, targets), middles))
+    U, S, Vt = np.linalg.svd(np.swapaxes(b, -1, -2) @ a)
+    signs = np.ones(S.shape)
+    signs[..., 2] = np.where(np.linalg.det(U @ Vt) < 0, -1, 1)
+    R = (U * signs[..., None, :]) @ Vt
+    spread = (a**2).sum((-1, -2))
+    scale = np.divide((S * signs).sum(-1), spread, out=np.ones(spread.shape), where=spread > 0) if scaled else np.ones(spread.shape)
+    few = count[..., 0] < MIN_POINTS
+    scale = np.where(few, np.nan, scale)
+    return Alignment(R, middles[1] - scale[..., None] * (R @ middles[0][..., None])[..., 0], scale)
 
 
 ORDERS = ("ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX")
-"""Axes of the three turns; the first is what most programs write."""
-CLEAR = np.radians(25.0)
-"""As long as the middle turn keeps so far from a quarter, the first order will do."""
-SINGULAR = 1e-7
-"""Cosine of the middle turn under which the other two are one and the same."""
+"""Orders of the three axes; the first is what most programs write."""
+MIN_MARGIN = np.radians(25.0)
+"""The first order is used if its middle angle stays this far (rad) from a quarter turn."""
+GIMBAL_COSINE = 1e-7
+"""Cosine of the middle angle below which the first and third axes coincide (gimbal lock)."""
 
 
-def continuous_angles(rotations: Array, order: str, limits: ArrayLike | None = None) -> Array:
-    """Angles (T, 3), rad, of turns about the axes of `order` that make rotations (T, 3, 3), each about the axes as turned by those before.
-
-    Every rotation is made by two triples, and by more of whole turns: the path of least steps is taken, so that angles may pass half a
-    turn; of such paths the one that strays least from `limits` (3, 2), rad, where they are given.
-    """
-    axes = ["XYZ".index(axis) for axis in order]
-    low, high = np.reshape([-np.pi, np.pi] * 3 if limits is None else limits, (3, 2)).T
-    middle = (low + high) / 2
-    first = three_turns(rotations, axes)
-    both = middle + (np.stack([first, first * [1, -1, 1] + np.pi], 1) - middle + np.pi) % (2 * np.pi) - np.pi
-    over = np.maximum(low - both, 0) + np.maximum(both - high, 0)
-    angles = branch(both, (over**2).sum(2) + 1e-6 * (both**2).sum(2), wraps=np.ones(3, bool))
-    angles = np.unwrap(_kept(rotations, angles, axes), axis=0)
-    return angles - 2 * np.pi * np.round((np.median(angles, axis=0) - middle) / (2 * np.pi))
-
-
-def clear_order(rotations: Array) -> str:
-    """The first of `ORDERS` where it is far from singular in all rotations (T, 3, 3); else the one that stays farthest."""
-    room = [np.pi / 2 - float(np.abs(three_turns(rotations, ["XYZ".index(axis) for axis in order])[:, 1]).max()) for order in ORDERS]
-    return ORDERS[0] if room[0] >= CLEAR else ORDERS[int(np.argmax(room))]
-
-
-def three_turns(R: Array, axes: Sequence[int]) -> Array:
-    """Angles (N, 3) of turns about three different axes, one after another, that make rotations (N, 3, 3); the second within a quarter.
-
-    Where the second is a quarter, the first and the third are one and the same, and the first is none.
-    """
+def euler_angles(R: Array, axes: Sequence[int]) -> Array:
+    """Angles (N, 3), rad, about three different axes, each as turned by those before, that make rotations (N, 3, 3). The middle angle is
+    within a quarter turn. In gimbal lock the first angle is zero."""
     i, j, k = axes
     e = 1 if (j - i) % 3 == 1 else -1
     second = np.arcsin(np.clip(e * R[:, i, k], -1, 1))
@@ -112,8 +130,45 @@ def three_turns(R: Array, axes: Sequence[int]) -> Array:
     return np.stack([np.where(single, 0.0, first), second, third], 1)
 
 
-def branch(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
-    """Of candidates (T, K, 3) the path (T, 3) of least squared steps and least costs of their own (T, K) (Viterbi 1967)."""
+def _singular(R: Array, axes: Sequence[int]) -> NDArray[np.bool_]:
+    return np.hypot(R[:, axes[0], axes[0]], R[:, axes[0], axes[1]]) < GIMBAL_COSINE
+
+
+def continuous_angles(rotations: Array, order: str, limits: ArrayLike | None = None) -> Array:
+    """Euler angles (T, 3), rad, in `order` that make rotations (T, 3, 3) and change least from frame to frame. Two triples of angles,
+    and any whole turns, make each rotation. The path of least steps is taken, so angles may pass half a turn; of equal paths the one
+    that exceeds `limits` (3, 2), rad, least."""
+    axes = ["XYZ".index(axis) for axis in order]
+    low, high = np.reshape([-np.pi, np.pi] * 3 if limits is None else limits, (3, 2)).T
+    middle = (low + high) / 2
+    first = euler_angles(rotations, axes)
+    both = middle + (np.stack([first, first * [1, -1, 1] + np.pi], 1) - middle + np.pi) % (2 * np.pi) - np.pi
+    over = np.maximum(low - both, 0) + np.maximum(both - high, 0)
+    angles = smoothest_path(both, (over**2).sum(2) + 1e-6 * (both**2).sum(2), wraps=np.ones(3, bool))
+    angles = np.unwrap(_through_gimbal_lock(rotations, angles, axes), axis=0)
+    return angles - 2 * np.pi * np.round((np.median(angles, axis=0) - middle) / (2 * np.pi))
+
+
+def _through_gimbal_lock(rotations: Array, angles: Array, axes: Sequence[int]) -> Array:
+    """Angles (T, 3) that keep the last frame's first angle in gimbal lock, where any value would do."""
+    i, j, _ = axes
+    e, angles = 1 if (j - i) % 3 == 1 else -1, angles.copy()
+    for t in np.flatnonzero(_singular(rotations, axes)):
+        if t:
+            rest = rotation_about(np.eye(3)[i], angles[t - 1, 0]).T @ rotations[t]
+            angles[t] = angles[t - 1, 0], np.arcsin(np.clip(e * rest[i, axes[2]], -1, 1)), np.arctan2(e * rest[j, i], rest[j, j])
+    return angles
+
+
+def clear_order(rotations: Array) -> str:
+    """The first of `ORDERS` if it keeps clear of gimbal lock in all rotations (T, 3, 3), else the order that stays farthest from it."""
+    room = [np.pi / 2 - float(np.abs(euler_angles(rotations, ["XYZ".index(axis) for axis in order])[:, 1]).max()) for order in ORDERS]
+    return ORDERS[0] if room[0] >= MIN_MARGIN else ORDERS[int(np.argmax(room))]
+
+
+def smoothest_path(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
+    """The path (T, 3) through candidates (T, K, 3) of least squared steps plus own costs (T, K) (Viterbi 1967). `wraps` (3,): which axes
+    are periodic."""
     steps = candidates[1:, None, :] - candidates[:-1, :, None]
     steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
     between = (steps**2).sum(3)
@@ -127,60 +182,3 @@ def branch(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
     for t in range(len(candidates) - 1, 0, -1):
         path[t - 1] = came[t, path[t]]
     return candidates[np.arange(len(path)), path]
-
-
-def _singular(R: Array, axes: Sequence[int]) -> NDArray[np.bool_]:
-    return np.hypot(R[:, axes[0], axes[0]], R[:, axes[0], axes[1]]) < SINGULAR
-
-
-def _kept(rotations: Array, angles: Array, axes: Sequence[int]) -> Array:
-    """Angles (T, 3) whose first stays what it was where it is one with the third, and could be anything."""
-    i, j, _ = axes
-    e, angles = 1 if (j - i) % 3 == 1 else -1, angles.copy()
-    for t in np.flatnonzero(_singular(rotations, axes)):
-        if t:
-            rest = rotation_about(np.eye(3)[i], angles[t - 1, 0]).T @ rotations[t]
-            angles[t] = angles[t - 1, 0], np.arcsin(np.clip(e * rest[i, axes[2]], -1, 1)), np.arctan2(e * rest[j, i], rest[j, j])
-    return angles
-
-
-FEWEST = 3
-"""Points that a rotation needs."""
-
-
-class Alignment(NamedTuple):
-    """What lays points over others: `scale * R @ point + translation`."""
-
-    rotation: Array
-    """Of shape (..., 3, 3)."""
-    translation: Array
-    """Of shape (..., 3)."""
-    scale: Array
-    """Of shape (...)."""
-
-    def apply(self, points: ArrayLike) -> Array:
-        """Points (..., P, 3) laid over."""
-        moved = np.asarray(points, float) @ np.swapaxes(self.rotation, -1, -2)
-        return self.scale[..., None, None] * moved + self.translation[..., None, :]
-
-
-def align(points: ArrayLike, targets: ArrayLike, scaled: bool = False) -> Alignment:
-    """The rotation, translation and, if `scaled`, scale that bring points (..., P, 3) nearest to targets, by least squares.
-
-    Each leading index is one of its own. Pairs of which one is not a number do not count; with fewer than three left nothing is told
-    (not a number). A mirror image is never an answer.
-    """
-    points, targets = np.asarray(points, float), np.asarray(targets, float)
-    known = (np.isfinite(points) & np.isfinite(targets)).all(-1, keepdims=True)
-    count = known.sum(-2)
-    middles = [np.where(known, each, 0).sum(-2) / np.maximum(count, 1) for each in (points, targets)]
-    a, b = (np.where(known, each - middle[..., None, :], 0) for each, middle in zip((points, targets), middles))
-    U, S, Vt = np.linalg.svd(np.swapaxes(b, -1, -2) @ a)
-    signs = np.ones(S.shape)
-    signs[..., 2] = np.where(np.linalg.det(U @ Vt) < 0, -1, 1)
-    R = (U * signs[..., None, :]) @ Vt
-    spread = (a**2).sum((-1, -2))
-    scale = np.divide((S * signs).sum(-1), spread, out=np.ones(spread.shape), where=spread > 0) if scaled else np.ones(spread.shape)
-    few = count[..., 0] < FEWEST
-    scale = np.where(few, np.nan, scale)
-    return Alignment(R, middles[1] - scale[..., None] * (R @ middles[0][..., None])[..., 0], scale)

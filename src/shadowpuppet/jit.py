@@ -1,4 +1,4 @@
-"""How the core's kernels are compiled, and how many poses they take at once."""
+"""Numba decorators of the kernels, and how many poses a kernel works on at once."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numba
 
 BLOCK = 32
 """Poses side by side in memory, so that one instruction works on eight (AVX-512) or four (AVX2) of them."""
-BARE: dict[str, Any] = {"nogil": True, "_nrt": False, "error_model": "numpy"}
-"""A kernel gets all its arrays and makes none, so that Numba counts no references: where arrays are sliced in inner loops, that took more
-time than the work. Nor are divisions checked, which would keep loops from being vectorised: no kernel divides by zero. Python's lock is let
-go, so that several cameras are worked on at once: who keeps arrays for a kernel to work in keeps them from other threads meanwhile.
+KERNEL_OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "error_model": "numpy"}
+"""Kernels get all arrays from their caller and allocate none, so Numba's reference counts are off: where arrays are sliced in inner loops,
+counting took longer than the work. Division checks are off, which would prevent vectorisation: no kernel divides by zero. The GIL is
+released, so several cameras are worked on at once; a caller that reuses work arrays must lock them.
 
-Numba keeps what it compiled until the kernel's own file changes: after a change in a file that it calls into, remove `__pycache__`."""
+Numba's cache only notices changes of a kernel's own file: after a change in a file that the kernel calls into, remove `__pycache__`."""
 
 
 def compiled(**options: Any) -> Callable[[Any], Any]:
-    """Numba's `njit`; what it compiled is kept for the next time, but where there is no folder for it, as where all can only be read."""
+    """Numba's `njit` with its cache on disk, or without it where the folder cannot be written."""
 
     def made(function: Any) -> Any:
         try:
@@ -31,13 +31,13 @@ def compiled(**options: Any) -> Callable[[Any], Any]:
     return made
 
 
-kernel = compiled(**BARE)
-joined = compiled(**BARE, forceinline=True)
-"""A kernel that another calls so often that the call itself would take time: LLVM puts it in its place."""
-part = numba.njit(inline="always")
-"""A part of one or two kernels, compiled with them only."""
-LOOSE = {"contract", "nsz", "arcp", "nnan"}
-"""Freedom that lets a loop over lanes become one of vectors; infinities keep their meaning, what is not a number must not come in. Sums
-keep their order: what is compiled now and what is loaded from the cache next time are optimised apart, and would differ in the last bit."""
-summing = compiled(**BARE, fastmath=LOOSE)
-"""A kernel of sums over finite numbers, lane by lane."""
+kernel = compiled(**KERNEL_OPTIONS)
+inline_kernel = compiled(**KERNEL_OPTIONS, forceinline=True)
+"""Always-inlined kernel: for those called so often that the call itself takes time (LLVM inlines it)."""
+device = numba.njit(inline="always")
+"""A function inside kernels; compiled with its callers only."""
+REDUCTION_MATH = {"contract", "nsz", "arcp", "nnan"}
+"""Fast-math flags that let loops over lanes vectorise; infinities keep their meaning, NaN must not come in. Sums are not reordered: the
+compiled and the cached version are optimised separately and would differ in the last bit."""
+reduction_kernel = compiled(**KERNEL_OPTIONS, fastmath=REDUCTION_MATH)
+"""Kernel of sums over finite numbers, lane by lane."""

@@ -1,23 +1,30 @@
-"""How many threads work: one for linear algebra, and no more in all than a process is told."""
+"""Numbers of threads: one for linear algebra, and at most the process's limit in all."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-LIMIT = "SHADOWPUPPET_THREADS"
+THREADS_VARIABLE = "SHADOWPUPPET_THREADS"
 """Environment variable: cores that a process may use, where several share a machine."""
-POOLS = (LIMIT, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
-"""Variables that libraries read when they are loaded."""
+THREAD_VARIABLES = (THREADS_VARIABLE, *(f"{library}_NUM_THREADS" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")),
+                    "VECLIB_MAXIMUM_THREADS")
+"""Environment variables that libraries read when they are loaded."""
+
+
+def child_environment(variables: Mapping[str, str]) -> dict[str, str]:
+    """Environment of a Python process that imports from where this one does, with `variables` set. Start the process with `-P`, or else
+    modules of the current folder come first."""
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    return {**os.environ, "PYTHONPATH": path, "PYTHONUTF8": "1", **variables}
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Inside, matrices are worked on by one thread.
-
-    Ours are small: more threads gain nothing, and on busy cores they wait for one another, which took seven times the whole.
-    """
+    """Context in which BLAS uses one thread. Our matrices are small: more threads gain nothing, and on busy cores waiting for one
+    another made the whole seven times slower."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):
@@ -25,9 +32,9 @@ def one_blas_thread() -> Iterator[None]:
 
 
 def thread_limit() -> int | None:
-    """Threads that this process is told to keep to; None where it is not told."""
-    told = os.environ.get(LIMIT, "")
-    return int(told) if told.isdecimal() and int(told) else None
+    """The number of threads that this process is limited to; None without a limit."""
+    value = os.environ.get(THREADS_VARIABLE, "")
+    return int(value) if value.isdecimal() and int(value) else None
 
 
 def usable_cores() -> int:
@@ -37,7 +44,7 @@ def usable_cores() -> int:
 
 
 def limit_threads() -> None:
-    """Hold OpenCV, which reads no variable, to the limit; the others had it when they were loaded."""
+    """Apply the limit to OpenCV, which reads no variable; other libraries read it when they were loaded."""
     if (limit := thread_limit()) is not None:
         import cv2
 

@@ -11,14 +11,15 @@ from scans import make_body as random_tree
 from scans import some_pose
 from scipy.spatial.transform import Rotation
 
-from shadowpuppet.body.jacobian import ROTATION, SMALL, TRANSLATION, VECTOR, exponential, make_chain, place_one
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.forward_kinematics import ROTATION, TRANSLATION, VECTOR
+from shadowpuppet.body.jacobian import SMALL_ANGLE, exponential, make_chain, place_one
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.evaluation.bench import naive_multi as naive
 
 pytestmark = pytest.mark.kernels
 BODIES = {"tree": random_tree(), **{name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}}
-ANGLES = (0.0, 1e-12, 1e-6, 0.99 * SMALL, 1.01 * SMALL, 1e-3, 0.5, 2.0, np.pi - 1e-6, np.pi, np.pi + 1e-6, 5.0, 2 * np.pi - 1e-3)
+ANGLES = (0.0, 1e-12, 1e-6, 0.99 * SMALL_ANGLE, 1.01 * SMALL_ANGLE, 1e-3, 0.5, 2.0, np.pi - 1e-6, np.pi, np.pi + 1e-6, 5.0,
+          2 * np.pi - 1e-3)
 
 
 def turned(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from people import SIZES, random_poses
 
 from shadowpuppet.body.forward_kinematics import sines
-from shadowpuppet.body.skeleton import AXES, Coupling, Dof, Joint, Skeleton
-from shadowpuppet.body.upper_body import RISE, SIDES, upper_body_skeleton
+from shadowpuppet.body.skeleton import AXES, SIDES, Coupling, Dof, Joint, Skeleton
+from shadowpuppet.body.upper_body import SHOULDER_RISE, upper_body_skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
@@ -131,7 +131,7 @@ def test_clavicles_lift_and_advance_the_shoulder_with_its_arm_only(name, other):
     rest = skeleton.forward(skeleton.pose()[None])[0, :, :, 3]
     raised = skeleton.forward(skeleton.pose(**{f"{name}_shoulder_abduction": 1.5, f"{name}_shoulder_forward": 0.5})[None])[0, :, :, 3]
     moved = (raised - rest)[skeleton.joint_index(f"{name}_shoulder")]
-    np.testing.assert_allclose(moved, [0.5 * RISE, 0, 1.5 * RISE], atol=1e-12)
+    np.testing.assert_allclose(moved, [0.5 * SHOULDER_RISE, 0, 1.5 * SHOULDER_RISE], atol=1e-12)
     np.testing.assert_allclose((raised - rest)[skeleton.joint_index(f"{other}_shoulder")], 0)
     assert not UPPER["plain"].couplings
 
@@ -226,9 +226,9 @@ def test_strain_is_zero_at_rest_and_at_most_nine_a_dof_and_grows_with_the_distan
     skeleton = UPPER["plain"]
     rest = np.array([dof.rest for dof in skeleton.dofs])
     away = np.random.default_rng(seed).standard_normal((4, 12))
-    near, far = skeleton.strain(rest + factor * away), skeleton.strain(rest + (factor + 0.1) * away)
+    near, far = skeleton.posture_penalty(rest + factor * away), skeleton.posture_penalty(rest + (factor + 0.1) * away)
     limited = sum(np.isfinite(dof.spread).all() for dof in skeleton.dofs)
-    assert skeleton.strain(rest[None]) == 0
+    assert skeleton.posture_penalty(rest[None]) == 0
     assert (near >= 0).all()
     assert (near < far + 1e-9).all()
     assert (far < 9 * limited).all()
@@ -236,7 +236,7 @@ def test_strain_is_zero_at_rest_and_at_most_nine_a_dof_and_grows_with_the_distan
 
 def test_strain_is_measured_from_rest_in_deviations_of_the_side_on_which_a_value_lies():
     one = Skeleton((Joint("a", None),), (Dof("d", "a", "x", rest=1.0, spread=(0.5, 2.0)), Dof("free", "a", "y")))
-    found = one.strain([[1.0, 7], [0.5, 0], [3.0, -9], [1 - 1.5, 0], [1e9, 0]])
+    found = one.posture_penalty([[1.0, 7], [0.5, 0], [3.0, -9], [1 - 1.5, 0], [1e9, 0]])
     np.testing.assert_allclose(found, [0, 0.9, 0.9, 4.5, 9], rtol=1e-6)
 
 

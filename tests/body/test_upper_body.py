@@ -9,12 +9,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from mirror import mirrored
-from people import SIZES, random_poses
+from people import BODIES, SIZES, random_poses, shapes_of
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body, Hulls, Quads  # fmt: skip
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.body.upper_body import BODIES, FOREARM, HAND_POINT, SIDES, TO_TIP, boxes, cardbox, rounded  # fmt: skip
+from shadowpuppet.body.skeleton import SIDES  # fmt: skip
+from shadowpuppet.body.upper_body import FOREARM, HAND_POINT, TO_TIP, boxes, cardbox, rounded  # fmt: skip
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 
@@ -25,7 +26,7 @@ def corners(body: Body, pose: np.ndarray, part: str) -> np.ndarray:
     """Corners of a part's quads (n, 3) in the body's frame."""
     assert isinstance(body.shapes, Quads)
     T = body.skeleton.forward(pose[None])[0]
-    which = body.shapes_of(part)
+    which = shapes_of(body, part)
     frames, local = T[body.shapes.joints[which, 0]], body.shapes.corners[which]
     return (local @ np.swapaxes(frames[..., :3], 1, 2) + frames[:, None, :, 3]).reshape(-1, 3)
 
@@ -123,7 +124,7 @@ def test_the_fifteen_cards():
 def test_the_torso_s_third_card_lies_across_it_at_mid_height():
     body = cardbox(SIZES)
     assert isinstance(body.shapes, Quads)
-    third = body.shapes.corners[body.shapes_of("torso")[2]]
+    third = body.shapes.corners[shapes_of(body, "torso")[2]]
     np.testing.assert_allclose(third[:, 2], SIZES.torso_height / 2)
     assert np.ptp(third[:, 1]) == pytest.approx((SIZES.shoulder_width + SIZES.torso_bottom_width) / 2)
     assert np.ptp(third[:, 0]) == pytest.approx((SIZES.torso_top_depth + SIZES.torso_bottom_depth) / 2)
@@ -142,7 +143,7 @@ def test_cards_are_flat_and_convex(make):
 def test_crossed_cards_are_perpendicular_and_share_the_part_s_axis():
     body = cardbox(SIZES)
     for part in dict.fromkeys(body.parts):
-        quads = body.shapes.corners[body.shapes_of(part)]  # type: ignore[union-attr]
+        quads = body.shapes.corners[shapes_of(body, part)]  # type: ignore[union-attr]
         normals = np.cross(quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0])
         for a, b in pairwise([*normals, normals[0]] if len(normals) > 2 else normals):
             assert a @ b == pytest.approx(0, abs=1e-12)
@@ -153,7 +154,7 @@ def test_boxes_are_closed():
     body = boxes(SIZES)
     assert Counter(body.parts) == dict.fromkeys(cardbox(SIZES).parts, 6)
     for part in set(body.parts):
-        faces = np.round(body.shapes.corners[body.shapes_of(part)], 9)  # type: ignore[union-attr]
+        faces = np.round(body.shapes.corners[shapes_of(body, part)], 9)  # type: ignore[union-attr]
         edges = Counter(frozenset((tuple(a), tuple(b))) for face in faces for a, b in zip(face, np.roll(face, -1, 0)))
         assert len(edges) == 12
         assert set(edges.values()) == {2}
@@ -165,7 +166,7 @@ def test_rounded_parts_reach_as_far_as_their_sizes_say():
     T = body.skeleton.forward(body.skeleton.pose()[None])[0]
 
     def reach(part: str, axis: int) -> tuple[float, float]:
-        i = body.shapes_of(part)[0]
+        i = shapes_of(body, part)[0]
         centres = (T[body.shapes.joints[i], :, :3] @ body.shapes.centres[i][..., None])[..., 0] + T[body.shapes.joints[i], :, 3]
         radii = body.shapes.radii[i]  # all frames have the body's axes in the zero pose
         return (centres - radii)[:, axis].min(), (centres + radii)[:, axis].max()
@@ -226,11 +227,6 @@ def test_a_mirrored_pose_has_mirrored_points(name, rng):
     np.testing.assert_array_equal(mirrored(body.skeleton, mirrored(body.skeleton, poses)), poses)
 
 
-@pytest.mark.parametrize(("call", "said"), [
-    (lambda: make_body("ball", SIZES), "unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"),
-    (lambda: cardbox(SIZES).shapes_of("head", "left_hand"), "body 'cardbox': unknown part left_hand; there are: head, left_forearm"),
-])
-def test_unknown_names_are_said_with_what_there_is(call, said):
-    with pytest.raises(ShadowPuppetError) as error:
-        call()
-    assert said in str(error.value)
+def test_unknown_names_are_said_with_what_there_is():
+    with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"):
+        make_body("ball", SIZES)

@@ -7,10 +7,9 @@ import pytest
 from people import random_poses
 from scipy import ndimage
 
-from shadowpuppet.body.anthropometry import ANATOMICAL, CYLINDERS, SOLE
-from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, CYLINDER_SHARES, SOLE
+from shadowpuppet.body.models import MODELS, WHOLE, average_sizes, kind_of, make_body, sizes_kind
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
-from shadowpuppet.body.sizes import KINDS, WHOLE, kind_of, sizes_kind
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
@@ -76,7 +75,7 @@ def test_bodies_are_linear_in_their_sizes_and_use_every_one(name, rng):
 def test_sizes_are_kept_checked_and_grow_with_the_height(name):
     sizes, kind = average_sizes(name, 1.75), sizes_kind(name)
     assert kind.from_mapping(dict(zip(kind.names(), sizes.to_array().tolist()))) == sizes
-    assert set(kind.names()) == set(ANATOMICAL if name == "anatomical" else CYLINDERS)
+    assert set(kind.names()) == set(ANATOMICAL_SHARES if name == "anatomical" else CYLINDER_SHARES)
     np.testing.assert_allclose(sizes.to_array() / (1.75 - SOLE), average_sizes(name, 1.4).to_array() / (1.4 - SOLE))
     assert sizes.with_values(hip_forward=-0.02, shoulder_drop=0.0).to_array() is not None
     with pytest.raises(ShadowPuppetError, match=r"size thigh_length: found 44\.0, expected 0\.005 to 2\.0 metres"):
@@ -85,7 +84,7 @@ def test_sizes_are_kept_checked_and_grow_with_the_height(name):
         make_body("cardbox", sizes)
     with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"):
         sizes_kind("ball")
-    assert set(ALL) == set(KINDS) > set(WHOLE)
+    assert set(MODELS) > set(WHOLE)
     assert kind_of(sizes) == name
 
 
@@ -159,7 +158,7 @@ def test_a_mirrored_pose_is_the_mirrored_person(name, rng):
     np.testing.assert_allclose(body.points(mirrored(body.skeleton, poses)), body.points(poses)[:, swap] * [1, -1, 1], atol=1e-12)
     low, high = body.skeleton.limits
     np.testing.assert_allclose(np.sort(mirrored(body.skeleton, np.stack([low, high])), axis=0), [low, high])
-    np.testing.assert_allclose(body.skeleton.strain(mirrored(body.skeleton, poses)), body.skeleton.strain(poses))
+    np.testing.assert_allclose(body.skeleton.posture_penalty(mirrored(body.skeleton, poses)), body.skeleton.posture_penalty(poses))
 
 
 def test_vectors_have_three_components_in_a_row():

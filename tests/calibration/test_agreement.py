@@ -17,11 +17,6 @@ STEP = 1 / made_rig.RATE
 
 
 @pytest.fixture(scope="module")
-def cameras():
-    return made_rig.cameras(4)
-
-
-@pytest.fixture(scope="module")
 def masks(cameras):
     return made_rig.masks(cameras, 30)
 
@@ -31,12 +26,6 @@ def moved(camera: Camera, degrees: float) -> Camera:
     a = np.radians(degrees)
     turn = rigid([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]], np.zeros(3))
     return replace(camera, T_camera_world=turn @ camera.T_camera_world)
-
-
-def scaled(camera: Camera, factor: float) -> Camera:
-    T = camera.T_camera_world.copy()
-    T[:3, 3] *= factor
-    return replace(camera, T_camera_world=T)
 
 
 def test_cameras_that_fit_are_within_a_pixel(cameras, masks):
@@ -132,7 +121,7 @@ def test_a_calibration_from_camera_to_world_is_found(cameras, masks):
 
 
 def test_millimetres_are_found_and_refused(cameras, masks):
-    found = agreement([scaled(camera, 1000) for camera in cameras], masks, STEP)
+    found = agreement([made_rig.scaled(camera, 1000) for camera in cameras], masks, STEP)
     assert max(found.apart) < 0.6  # silhouettes know no scale
     assert found.hopeless
     assert re.search(r"the person 1,[4-9]\d\d m high .* in millimetres", found.refusal())
@@ -141,7 +130,7 @@ def test_millimetres_are_found_and_refused(cameras, masks):
 
 @pytest.mark.parametrize("factor", [0.1, 2.54])
 def test_another_unit_is_doubted(cameras, masks, factor):
-    (doubt,) = agreement([scaled(camera, factor) for camera in cameras], masks, STEP).doubts()
+    (doubt,) = agreement([made_rig.scaled(camera, factor) for camera in cameras], masks, STEP).doubts()
     assert "is it in metres?" in doubt
 
 

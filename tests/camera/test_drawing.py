@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from people import BODIES, shapes_of
 
 from shadowpuppet.body.models import make_body
-from shadowpuppet.body.upper_body import BODIES, CardboxSizes
+from shadowpuppet.body.upper_body import CardboxSizes
 from shadowpuppet.camera import drawing
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model, matching, overlay_frame
@@ -92,12 +93,12 @@ def test_what_is_nearer_hides_what_is_behind(body, behind):
     picture = a_picture(body=body)
     arm_before_chest = {"left_shoulder_abduction": -0.35, "left_shoulder_forward": 0.5, "left_elbow_flexion": 0.3}
     pose = a_pose(picture, **arm_before_chest, torso_twist=np.pi if behind else 0.0)
-    arm, torso = (unpack(picture.draw(pose, picture.body.shapes_of(*parts)), 160)
+    arm, torso = (unpack(picture.draw(pose, shapes_of(picture.body, *parts)), 160)
                   for parts in (["left_forearm"], ["torso"]))
     image = np.zeros((120, 160, 3), np.uint8)
     draw_model(image, picture, pose)
     both = image[arm & torso].astype(float)
-    hues = np.array([drawing.SIDES["left"], drawing.MIDDLE], float)
+    hues = np.array([drawing.SIDE_COLOURS["left"], drawing.MIDDLE_COLOUR], float)
     nearest = (both @ (hues / np.linalg.norm(hues, axis=1, keepdims=True)).T).argmax(1)
     assert len(nearest) > 40
     assert (nearest == behind).mean() > 0.85

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from people import LENSES, camera, picture, random_poses
+from people import BODIES, LENSES, camera, picture, random_poses
 
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Joint, Skeleton
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.projection import DIRECTIONS, NEAR, make_lens
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE, make_lens
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import rigid, rotation_from_vector
 
@@ -65,7 +64,7 @@ def test_a_card_is_the_pixels_whose_rays_hit_it(seed):
 
 
 @pytest.mark.parametrize(("depths", "number"), [
-    ([1, 1, 1, 1], 4), ([-1, -1, -1, -1], 0), ([0, 0, 0, 0], 0), ([NEAR / 2] * 4, 0), ([NEAR] * 4, 4),
+    ([1, 1, 1, 1], 4), ([-1, -1, -1, -1], 0), ([0, 0, 0, 0], 0), ([NEAR_PLANE / 2] * 4, 0), ([NEAR_PLANE] * 4, 4),
     ([1, 1, -1, -1], 4), ([1, 1, 1, -1], 5), ([1, -1, -1, -1], 3), ([-1, 1, -1, -1], 3), ([0, 1, 1, 0], 4), ([-1, -1, -1, 1], 3),
 ])  # fmt: skip
 def test_how_many_corners_are_left_in_front(depths, number):

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from mirror import mirrored
-from people import SIZES, camera, picture, random_poses
+from people import BODIES, SIZES, camera, draw_polygon, picture, random_poses, shapes_of
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.upper_body import BODIES, upper_body_skeleton
+from shadowpuppet.body.upper_body import upper_body_skeleton
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, count, draw_polygon, pack, place, unpack
+from shadowpuppet.camera.rasterize import Picture, count, pack, place, unpack
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
@@ -268,13 +268,25 @@ def test_points_in_the_world_are_those_in_the_camera_s_frame(rng):
 def test_legs_hang_from_the_waist_and_widen(twist):
     view = picture("rounded", camera((200, 220)), elevation=0.3)
     pose = view.body.skeleton.pose(torso_twist=twist)
-    legs, waist = view.legs(pose), unpack(view.draw(pose, view.body.shapes_of("waist")), 200)
+    legs, waist = view.legs(pose), unpack(view.draw(pose, shapes_of(view.body, "waist")), 200)
     rows = np.flatnonzero(legs.any(1))
     assert abs(rows[0] - np.flatnonzero(waist.any(1))[-1]) <= 3
     assert rows[-1] == 219
     widths = legs[rows].sum(1)
     assert (np.diff(widths) >= 0).all()
     assert widths[-1] - widths[0] == pytest.approx(2 * np.tan(np.radians(25)) * (len(rows) - 1), abs=3)
+
+
+@pytest.mark.parametrize("twist", [1.2, -1.2])
+def test_legs_begin_in_the_middle_of_a_hem_that_is_seen_aslant(twist):
+    view = picture("rounded", camera((200, 220)), distance=1.0, elevation=0.0)
+    pose = view.body.skeleton.pose(torso_twist=twist)
+    T = view.transforms(pose[None])[0, view.body.skeleton.joint_index("pelvis")]
+    hem = view.body.hem
+    assert hem is not None
+    ends = naive.to_pixels(view.camera, hem @ T[:, :3].T + T[:, 3])[:, 1]
+    assert np.ptp(ends) > 8
+    assert abs(np.flatnonzero(view.legs(pose).any(1))[0] - ends.mean()) <= 1
 
 
 def test_legs_out_of_the_picture_or_behind_the_camera_are_nowhere():

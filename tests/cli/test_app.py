@@ -19,16 +19,11 @@ import pytest
 
 from shadowpuppet.cli import app as cli
 from shadowpuppet.io.run import read_run
-from shadowpuppet.motion.metrics import UPPER
+from shadowpuppet.motion.metrics import UPPER_JOINTS
 from shadowpuppet.pipeline.options import Options, make_options, options_text
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
          "--initialization.sweeps", "2"]
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +160,7 @@ def test_evaluate_takes_joints_and_a_first_frame(shell, run):
     errors = json.loads(out)["errors"]
     assert (code, list(errors["joints"]), errors["frames"]) == (0, ["neck", "head"], made.FRAMES - 10)
     group = json.loads(shell("evaluate", run, "--joints", "upper", "--json")[1])["errors"]
-    assert list(group["joints"]) == list(UPPER)
+    assert list(group["joints"]) == list(UPPER_JOINTS)
     assert "the run lacks" in refused(shell, "evaluate", run, "--joints", "left_knee")
     assert f"start: found 99, expected 0 to {made.FRAMES - 1}, a frame of" in refused(shell, "evaluate", run, "--start", "99")
 
@@ -270,11 +265,6 @@ def test_a_wrong_file_of_settings_is_said_by_name(shell, recording, tmp_path, te
 
 
 # Bad input
-
-
-@pytest.fixture
-def spoilt(recording, tmp_path):
-    return made.copied(recording, tmp_path / "spoilt")
 
 
 def test_a_missing_film(shell, spoilt):

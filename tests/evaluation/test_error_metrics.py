@@ -25,7 +25,7 @@ from shadowpuppet.evaluation.error_metrics import (
 )
 from shadowpuppet.evaluation.joint_angles import dof_errors, wrapped
 from shadowpuppet.geometry import rotation_from_vector
-from shadowpuppet.motion.metrics import LIMBS, joint_errors
+from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable, Motion
 
 TRUTH = person(2)
@@ -40,7 +40,7 @@ def turned(table: JointTable, vector, shift) -> JointTable:
 
 
 def measured(run: JointTable, truth: JointTable = TRUTH):
-    return joint_errors(run, truth, LIMBS)
+    return joint_errors(run, truth, LIMB_JOINTS)
 
 
 # Ways of laying a run over its truth
@@ -66,7 +66,7 @@ def test_each_way_is_blind_to_what_it_takes_away(seed, vector, shift):
 def test_the_root_is_taken_away_as_a_plain_loop_does_it():
     run = noisy()
     ours, theirs = run.positions - run.positions[:, :1], TRUTH.positions - TRUTH.positions[:, :1]  # the pelvis comes first
-    off = [math.dist(ours[t, NAMES.index(name)], theirs[t, NAMES.index(name)]) for t in range(len(run.times)) for name in LIMBS]
+    off = [math.dist(ours[t, NAMES.index(name)], theirs[t, NAMES.index(name)]) for t in range(len(run.times)) for name in LIMB_JOINTS]
     found = aligned_errors(measured(run), run, TRUTH)
     assert found["root"] == pytest.approx(1000 * np.mean(off))
     assert found["root_joint"] == "pelvis"
@@ -133,7 +133,7 @@ def test_a_bad_run_is_not_taken_for_another_world():
 
 def test_humaneva_s_error_is_the_mean_over_its_fifteen():
     run = noisy()
-    names = ["pelvis", "neck", "head", *LIMBS]
+    names = ["pelvis", "neck", "head", *LIMB_JOINTS]
     frames = [np.mean([math.dist(run.positions[t, NAMES.index(n)], TRUTH.positions[t, NAMES.index(n)]) for n in names])
               for t in range(len(run.times))]
     found = humaneva_error(run, TRUTH)

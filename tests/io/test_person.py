@@ -7,8 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.body.models import average_sizes
-from shadowpuppet.body.sizes import WHOLE, CardboxSizes
+from shadowpuppet.body.models import WHOLE, average_sizes
+from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.person import Person, read_person, write_person
 

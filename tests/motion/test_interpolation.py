@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion.interpolation import steady
+from shadowpuppet.motion.interpolation import uniform_sampling
 
 
 @pytest.mark.parametrize("rate", [23.976, 25, 29.97, 60, 119.88, 1000])
 def test_a_films_times_rounded_to_milliseconds_have_its_rate(rate):
-    found = steady(np.round(np.arange(500) / rate, 3 if rate < 500 else 6) + 7.25)
+    found = uniform_sampling(np.round(np.arange(500) / rate, 3 if rate < 500 else 6) + 7.25)
     assert found.rate == pytest.approx(rate, rel=2e-4)
     np.testing.assert_array_equal(found.frames, np.arange(500))
 
 
 def test_missing_frames_are_places_without_a_frame():
     kept = np.delete(np.arange(50), [5, 6, 7, 30])
-    found = steady(kept / 25)
+    found = uniform_sampling(kept / 25)
     assert found.frames is not None
     np.testing.assert_array_equal(np.flatnonzero(found.frames < 0), [5, 6, 7, 30])
     np.testing.assert_array_equal(found.frames[kept], np.arange(46))
@@ -27,18 +27,18 @@ def test_missing_frames_are_places_without_a_frame():
 
 def test_frames_that_lie_between_are_to_be_found_anew():
     times = np.cumsum(np.random.default_rng(3).uniform(0.02, 0.08, 60))
-    found = steady(times)
+    found = uniform_sampling(times)
     assert found.frames is None
     np.testing.assert_allclose(np.diff(found.times)[:-1], np.median(np.diff(times)))
     assert times[0] <= found.times[0] <= found.times[-1] <= times[-1]
 
 
 def test_one_frame_and_none():
-    assert len(steady([3.0]).times) == 1
+    assert len(uniform_sampling([3.0]).times) == 1
     with pytest.raises(ShadowPuppetError, match="found no frame"):
-        steady([])
+        uniform_sampling([])
 
 
 def test_far_too_long_a_gap_is_said():
     with pytest.raises(ShadowPuppetError, match=r"in steps of 0\.01 s"):
-        steady([0, 0.01, 0.02, 1e7])
+        uniform_sampling([0, 0.01, 0.02, 1e7])

@@ -10,14 +10,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.geometry import Array, rotation_about, three_turns
+from shadowpuppet.geometry import Array, euler_angles, rotation_about
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.motion.inverse_kinematics import _along, _Linear, _solved, fit_poses
+from shadowpuppet.motion.inverse_kinematics import (
+    SMOOTH_PULL,
+    TRUNK_SMOOTH_PULL,
+    _at_limits,
+    _Linear,
+    _Problem,
+    _solve_chain,
+    _solve_step,
+    fit_poses,
+)
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.plausibility import NEEDED
+from shadowpuppet.motion.plausibility import NEEDED_JOINTS
 from shadowpuppet.motion.prior.clips import mirrored
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 
@@ -140,7 +148,7 @@ def test_a_short_trunk_bends_forward_not_backward():
 
 @pytest.mark.parametrize("left_out", [
     ("pelvis",), ("left_hip", "right_hip"), ("neck", "head"), ("left_wrist", "right_wrist", "left_hand", "right_hand"),
-    ("left_ankle", "right_ankle"), tuple(set(JOINTS) - set(NEEDED) - {"left_hip", "right_hip"}),
+    ("left_ankle", "right_ankle"), tuple(set(JOINTS) - set(NEEDED_JOINTS) - {"left_hip", "right_hip"}),
 ])  # fmt: skip
 @pytest.mark.parametrize("name", WHOLE)
 def test_any_joints_will_do_that_show_a_person(name, left_out):
@@ -187,9 +195,9 @@ def test_three_turns_make_the_rotation_again_in_the_singular_place_too(axes, rng
     angles[:20, 1] = rng.choice([-1, 1], 20) * np.pi / 2
     turned = [rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, angles.T)]
     R = turned[0] @ turned[1] @ turned[2]
-    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, three_turns(R, axes).T))
+    first, second, third = (rotation_about(np.eye(3)[axis], column) for axis, column in zip(axes, euler_angles(R, axes).T))
     np.testing.assert_allclose(first @ second @ third, R, atol=1e-6)
-    np.testing.assert_array_equal(three_turns(R, axes)[:20, 0], 0)
+    np.testing.assert_array_equal(euler_angles(R, axes)[:20, 0], 0)
 
 
 def test_one_frame_is_enough():
@@ -273,12 +281,12 @@ def test_the_chain_is_solved_as_the_whole_matrix(T, D, S, seed):
     right, free = np.concatenate([equations.g.ravel(), equations.h]), np.append(~held.ravel(), np.ones(S, bool))
     expected = np.zeros(len(right))
     expected[free] = np.linalg.solve(M[np.ix_(free, free)], right[free])
-    step, change = _solved(equations, links, damping, held)
+    step, change = _solve_step(equations, links, damping, held)
     np.testing.assert_allclose(np.append(step.ravel(), change), expected, rtol=1e-6, atol=1e-9)
 
 
 def test_a_chain_of_one_block():
-    np.testing.assert_allclose(_along(np.array([[[2.0]]]), np.zeros((0, 1)), np.array([[[4.0]]])), [[[2.0]]])
+    np.testing.assert_allclose(_solve_chain(np.array([[[2.0]]]), np.zeros((0, 1)), np.array([[[4.0]]])), [[[2.0]]])
 
 
 # On recordings ----------------------------------------------------------------------------------------------------------
@@ -294,3 +302,51 @@ def test_how_near_the_skeleton_can_come_to_people(name, floors, shared):
         limbs = 1000 * np.sqrt(np.mean([fitted.by_joint[joint] ** 2 for joint in LIMBS]))
         assert limbs < floor, recording
         assert np.abs(np.diff(fitted.poses, axis=0)).max() < 1.5
+
+
+def problem(name: str = "anatomical", rate: float = 60.0, free: tuple[str, ...] = ()) -> tuple[_Problem, Array]:
+    """The problem of a motion's joints, and its true poses."""
+    poses, table = motion(name, frames=5, rate=rate)
+    return _Problem(name, table, person(name), free), poses
+
+
+@pytest.mark.parametrize("rate", [15.0, 60.0, 240.0])
+def test_a_steady_turn_costs_the_same_in_every_frame_whatever_the_rate(rate):
+    made, poses = problem(rate=rate)
+    speed = np.linspace(0.5, 1.5, poses.shape[1])
+    cost = made.smooth * (speed * np.diff(made.table.times)[:, None]) ** 2
+    slow = [dof.name.startswith(("chest", "root_bow", "root_tilt")) for dof in make_body("anatomical", person("anatomical")).skeleton.dofs]
+    np.testing.assert_allclose(cost, np.tile(np.where(slow, TRUNK_SMOOTH_PULL, SMOOTH_PULL) * (speed / 60) ** 2, (4, 1)))
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_the_equations_right_side_is_the_cost_s_slope_near_and_far(name, rng):
+    """Half the descent of the cost, by central differences: also of joints far off, whose robust weight falls with the distance."""
+    made, poses = problem(name, free=("upper_arm_length", "thigh_length"))
+    far = rng.normal(0, 1, made.wanted.shape) * rng.choice([0.01, 0.05, 0.2], (*made.wanted.shape[:2], 1))
+    made.wanted = made.wanted + far
+    values = person(name).to_array()
+    values[made.free] += [0.03, -0.02]
+    equations, step = made._equations(poses, values), 1e-6
+    for t, d in [(t, int(d)) for t in (0, 2, 4) for d in rng.integers(poses.shape[1], size=8)]:
+        moved = np.zeros_like(poses)
+        moved[t, d] = step
+        slope = (made.cost(poses + moved, values) - made.cost(poses - moved, values)) / (2 * step)
+        assert equations.g[t, d] == pytest.approx(-slope / 2, rel=1e-3, abs=1e-5)
+    for k, column in enumerate(made.free):
+        moved = step * (np.arange(len(values)) == column)
+        slope = (made.cost(poses, values + moved) - made.cost(poses, values - moved)) / (2 * step)
+        assert equations.h[k] == pytest.approx(-slope / 2, rel=1e-3, abs=1e-5)
+
+
+def test_only_what_would_leave_its_limits_is_held_there(rng):
+    low, high = np.full(5, -1.0), np.ones(5)
+    poses, downhill = np.array([[-1.0, -1.0, 0.3, 1.0, 1.0]]), np.array([[-2.0, 2.0, -2.0, -2.0, 2.0]])
+    held = _at_limits(poses, downhill, low, high)
+    np.testing.assert_array_equal(held, [[True, False, False, False, True]])
+    half = rng.normal(size=(5, 5))
+    equations = _Linear((half @ half.T + np.eye(5))[None], np.zeros((1, 5, 0)), np.zeros((0, 0)), downhill, np.zeros(0))
+    step, _ = _solve_step(equations, np.zeros((0, 5)), 0.0, held)
+    np.testing.assert_array_equal(step[held], 0)
+    free = ~held[0]
+    np.testing.assert_allclose(step[0, free], np.linalg.solve(equations.A[0][np.ix_(free, free)], downhill[0, free]))

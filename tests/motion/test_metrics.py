@@ -20,7 +20,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector, transform
 from shadowpuppet.io.motion.table import read_joints, write_joints
 from shadowpuppet.motion import metrics
-from shadowpuppet.motion.metrics import LIMBS, UPPER, evaluate, joint_errors, match
+from shadowpuppet.motion.metrics import LIMB_JOINTS, UPPER_JOINTS, evaluate, joint_errors, match
 from shadowpuppet.motion.motion import JointTable, MotionBuilder, MotionFrame
 
 NAMES = ("left_elbow", "left_hand", "right_wrist")
@@ -113,10 +113,10 @@ def test_figures_are_those_of_score(score, tmp_path, pair):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize(("recording", "group"), [("upper_body", UPPER), ("reaching", UPPER), ("walking", LIMBS)])
+@pytest.mark.parametrize(("recording", "group"), [("upper_body", UPPER_JOINTS), ("reaching", UPPER_JOINTS), ("walking", LIMB_JOINTS)])
 def test_figures_of_whole_recordings_are_those_of_score(score, shared, tmp_path, rng, recording, group):
     truth = read_joints(shared / "recordings" / recording / "truth.csv")
-    assert (set(score.UPPER), set(score.LIMBS)) == (set(UPPER), set(LIMBS))
+    assert (set(score.UPPER), set(score.LIMBS)) == (set(UPPER_JOINTS), set(LIMB_JOINTS))
     noisy = truth.positions + rng.normal(size=truth.positions.shape) * 0.1
     noisy[50:60] = np.nan
     run = JointTable(truth.times + 0.01, truth.names, noisy)
@@ -133,7 +133,7 @@ def test_the_truth_itself_has_no_error():
 def test_plane_and_depth_make_up_the_distance_and_turn_with_the_world(pair, vector):
     """A camera that turns with the world sees the same."""
     run, truth = pair
-    level = Camera("cam", (4, 4), [[1, 0, 0], [0, 1, 0], [0, 0, 1]], T_camera_world=rigid(metrics.LEVEL, [1, 2, 3]))
+    level = Camera("cam", (4, 4), [[1, 0, 0], [0, 1, 0], [0, 0, 1]], T_camera_world=rigid(metrics.LEVEL_CAMERA, [1, 2, 3]))
     T = rigid(rotation_from_vector(vector), np.zeros(3))
     turned = Camera("cam", (4, 4), level.matrix, T_camera_world=level.T_camera_world @ np.linalg.inv(T))
     moved = [JointTable(t.times, t.names, transform(T, t.positions)) for t in pair]
@@ -175,11 +175,11 @@ def test_frames_are_matched_as_by_trying_all(a, b):
 
 
 def test_default_joints_are_those_of_the_body_that_was_seen():
-    upper = table(0, 2, 15, 0, ("pelvis", "neck", *UPPER, "left_wrist", "right_wrist"))
-    whole = table(0, 2, 15, 0, (*LIMBS, "left_hand", "right_hand"))
-    assert joint_errors(upper, whole).names == UPPER
-    assert joint_errors(whole, whole).names == LIMBS
-    assert joint_errors(whole, upper).names == tuple(name for name in LIMBS if name in upper.names)
+    upper = table(0, 2, 15, 0, ("pelvis", "neck", *UPPER_JOINTS, "left_wrist", "right_wrist"))
+    whole = table(0, 2, 15, 0, (*LIMB_JOINTS, "left_hand", "right_hand"))
+    assert joint_errors(upper, whole).names == UPPER_JOINTS
+    assert joint_errors(whole, whole).names == LIMB_JOINTS
+    assert joint_errors(whole, upper).names == tuple(name for name in LIMB_JOINTS if name in upper.names)
 
 
 @pytest.mark.parametrize(("run", "truth", "names", "said"), [
@@ -240,8 +240,8 @@ def test_statistics_leave_out_what_is_no_number():
 
 
 def test_an_evaluation_is_all_plain_numbers():
-    truth = table(0, 8, 15, 0, UPPER)
-    builder = MotionBuilder("cardbox", ["torso_y"], UPPER)
+    truth = table(0, 8, 15, 0, UPPER_JOINTS)
+    builder = MotionBuilder("cardbox", ["torso_y"], UPPER_JOINTS)
     for time, places in zip(truth.times, truth.positions):
         builder.append(MotionFrame(time, "tracked", joints=places + 0.1, cost=100.0, overlap=0.9))
     said = json.loads(json.dumps(evaluate(builder.build(), truth)))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion.motion import BLANK, SERIES, STATUSES, JointTable, Motion, MotionBuilder, MotionFrame
+from shadowpuppet.motion.motion import BLANK, PER_FRAME, STATUSES, JointTable, Motion, MotionBuilder, MotionFrame
 
 DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand", "right_hand")
 
@@ -57,7 +57,7 @@ def test_a_part_is_the_motion_of_its_frames(words, part):
     if part.step is not None and part.step < 0:
         part = slice(part.start, part.stop, -part.step)
     some = whole[part]
-    for name in SERIES:
+    for name in PER_FRAME:
         np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[part])
     assert (some.dof_names, some.joint_names, some.body_name) == (DOFS, JOINTS, "cardbox")
 
@@ -112,7 +112,7 @@ def test_an_interrupt_within_a_frame_loses_that_frame_only():
     assert len(builder.build()) == 1
 
 
-@pytest.mark.parametrize("name", [name for name in SERIES if name != "times"])
+@pytest.mark.parametrize("name", [name for name in PER_FRAME if name != "times"])
 def test_a_shape_that_does_not_fit_is_said(name):
     motion = a_motion()
     with pytest.raises(ShadowPuppetError, match=rf"{name}: found shape .*, expected \(5"):

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_from_vector
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.synchronization import at_times, find_offset, in_step, step_of
+from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
 
 steps = st.lists(st.floats(0.8, 1.2), min_size=3, max_size=20)
 
@@ -41,7 +41,7 @@ def test_at_its_own_times_a_table_is_itself_to_the_bit(parts):
     places[rng.random((len(parts), 2)) < 0.3] = np.nan
     table = JointTable(np.cumsum(parts), ("neck", "head"), places)
     assert_array_equal(at_times(table, table.times).positions, places)
-    assert_array_equal(in_step(table, table)[0].positions, places)
+    assert_array_equal(at_common_times(table, table)[0].positions, places)
 
 
 def test_gaps_are_not_bridged():
@@ -65,7 +65,7 @@ def test_a_table_of_one_frame_or_none_knows_no_other_time():
 @pytest.mark.parametrize(("run_rate", "truth_rate", "used"), [(30, 30, 30), (60, 25, 25), (15, 120, 15), (30, 29.97, 29.97), (30, 100, 30)])
 def test_the_slower_one_s_times_are_used_and_the_motion_is_that_of_the_faster(run_rate, truth_rate, used):
     run, truth = person(4, run_rate), person(4, truth_rate)
-    ours, theirs = in_step(run, truth)
+    ours, theirs = at_common_times(run, truth)
     assert step_of(ours.times) == pytest.approx(1 / used)
     assert_array_equal(ours.times, theirs.times)
     off = np.linalg.norm(ours.positions - theirs.positions, axis=2)
@@ -78,7 +78,7 @@ def test_frames_that_a_run_leaves_out_are_not_forgotten():
     """Of a truth with more frames than the run, those remain that the run does not have, as many a second as it has elsewhere."""
     run, truth = person(4, 20), person(6, 100)
     some = (run.times < 1) | (run.times > 2)
-    ours, theirs = in_step(JointTable(run.times[some], run.names, run.positions[some]), truth)
+    ours, theirs = at_common_times(JointTable(run.times[some], run.names, run.positions[some]), truth)
     lost = ~np.isfinite(ours.positions).all((1, 2))
     assert np.isfinite(theirs.positions).all()
     assert abs(lost.sum() - 60) <= 3  # a second in the middle, two at the end

@@ -88,11 +88,11 @@ def test_all_of(answers, expected):
     assert all_of(answers) is expected
 
 
-def test_the_claims_table_says_yes_no_and_cannot_be_told():
+def test_the_claims_table_says_yes_no_and_inconclusive():
     rows = [Verdict("c", "V", "1 mm", same) for same in (True, False, None)]
     lines = claims_table(rows).splitlines()
     assert lines[0] == "| paper said | where | we got | same conclusion? |"
-    assert [line.split("|")[4].strip() for line in lines[2:]] == ["yes", "**no**", "cannot be told"]
+    assert [line.split("|")[4].strip() for line in lines[2:]] == ["yes", "**no**", "inconclusive"]
 
 
 # Tables and pictures
@@ -240,7 +240,7 @@ def test_the_page_is_built_of_results_and_keeps_what_is_not_named(tmp_path, docs
     assert page.endswith("<!-- others -->\nkept\n<!-- end of others -->\n")
     assert "| paper said | where | we got: made | same? | we got: lab | same? |" in page
     assert "| one is less than two | Table I | 3 | **no** | 1 | yes |" in page
-    assert "Of 2 conclusions 0 are the same here, 1 are not, and for 1 the runs do not tell" in page
+    assert "Of 2 conclusions 0 are the same here, 1 are not, and for 1 the runs are inconclusive" in page
     assert [line for line in page.splitlines() if line.startswith("- *")] == [
         "- *one is less than two* (Table I): 3; see [`tried`](#tests-tried)."]
     assert "![tried](assets/tests_tried.png)" in page

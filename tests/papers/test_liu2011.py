@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import json
 import shutil
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from results import read_rows, read_summary
 
 from papers.common.experiment import Request
 from papers.liu2011 import (
@@ -54,44 +52,33 @@ def request_(out) -> Request:
     return Request(out, runs=4, seed=SEED, short=True, more={"silhouettes": "practical"})
 
 
-@cache
-def read(out: Path, name: str) -> list[dict[str, str]]:
-    with (out / f"{name}.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-@cache
-def told(out: Path, name: str) -> dict[str, Any]:
-    return json.loads((out / f"{name}.json").read_text("utf-8"))
-
-
 # As a reader types it
 
 
 @pytest.mark.parametrize("name", [experiment.name for experiment in EXPERIMENTS])
 def test_each_leaves_pictures_and_data(out, name):
-    summary = told(out, name)
+    summary = read_summary(out, name)
     assert summary["command"] == f"python -m papers.liu2011 {name} --short --seed {SEED}"
     assert summary["pictures"] or name == "table_1"
     for picture in summary["pictures"]:
         pixels = np.asarray(Image.open(out / picture).convert("L"), float)
         assert (out / picture).stat().st_size <= 150_000
         assert pixels.std() > 5
-    assert all(len(read(out, Path(file).stem)) > 0 for file in summary["data"])
+    assert all(len(read_rows(out, Path(file).stem)) > 0 for file in summary["data"])
 
 
 def test_the_claims_that_method_md_lists_are_all_judged(out):
-    said = " ".join(claim["claim"] for experiment in EXPERIMENTS for claim in told(out, experiment.name)["claims"])
+    said = " ".join(claim["claim"] for experiment in EXPERIMENTS for claim in read_summary(out, experiment.name)["claims"])
     for part in ("3D: elbows", "3D: hands", "hand is tracked worse", "10 cm", "stably", "2D error", "varies less", "each of the 12",
                  "throughout", "bow toward", "Arms' motion toward", "e near 0", "e = 1", "15 frames/s", "fewer planes"):  # fmt: skip
         assert part in said
 
 
 def test_means_are_those_of_the_curves(out):
-    rows = read(out, "figure_6_7")
+    rows = read_rows(out, "figure_6_7")
     for side, joint, row in (("left", "elbow", 1), ("right", "fist", 7)):
         curve = np.array([float(each[f"{side}_{joint}_DRS_mm"]) for each in rows])
-        assert float(read(out, "figure_6_7_means")[row]["DRS mean, mm"]) == pytest.approx(curve.mean(), abs=0.1)
+        assert float(read_rows(out, "figure_6_7_means")[row]["DRS mean, mm"]) == pytest.approx(curve.mean(), abs=0.1)
 
 
 def test_the_truth_is_far_from_itself_by_nothing(request_):
@@ -149,7 +136,7 @@ def test_given_recordings_are_taken_and_need_a_truth_for_3d_errors(out, tmp_path
     given = tmp_path / "lab"
     given.symlink_to(out / "recordings" / "three_motions_short", target_is_directory=True)
     assert run(["figure_8", "--short", "--recording", str(given), "-o", str(tmp_path / "out")]) == 0
-    assert told(tmp_path / "out", "figure_8")["recordings"] == ["lab"]
+    assert read_summary(tmp_path / "out", "figure_8")["recordings"] == ["lab"]
     bare = tmp_path / "bare"
     bare.mkdir()
     for path in given.iterdir():
@@ -203,7 +190,7 @@ def test_gains_are_told_motion_by_motion():
     of = errors(0.06, 0.1)
     of["DRS"][:, 2:] += 0.09
     said = figure_6_7.by_motion(case, of)
-    assert said == "What DRS gains over SRS, motion by motion (lab): wave: elbow +40, hand +60 mm; bow: elbow -50, hand -30 mm."
+    assert said == "Improvement of DRS over SRS for each motion (lab): wave: elbow +40, hand +60 mm; bow: elbow -50, hand -30 mm."
 
 
 @pytest.mark.parametrize(("drs", "srs", "same"), [(100, 200, True), (200, 100, False), (100, 100, None)])
@@ -322,7 +309,7 @@ def test_following_decides(request_, share, noise, same):
 
 
 def test_the_diagram_of_drs_is_algorithm_4(out):
-    ranks = [int(row["drawn_from_rank"]) for row in read(out, "figure_5")]
+    ranks = [int(row["drawn_from_rank"]) for row in read_rows(out, "figure_5")]
     survivors = int(figure_5.SURVIVAL * figure_5.NUMBER)
     assert ranks == [*range(1, survivors + 1), *[1] * (figure_5.NUMBER - survivors)]
 

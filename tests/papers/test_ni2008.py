@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from PIL import Image
+from results import read_rows, read_summary
 
 from papers.common import runner
 from papers.common.experiment import Request
@@ -55,21 +54,12 @@ def case(asked) -> inputs.Case:
     return inputs.load(asked, inputs.sources(asked)[2])
 
 
-def summary(out: Path, name: str) -> dict:
-    return json.loads((out / f"{name}.json").read_text("utf-8"))
-
-
-def rows(out: Path, name: str) -> list[dict[str, str]]:
-    with (out / f"{name}.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 # As a reader types it
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda experiment: experiment.name)
 def test_each_leaves_pictures_data_and_claims(out, experiment):
-    told = summary(out, experiment.name)
+    told = read_summary(out, experiment.name)
     assert told["short"]
     assert told["seed"] == SEED
     assert told["takes"] == experiment.takes
@@ -78,7 +68,7 @@ def test_each_leaves_pictures_data_and_claims(out, experiment):
             assert min(picture.size) > 150
             assert len(picture.convert("RGB").getcolors(1 << 20)) > 5  # something is drawn
     for name in told["data"]:
-        assert rows(out, Path(name).stem)
+        assert read_rows(out, Path(name).stem)
     claims = [claim["claim"] for claim in told["claims"]]
     wanted = CLAIMS.get(experiment.name, [])
     assert len(claims) == len(wanted)
@@ -91,13 +81,13 @@ def test_each_leaves_pictures_data_and_claims(out, experiment):
 def test_a_second_command_uses_the_runs_of_the_first(out, capsys):
     files = {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")}
     assert files
-    before = summary(out, "table_2")["claims"]
+    before = read_summary(out, "table_2")["claims"]
     assert main(["table_2", "--short", "--workers", "1", "--seed", str(SEED), "-o", str(out)]) == 0
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")} == files
     said = capsys.readouterr()
     assert "| paper said | where | we got | same conclusion? |" in said.out
     assert "reading" not in said.err
-    assert [claim["same"] for claim in summary(out, "table_2")["claims"]] == [claim["same"] for claim in before]
+    assert [claim["same"] for claim in read_summary(out, "table_2")["claims"]] == [claim["same"] for claim in before]
 
 
 def test_a_run_is_kept_under_all_that_it_depends_on(case, asked, monkeypatch):
@@ -117,9 +107,9 @@ def test_a_given_recording_is_read_from_its_films(tmp_path, capsys):
                 ring=Ring(count=4, radius=3.6, fov_deg=42, size=(160, 120)), scene=Scene(empty_seconds=0.3))
     folder, into = synthesize(spec, tmp_path / "boxer"), tmp_path / "out"
     assert main(["table_1", "figure_5", "--recording", str(folder), "--workers", "1", "-o", str(into)]) == 0
-    assert [row["testing size, frames"] for row in rows(into, "table_1")] == ["5"]
-    assert summary(into, "figure_5")["command"] == "python -m papers.ni2008 figure_5 --recording boxer"
-    assert float(rows(into, "figure_5")[0]["rmse_mm"]) < 150
+    assert [row["testing size, frames"] for row in read_rows(into, "table_1")] == ["5"]
+    assert read_summary(into, "figure_5")["command"] == "python -m papers.ni2008 figure_5 --recording boxer"
+    assert float(read_rows(into, "figure_5")[0]["rmse_mm"]) < 150
     with Image.open(into / "figure_5.png") as picture:
         seen = np.asarray(picture.convert("RGB")).astype(int)
     lower = seen[seen.shape[0] // 2 :].reshape(-1, 3)
@@ -351,19 +341,19 @@ def test_figs_6_and_7_and_the_particles_are_judged():
 
 
 def test_the_model_is_the_papers(out):
-    parts = rows(out, "figure_1")
+    parts = read_rows(out, "figure_1")
     assert [row["part"] for row in parts] == list(models.PARTS)
     assert sum(len(row["degrees_of_freedom"].split()) for row in parts) == 25
     assert float(parts[0]["radius_x_m"]) != float(parts[0]["radius_y_m"])  # the torso is elliptic
     assert all(row["radius_x_m"] == row["radius_y_m"] for row in parts[1:])
-    feels = {row["part"]: row["feels_forces_on"] for row in rows(out, "figure_3")}
+    feels = {row["part"]: row["feels_forces_on"] for row in read_rows(out, "figure_3")}
     assert feels["torso"] == "all"
     assert feels["right_upper_arm"] == "1 + 2"  # eq. 40
     assert feels["left_lower_leg"] == "8"
 
 
 def test_the_force_points_at_the_scene_point_and_is_bounded(out):
-    P, foot, c, F, M = (np.array([float(row[axis]) for axis in "xyz"]) for row in rows(out, "figure_2"))
+    P, foot, c, F, M = (np.array([float(row[axis]) for axis in "xyz"]) for row in read_rows(out, "figure_2"))
     away = (P - foot) / np.linalg.norm(P - foot)
     np.testing.assert_allclose(F, away * make_multiview_settings("ni2008").surface.tau, atol=1e-3)
     np.testing.assert_allclose(M, np.cross(foot - c, F), atol=1e-3)

@@ -27,11 +27,6 @@ MASKS = Options(masks=True)
 
 
 @pytest.fixture(scope="module")
-def cameras() -> list[Camera]:
-    return made_rig.cameras(4)
-
-
-@pytest.fixture(scope="module")
 def masks(cameras):
     return made_rig.masks(cameras, FRAMES)
 

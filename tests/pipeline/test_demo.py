@@ -18,7 +18,7 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.inverse_kinematics import fit_poses
-from shadowpuppet.motion.metrics import LIMBS
+from shadowpuppet.motion.metrics import LIMB_JOINTS
 from shadowpuppet.pipeline.synthesize import contact_sheet
 from shadowpuppet.synthetic import demo_ring_spec
 
@@ -74,7 +74,7 @@ def test_contact_sheets_show_what_the_films_show(shown):
 def test_several_cameras_find_the_whole_person(shown):
     run = read_run(shown / "run-ring")
     assert run.motion.status_counts == {"tracked": len(run.motion)}
-    assert set(LIMBS) <= set(run.motion.joint_names)
+    assert set(LIMB_JOINTS) <= set(run.motion.joint_names)
     truth = read_joints(shown / "recording-ring" / "truth.csv")
     feet = ["left_ankle", "right_ankle", "left_knee", "right_knee", "head"]
     off = np.linalg.norm(run.motion.table.select(feet).positions - truth.select(feet).positions, axis=2)
@@ -91,7 +91,7 @@ def test_evaluate_measures_limbs_by_default_and_those_that_are_named(shell):
     code, out, err = shell("evaluate", "show/run-ring")
     assert (code, err) == (0, "")
     rows = [line.split()[0] for line in out.splitlines() if line.startswith(("left_", "right_", "all", "head", "pelvis"))]
-    assert rows == [*LIMBS, "all"]
+    assert rows == [*LIMB_JOINTS, "all"]
     assert "cm2" in out
     assert "pixels" not in out
     assert "plane" not in out

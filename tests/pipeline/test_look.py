@@ -28,14 +28,9 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, wrong_posture
 from shadowpuppet.pipeline.track import json_text, look_at, track_recording
 from shadowpuppet.silhouette.quality import mask_quality
-from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, Guess, sizes_from_height
+from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, sizes_from_height
 
 QUICK = {"rounds": 20, "patience": 5, "sweeps": 2}
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
 
 
 @pytest.fixture(scope="module")
@@ -287,10 +282,10 @@ def _write(path, image) -> None:
 def _drawn(posture: str, pose_of: str, distance: float = 2.0):
     """What `wrong_posture` is asked of a body drawn in one posture that is said to be another."""
     camera = replace(Camera.from_fov((320, 240), np.radians(60)), oriented=True)
-    guess = Guess(sizes_from_height(1.75), 1.75, distance, -0.55)
+    guess = PersonEstimate(sizes_from_height(1.75), 1.75, distance, -0.55)
     picture = guess.picture(camera)
     pose, said = (picture.body.skeleton.pose(**POSTURES[name]) for name in (pose_of, posture))
-    return camera, picture.mask(pose), posture, Fit(guess, {}, {posture: 0.9}, np.array([said])), said
+    return camera, picture.mask(pose), posture, SizeFit(guess, {}, {posture: 0.9}, np.array([said])), said
 
 
 @pytest.mark.parametrize("posture", POSTURES)

@@ -25,13 +25,8 @@ MASKS = Options(masks=True)
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made_rig.write(tmp_path_factory.mktemp("made") / "rig")
-
-
-@pytest.fixture
-def spoilt(recording, tmp_path):
-    return made.copied(recording, tmp_path / "spoilt")
+def recording(rig_recording):
+    return rig_recording
 
 
 def looked(path, options=MASKS) -> RigLook:
@@ -90,14 +85,8 @@ def test_swapped_films_are_told(spoilt):
     assert any("cameras 'cam1' and 'cam2' are swapped" in doubt for doubt in looked(spoilt).doubts)
 
 
-def scaled(camera, factor):
-    T = camera.T_camera_world.copy()
-    T[:3, 3] *= factor
-    return replace(camera, T_camera_world=T)
-
-
 def test_a_calibration_in_millimetres_is_refused_as_it_is_read(spoilt, capsys):
-    write_calibration(spoilt / "calibration.toml", [scaled(camera, 1000) for camera in made_rig.cameras()])
+    write_calibration(spoilt / "calibration.toml", [made_rig.scaled(camera, 1000) for camera in made_rig.cameras()])
     assert run(["info", str(spoilt), "--masks"]) == 2
     shown = capsys.readouterr()
     assert "millimetres" in shown.err
@@ -105,7 +94,7 @@ def test_a_calibration_in_millimetres_is_refused_as_it_is_read(spoilt, capsys):
 
 
 def test_a_calibration_in_feet_is_doubted(spoilt):
-    write_calibration(spoilt / "calibration.toml", [scaled(camera, 3.28) for camera in made_rig.cameras()])
+    write_calibration(spoilt / "calibration.toml", [made_rig.scaled(camera, 3.28) for camera in made_rig.cameras()])
     assert any("is it in metres?" in doubt for doubt in looked(spoilt).doubts)
 
 

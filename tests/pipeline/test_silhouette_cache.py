@@ -14,11 +14,6 @@ from shadowpuppet.pipeline.track import Listener, track_recording
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
-
-
 @pytest.fixture
 def track(recording, tmp_path):
     """Tracks; gives joints.csv and whether silhouettes were kept."""

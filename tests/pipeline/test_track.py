@@ -25,11 +25,6 @@ QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 2
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
-
-
-@pytest.fixture(scope="module")
 def run(recording, tmp_path_factory):
     return track_recording(recording, tmp_path_factory.mktemp("run") / "run", Options(overlay=True))
 

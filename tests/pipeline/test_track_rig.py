@@ -66,8 +66,8 @@ def track(recording, folder, options=None, listener=None):
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return made_rig.write(tmp_path_factory.mktemp("made") / "rig")
+def recording(rig_recording):
+    return rig_recording
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""An Acclaim skeleton with the CMU laboratory's bones, written as text, and motions of it: for the tests of motion capture."""
+"""Text of an Acclaim skeleton with the CMU laboratory's bones, and of motions of it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def bones():
 
 
 def asf() -> str:
-    """The skeleton as a file's text."""
+    """Text of the .asf file."""
     lines = [":version 1.10", ":name TEST", ":units", "  mass 1.0", "  length 0.45", "  angle deg", ":documentation", "  made",
              ":root", "  order TX TY TZ RX RY RZ", "  axis XYZ", "  position 0 0 0", "  orientation 0 0 0", ":bonedata"]
     for n, (name, _, direction, length, axis, dofs) in enumerate(bones(), 1):
@@ -62,7 +62,7 @@ def poses(count: int, rng: np.random.Generator, size: float = 25.0):
 
 
 def amc(frames) -> str:
-    """Frames as a file's text."""
+    """Text of the .amc file."""
     lines = ["#!OML:ASF made", ":FULLY-SPECIFIED", ":DEGREES"]
     for n, frame in enumerate(frames, 1):
         lines += [str(n), *(f"{name} {' '.join(f'{v:.6f}' for v in values)}" for name, values in frame.items())]
@@ -70,7 +70,7 @@ def amc(frames) -> str:
 
 
 def write(folder, count: int = 3, rng: np.random.Generator | None = None, size: float = 25.0):
-    """`01.asf` and `01_01.amc` in a folder; gives the motion's path and its frames."""
+    """Write `01.asf` and `01_01.amc` into a folder; returns the motion's path and its frames."""
     frames = poses(count, rng or np.random.default_rng(1), size)
     (folder / "01.asf").write_text(asf(), "utf-8")
     (folder / "01_01.amc").write_text(amc(frames), "utf-8")

@@ -1,4 +1,4 @@
-"""A whole person whose poses are known: their surface, what a ring of cameras sees of them, how they move."""
+"""A whole body in known poses: surface points, silhouettes in a ring of cameras, a walk."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, mak
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 CAMERAS = 5
-"""Of four in a ring, two and two face each other."""
+"""Not four: in a ring of four, cameras would face each other in pairs."""
 LIMBS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
 
 
@@ -31,7 +31,7 @@ def body(name: str = "anatomical", height: float = 1.75) -> Body:
 
 
 def sizes(**changes: float) -> AnatomicalSizes:
-    """The average person's, some multiplied."""
+    """Sizes of the average person, some multiplied by factors."""
     mean = average_sizes("anatomical", 1.75)
     assert isinstance(mean, AnatomicalSizes)
     return mean.with_values(**{name: factor * getattr(mean, name) for name, factor in changes.items()})
@@ -55,7 +55,7 @@ def stance(skeleton: Skeleton, swing: float = 0.3, heading: float = 0.0, place: 
 
 
 def walk(skeleton: Skeleton, frames: int, rate: float = 20.0, begin: float = 0.0) -> Array:
-    """Poses (T, D): some steps on a bow."""
+    """Poses (T, D): some steps along a curve."""
     t = begin + np.arange(frames) / rate
     return np.array([stance(skeleton, 0.45 * np.sin(5 * s), 0.4 * s, (0.5 * s - 0.3, 0.1 * s**2)) for s in t])
 
@@ -77,7 +77,7 @@ def cloud_of(seen: SurfacePoints, share: int = 1) -> Cloud:
 
 
 def apart(of: Body, poses: Array, truth: Array) -> Array:
-    """Mean distance of the limbs' joints, of shape (N,), metres."""
+    """Mean distance (N,) of the limbs' joints, metres."""
     chosen = [of.landmark_names.index(name) for name in LIMBS]
     return np.linalg.norm(of.points(np.atleast_2d(poses))[:, chosen] - of.points(np.atleast_2d(truth))[:, chosen], axis=2).mean(1)
 
@@ -93,7 +93,7 @@ def hull(count: int = CAMERAS) -> VisualHull:
 
 
 def masks(of: Body, pose: Array, count: int = CAMERAS) -> list[Mask]:
-    """What each camera sees of a pose (D,)."""
+    """Silhouette of a pose (D,) in each camera."""
     return [Picture(of, camera, camera.T_camera_world).mask(pose) for camera in cameras(count)]
 
 

@@ -1,4 +1,4 @@
-"""BVH files written as text, of made skeletons: for the tests of motion files."""
+"""Text of BVH files with synthetic skeletons."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def bvh(nodes, channels: dict[str, list[str]], frames, step: float = 1 / 30, pre
 
 
 def in_order(nodes) -> list[str]:
-    """Names in the order of the file: each joint before its children, which follow at once."""
+    """Names in the order of the file: depth first."""
 
     def below(name: str) -> list[str]:
         return [name, *(other for child, parent, _ in nodes if parent == name for other in below(child))]
@@ -50,7 +50,7 @@ def in_order(nodes) -> list[str]:
 
 
 def person(frames: int = 5, prefix: str = "", scale: float = 1.0, rng: np.random.Generator | None = None, size: float = 10.0) -> str:
-    """A person who stands and sways by some degrees: six channels for the root, ZXY rotations for the others."""
+    """A standing person, swaying by some degrees: six channels for the root, ZXY rotations for the others."""
     rng = rng or np.random.default_rng(0)
     turns = ["Zrotation", "Xrotation", "Yrotation"]
     channels = {name: (["Xposition", "Yposition", "Zposition"] if parent is None else []) + turns for name, parent, _ in PERSON}

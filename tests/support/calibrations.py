@@ -1,4 +1,4 @@
-"""One ring of cameras as every program writes it: texts made by the formats' own rules, from cameras, not by the package's writers."""
+"""A ring of cameras in the format of every program, written by the rules of the formats and not by the package's writers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def rotation(camera: Camera) -> Rotation:
 
 
 def toml(made: Sequence[Camera], scale: float = 1.0, tail: str = "[metadata]\nadjusted = false\nerror = 0.0\n") -> str:
-    """As aniposelib and Pose2Sim write it."""
+    """TOML as written by aniposelib and Pose2Sim."""
     parts = []
     for n, camera in enumerate(made):
         t = camera.T_camera_world[:3, 3] * scale
@@ -41,7 +41,7 @@ def freemocap(made: Sequence[Camera]) -> str:
 
 
 def caliscope(made: Sequence[Camera], rotated: str = "vector") -> str:
-    """camera_array.toml: one camera set aside, one not placed."""
+    """Caliscope's camera_array.toml with one ignored and one unposed camera."""
     parts = []
     for n, camera in enumerate(made):
         R = rotation(camera).as_rotvec() if rotated == "vector" else camera.T_camera_world[:3, :3]
@@ -54,7 +54,7 @@ def caliscope(made: Sequence[Camera], rotated: str = "vector") -> str:
 
 
 def _node(key: str, values: np.ndarray) -> str:
-    """A matrix as cv::FileStorage breaks its lines."""
+    """A matrix with the line breaks of cv::FileStorage."""
     numbers = [f"{value!r}" for value in np.ravel(values).tolist()]
     data = ",\n       ".join(", ".join(numbers[n : n + 4]) for n in range(0, len(numbers), 4))
     rows, cols = values.shape
@@ -100,7 +100,7 @@ def opencv_xml(camera: Camera) -> str:
 
 
 def qualisys(made: Sequence[Camera]) -> str:
-    """QTM's export: 64ths of a pixel, millimetres, y up and z backward; beside a camera for markers, and one that is off."""
+    """QTM's export: 1/64 pixel, millimetres, y up and z backward; with a marker camera, and one that is switched off."""
     def camera_text(camera: Camera, model: str, active: int = 1) -> str:
         R, (x, y, z) = np.diag([1, -1, -1]) @ camera.T_camera_world[:3, :3], camera.centre * 1000
         turn = " ".join(f'r{i + 1}{j + 1}="{R[i, j]!r}"'.replace("np.float64(", "").replace(")", "") for i in range(3) for j in range(3))
@@ -152,7 +152,7 @@ def cal(camera: Camera) -> str:
 
 
 def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
-    """A file of every kind, by its name; the path to give for each."""
+    """Write a file of every kind; returns the path of each by its name."""
     texts = {"anipose.toml": toml(made), "freemocap.toml": freemocap(made), "camera_array.toml": caliscope(made),
              "Calib.qca.txt": qualisys(made), "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
     for camera in made:

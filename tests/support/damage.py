@@ -1,4 +1,4 @@
-"""What a damaged file may do: be read all the same, or end in one sentence that names it."""
+"""Check for damaged files: reading succeeds, or fails with one sentence that names the file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from shadowpuppet.motion.motion import JointTable
 
 
 def told_or_read(read: Callable[[], JointTable], name: str) -> bool:
-    """Whether `read` gives a table of places, or says of the file `name` in one line what is wrong; nothing else is caught."""
+    """Assert that `read` returns a table of positions, or raises an error of one line that names the file; other errors are not caught."""
     try:
         table = read()
     except ShadowPuppetError as error:

@@ -1,4 +1,4 @@
-"""A short film as a live camera would give it: the empty scene, a person who stands, then waves; and a fake clock."""
+"""Frames of a short film for live sessions: the empty scene, then a person standing and waving; and a fake clock."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from shadowpuppet.synthetic import Gesture, Scene, Spec, Viewpoint, synthesize
 
 RATE, EMPTY, STAND, WAVE = 15.0, 2.0, 3.0, 2.0
-"""Frames/s and seconds."""
+"""Frame rate, and durations (s)."""
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"hypotheses": 60, "rounds": 8, "patience": 4, "sweeps": 1}}
-"""For tests of what does not depend on how well it is done."""
+"""Fast settings, for tests that do not depend on the accuracy."""
 FLAGS = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.hypotheses", "60", "--initialization.rounds", "8",
          "--initialization.patience", "4", "--initialization.sweeps", "1"]
 HEIGHT, FOV = 1.75, 60.0
 
 
 def frames(folder: Path, size: tuple[int, int]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """The pictures of the empty scene, and those of the person."""
+    """Images of the empty scene, and of the person."""
     spec = Spec(name="live", motion=(Gesture(motion="stand", seconds=STAND), Gesture(motion="wave_hands", seconds=WAVE)),
                 cameras=(Viewpoint(size=size, fov_deg=FOV),), rate=RATE, scene=Scene(empty_seconds=EMPTY))
     recording = synthesize(spec, folder, np.random.default_rng(7))
@@ -27,7 +27,7 @@ def frames(folder: Path, size: tuple[int, int]) -> tuple[list[np.ndarray], list[
 
 
 class Clock:
-    """Seconds that pass when they are told to."""
+    """A clock whose time advances by `wait` only."""
 
     def __init__(self, now: float = 100.0) -> None:
         self.now = now

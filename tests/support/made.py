@@ -1,4 +1,4 @@
-"""A tiny made recording for tests of whole runs, and parts of it changed."""
+"""A small synthetic recording for tests of whole runs, and functions to change copies of it."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ SPEC = Spec(name="tiny", motion=(Gesture(motion="wave_hands", seconds=2),), came
 
 RING = Spec(name="tiny_ring", motion=(Gesture(motion="walk", seconds=2),), rate=RATE, scene=Scene(empty_seconds=1),
             ring=Ring(count=4, radius=3.6, fov_deg=42, size=SIZE))  # fmt: skip
-"""Somebody walks before four cameras, 29 frames; with training motion."""
+"""A person walks in front of four cameras, 29 frames; with training motion."""
 
 
 def make(folder: Path) -> Path:
-    """A recording of `FRAMES` frames, with background, masks, references and truth."""
+    """Render a recording of `FRAMES` frames, with background, masks, references and ground truth."""
     return synthesize(SPEC, folder, np.random.default_rng(7))
 
 
 def copied(recording: Path, to: Path, without: Iterable[str] = ()) -> Path:
-    """A copy to be spoilt, without some of its files or folders."""
+    """A copy without some of its files or folders, to be changed."""
     shutil.copytree(recording, to)
     for name in without:
         path = to / name

@@ -1,4 +1,4 @@
-"""A tiny made recording of several cameras: somebody of ellipsoids, walking, before a wall of noise."""
+"""A small synthetic recording with several cameras: a walking person of ellipsoids in front of a noisy wall."""
 
 from __future__ import annotations
 
@@ -20,15 +20,22 @@ CAMERAS = 4
 
 
 def cameras(count: int = CAMERAS, size: tuple[int, int] = SIZE, **more) -> list[Camera]:
-    """A ring that looks at the middle of a person at the origin."""
+    """Cameras in a ring around a person at the origin."""
     made = ring(count, radius=3.0, height=0.6, size=size, focal=0.85 * size[0], **more)
     T = np.eye(4)
     T[2, 3] = -0.9  # the person stands on the floor, z = 0
     return [replace(camera, T_camera_world=camera.T_camera_world @ T) for camera in made]
 
 
+def scaled(camera: Camera, factor: float) -> Camera:
+    """The camera with its translation in another unit."""
+    T = camera.T_camera_world.copy()
+    T[:3, 3] *= factor
+    return replace(camera, T_camera_world=T)
+
+
 def place(n: int) -> np.ndarray:
-    """Where the person's middle is in frame `n`, metres: on a bow, which no shift in time leaves as it is."""
+    """Position (3,) of the person's centre in frame `n`, metres, on a curve that no time shift maps to itself."""
     t = n / RATE
     return np.array([0.5 * np.sin(1.9 * t), 0.6 * np.cos(1.3 * t) - 0.4, 0.9 + 0.05 * np.sin(5 * t)])
 
@@ -42,12 +49,12 @@ def person(n: int) -> list[Ellipsoid]:
 
 
 def masks(made: Sequence[Camera], frames: int = FRAMES, first: int = 0) -> list[list[Mask]]:
-    """By frame and camera."""
+    """Exact silhouettes by frame and camera."""
     return [[seen_by(camera, person(first + n)) for camera in made] for n in range(frames)]
 
 
 def write(folder: Path, made: Sequence[Camera] | None = None, seen: Sequence[Sequence[Mask]] | None = None) -> Path:
-    """A recording folder with films, backgrounds, masks and calibration."""
+    """Write a recording folder with films, backgrounds, masks and calibration; returns it."""
     made = made or cameras()
     seen = masks(made) if seen is None else seen
     for kind in ("video", "background", "masks"):

@@ -1,4 +1,4 @@
-"""A person who moves, as tables of joints, and run folders made of them without tracking: for tests of what is measured."""
+"""Joint tables of a moving person, and run folders made from them without tracking, for tests of evaluation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ for _side, _y in (("left", 1), ("right", -1)):
 
 
 def person(seconds: float = 6.0, rate: float = 30.0, start: float = 0.0, names=NAMES, seed: int = 3) -> JointTable:
-    """Somebody who sways, each joint in its own way that never repeats itself; the same at any rate."""
+    """Joints of a swaying person: each joint moves differently and aperiodically; the same motion at any rate."""
     rng = np.random.default_rng(seed)
     speeds, phases = rng.uniform(1.5, 7, (len(NAMES), 3, 3)), rng.uniform(0, 6, (len(NAMES), 3, 3))
     times = start + np.arange(round(seconds * rate)) / rate
@@ -29,13 +29,13 @@ def person(seconds: float = 6.0, rate: float = 30.0, start: float = 0.0, names=N
 
 
 def moved(table: JointTable, by=0.0, names=None, times=None) -> JointTable:
-    """A table with its places moved, other names or other times."""
+    """The table with transformed positions, other names or other times."""
     return JointTable(table.times if times is None else times, table.names if names is None else tuple(names), table.positions + by)
 
 
 def write_run(folder: Path, table: JointTable, *, sd=None, status=None, truth: Path | None = None, body: str = "anatomical",
               poses=None, dofs=("torso_y",), **info) -> Path:
-    """A run folder whose joints are those of a table; frames that are not all numbers are lost."""
+    """Write a run folder with the joints of a table; frames with NaN are lost."""
     said = info | ({"truth": str(truth)} if truth else {})
     with RunWriter(folder, body, dofs, table.names, {"recording": "nowhere", "method": "made", "settings": {"seed": 4}, **said}) as run:
         for n, (time, places) in enumerate(zip(table.times, table.positions)):

@@ -1,4 +1,4 @@
-"""Poses as in a mirror."""
+"""Mirrored poses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from shadowpuppet.body.skeleton import Skeleton
 
 
 def mirrored(skeleton: Skeleton, poses: np.ndarray) -> np.ndarray:
-    """Poses as in a mirror: sides change places, and what goes to the side goes to the other."""
+    """Poses (N, D) mirrored left to right."""
     names = skeleton.dof_names
     swap = {"left": "right", "right": "left"}
     order = [names.index("_".join([swap.get(first, first), *rest])) for first, *rest in (name.split("_") for name in names)]

@@ -1,4 +1,4 @@
-"""Joints of made whole-body motions, whose poses are known: for the tests of what is learnt from motion."""
+"""Joints of synthetic whole-body motions with known poses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SWINGS = {"left_hip_y": (-30, 0), "right_hip_y": (-30, np.pi), "left_knee_flexio
 
 
 def walk(frames: int, rate: float = 60.0, height: float = 1.75, turn: float = 0.0, start: float = 0.0) -> tuple[JointTable, np.ndarray]:
-    """A gait of one cycle a second, and its poses (T, D) of the anatomical body."""
+    """Joints of a gait with one cycle per second, and its poses (T, D) of the anatomical body."""
     body = make_body("anatomical", average_sizes("anatomical", height))
     times, names = start + np.arange(frames) / rate, body.skeleton.dof_names
     poses = np.zeros((frames, len(names)))

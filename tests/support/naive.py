@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.body.shapes import Hulls
 from shadowpuppet.body.skeleton import AXES, Skeleton
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.projection import DIRECTIONS, NEAR
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, rotation_from_vector, transform
 from shadowpuppet.motion.prior.hmm import Posterior
@@ -48,7 +48,7 @@ def to_pixels(camera: Camera, points: ArrayLike) -> Array:
     return camera.project(transform(inverse(camera.T_camera_world), points))
 
 
-def clipped(corners: ArrayLike, near: float = NEAR) -> list[Array]:
+def clipped(corners: ArrayLike, near: float = NEAR_PLANE) -> list[Array]:
     """What of a polygon (K, 3) lies at z >= near (Sutherland & Hodgman 1974)."""
     out: list[Array] = []
     corners = np.asarray(corners, float)
@@ -79,11 +79,11 @@ def polygon(picture: Picture, joints: dict[str, Array], shape: int) -> Array:
         seen = clipped(transform(frames[0], shapes.corners[shape]))
         return to_pixels(picture.camera, seen) if seen else np.zeros((0, 2))
     places = [transform(T, c) for T, c in zip(frames, shapes.centres[shape], strict=True)]
-    if max(p[2] for p in places) <= NEAR:
+    if max(p[2] for p in places) <= NEAR_PLANE:
         return np.zeros((0, 2))
     centres, axes = [], []
     for T, p, radii in zip(frames, places, shapes.radii[shape], strict=True):
-        z = max(p[2], NEAR)
+        z = max(p[2], NEAR_PLANE)
         centres.append(p[:2] / z)
         axes.append(np.array([r / z * (T[:2, a] - p[:2] / z * T[2, a]) for a, r in enumerate(radii)]))
     flat = np.array([support(centres, axes, direction) for direction in DIRECTIONS])
@@ -110,7 +110,7 @@ def half_planes(corners: ArrayLike, size: tuple[int, int], unit: int = 1) -> tup
     return inside, near
 
 
-def seen_through(quad: ArrayLike, camera: Camera, near: float = NEAR) -> tuple[Mask, Mask]:
+def seen_through(quad: ArrayLike, camera: Camera, near: float = NEAR_PLANE) -> tuple[Mask, Mask]:
     """Pixels (H, W) of a pinhole camera whose rays hit a flat convex quad (4, 3) at z >= near, and pixels whose rays pass close to an edge.
 
     Knows neither projection nor clipping: the ray is cut with the quad's plane.

@@ -8,7 +8,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.projection import NEAR
+from shadowpuppet.camera.projection import NEAR_PLANE
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.tracking.multiview.surface.viewing_edges import CONFIRMED, FAR, SHORTEST
 
@@ -45,7 +45,7 @@ def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Se
     """Depths (E, 2) of a ray (3,), z = 1, of a view that the others leave; their polygons are on the plane z = 1."""
     others = [j for j in range(len(cameras)) if j != view]
     relative = {j: cameras[j].T_camera_world @ inverse(cameras[view].T_camera_world) for j in others}
-    ends = np.unique(np.concatenate([[NEAR, FAR], *(_crossings(ray, relative[j], polygons[j]) for j in others)]))
+    ends = np.unique(np.concatenate([[NEAR_PLANE, FAR], *(_crossings(ray, relative[j], polygons[j]) for j in others)]))
     places = (ends[:-1] + ends[1:]) / 2
     times = [sum(_denied(ray * z, relative[j], polygons[j]) for j in others) for z in places]
     for level in range(tolerated + 1):
@@ -57,7 +57,7 @@ def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Se
             elif not fits and start is not None:
                 needed = max(1, (1 + CONFIRMED) * level)
                 seen = sum(_pictured(ray * (start + ends[k]) / 2, relative[j], cameras[j]) for j in others)
-                if start > NEAR and ends[k] < FAR and ends[k] - start > SHORTEST and seen >= needed:
+                if start > NEAR_PLANE and ends[k] < FAR and ends[k] - start > SHORTEST and seen >= needed:
                     out.append((start, ends[k]))
                 start = None
         if out:
@@ -68,7 +68,7 @@ def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Se
 def _crossings(ray: Array, T: Array, polygons: Sequence[Array]) -> Array:
     """Depths on a ray where its picture in another view lies on a polygon's side, or the view's near plane is passed."""
     a, b = T[:3, 3], T[:3, :3] @ ray
-    out = [(NEAR - a[2]) / b[2]] if b[2] else []
+    out = [(NEAR_PLANE - a[2]) / b[2]] if b[2] else []
     for P in polygons:
         for p, q in zip(P, np.roll(P, -1, 0)):
             normal = np.cross([*p, 1], [*q, 1])  # of the plane through the view's centre and the side
@@ -77,17 +77,17 @@ def _crossings(ray: Array, T: Array, polygons: Sequence[Array]) -> Array:
                 x = a + z * b
                 inside = x[2] > 0 and (x[:2] / x[2] - p) @ (x[:2] / x[2] - q) <= 0
                 out += [z] if inside else []
-    return np.array([z for z in out if NEAR < z < FAR])
+    return np.array([z for z in out if NEAR_PLANE < z < FAR])
 
 
 def _denied(point: Array, T: Array, polygons: Sequence[Array]) -> bool:
     x = transform(T, point)
-    return bool(x[2] >= NEAR) and holds(polygons, x[:2] / x[2])
+    return bool(x[2] >= NEAR_PLANE) and holds(polygons, x[:2] / x[2])
 
 
 def _pictured(point: Array, T: Array, camera: Camera) -> bool:
     x = transform(T, point)
-    if x[2] < NEAR:
+    if x[2] < NEAR_PLANE:
         return False
     u, v = camera.project(transform(inverse(camera.T_camera_world), x))
     return bool(-0.5 <= u < camera.size[0] - 0.5 and -0.5 <= v < camera.size[1] - 0.5)

@@ -16,7 +16,7 @@ def one_limb(length=0.4, shear=(0.0, 0.0), start=(0.1, 0.08), end=(0.1, 0.08), c
 
 
 def random_limbs(rng: np.random.Generator, joints: list[int]) -> Limbs:
-    """Parts as people have them, one a joint, in any direction; flat ends and domes."""
+    """Parts of human proportions, one per joint, in random directions; flat ends and domes."""
     from scipy.spatial.transform import Rotation
 
     S = len(joints)
@@ -28,7 +28,7 @@ def random_limbs(rng: np.random.Generator, joints: list[int]) -> Limbs:
 
 
 def samples(limbs: Limbs, s: int, step: float = 0.003) -> Array:
-    """Points (P, 3) all over the surface of part `s`, in its own frame, no farther than about `step` (m) from one another."""
+    """Points (P, 3) on the whole surface of part `s`, in its frame, about `step` (m) apart."""
     L, shear, radii, caps = limbs.lengths[s], limbs.shears[s], limbs.radii[s], limbs.caps[s]
     angles = np.arange(0, 2 * np.pi, step / radii.max())
     circle = np.stack([np.cos(angles), np.sin(angles)], -1)
@@ -45,7 +45,7 @@ def samples(limbs: Limbs, s: int, step: float = 0.003) -> Array:
 
 
 def within(limbs: Limbs, s: int, points: Array) -> Array:
-    """Which points (P, 3), in the frame of part `s`, lie in it: (P,), from its definition."""
+    """Mask (P,) of the points (P, 3), in the frame of part `s`, that lie inside it, from its definition."""
     out = np.zeros(len(points), bool)
     L, shear, radii, caps = limbs.lengths[s], limbs.shears[s], limbs.radii[s], limbs.caps[s]
     for n, (x, y, z) in enumerate(points):
@@ -57,7 +57,7 @@ def within(limbs: Limbs, s: int, points: Array) -> Array:
 
 
 def brute(limbs: Limbs, s: int, points: Array, step: float = 0.003) -> tuple[Array, Array]:
-    """Signed distances (P,) and closest points (P, 3) of points in the frame of part `s`, too far by some `step`^2 at most."""
+    """Signed distances (P,) and closest points (P, 3) of points in the frame of part `s`, too large by about `step`^2 at most."""
     cloud = samples(limbs, s, step)
     away, which = cKDTree(cloud).query(points)
     return np.where(within(limbs, s, points), -away, away), cloud[which]

@@ -1,4 +1,4 @@
-"""The blended surface of a made person, in plain NumPy."""
+"""The blended surface of a synthetic person, in plain NumPy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LIGHTS = np.array([[0, -0.6, 0.8, 0.5], [0.6, -0.8, 0, 0.2], [0, 0, 0, 0.5]])
 
 
 def naive_distance(points, surface, axes, origin, joints):
-    """The blended surface's distance in plain NumPy, as one would write it first: all parts of a group, then the groups."""
+    """Distance to the blended surface in plain NumPy: all parts of a group, then the groups."""
 
     def smooth(a, b, k):
         return np.minimum(a, b) - np.maximum(k - np.abs(a - b), 0) ** 2 * 0.25 / k

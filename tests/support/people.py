@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.body.models import MODELS
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, place
+from shadowpuppet.camera.rasterize import Picture, place, polygon_bits, unpack
 from shadowpuppet.geometry import Array
 
+BODIES = {name: model.make for name, model in MODELS.items() if model.sizes is CardboxSizes}
+"""Upper bodies."""
 SIZES = sizes_from_height(1.75)
 LENSES = {
     "pinhole": {},
@@ -39,3 +42,14 @@ def random_poses(rng: np.random.Generator, skeleton: Skeleton, number: int) -> A
     bound = np.array([0.3 if dof.kind == "translation" else 4.0 for dof in skeleton.dofs])
     low, high = np.clip(skeleton.limits, -bound, bound)
     return rng.uniform(low, high, (number, len(bound)))
+
+
+def shapes_of(body: Body, *parts: str) -> np.ndarray:
+    """Indices of the shapes of some parts."""
+    assert set(parts) <= set(body.parts)
+    return np.array([i for i, part in enumerate(body.parts) if part in parts], np.int64)
+
+
+def draw_polygon(corners, size: tuple[int, int]) -> np.ndarray:
+    """One convex polygon of corners (K, 2), pixels, drawn into an empty mask (H, W)."""
+    return unpack(polygon_bits(corners, size), size[0])

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter
 from shadowpuppet.motion.motion import MotionFrame
 
-BODIES = tuple(ALL)
+BODIES = tuple(MODELS)
 ROOT = rigid(rotation_about([0, 0, 1], 2.0), [0.3, -1.2, 1.05])
 """Where an upper body's frame stands in the world: as a camera put it there."""
 RATE = 25.0

@@ -1,4 +1,4 @@
-"""A made body for surface points: parts in any direction on a small tree, and scans of it."""
+"""A synthetic body with parts in random directions on a small tree, and surface points of it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shadowpuppet.geometry import Array
 
 
 def make_body(seed: int = 1) -> SimpleNamespace:
-    """Six parts on five joints, with shifts, turns, and rotation vectors."""
+    """Six parts on five joints, with translations, rotations and rotation vectors."""
     joints = (Joint("pelvis", None), Joint("chest", "pelvis", (0, 0, 0.3)), Joint("hip", "pelvis", (0, 0.1, -0.05)),
               Joint("knee", "hip", (0, 0, -0.4)), Joint("arm", "chest", (0, 0.2, 0.2)))
     dofs = [*(Dof(f"root_{axis}", "pelvis", axis, kind="translation") for axis in "xyz"), Dof("heading", "pelvis", "z"),
@@ -28,12 +28,12 @@ def _vector(joint: str) -> list[Dof]:
 
 
 def some_pose(body, rng: np.random.Generator) -> Array:
-    """Within limits (D,)."""
+    """A random pose (D,) within the limits."""
     return body.skeleton.clamp(rng.normal(0, 0.4, (1, len(body.skeleton.dofs))))[0]
 
 
 def scan(body, pose: Array, rng: np.random.Generator, each: int = 150) -> tuple[Array, Array, Array]:
-    """Points (P, 3) on the parts' own surfaces, their outward normals (P, 3), and weights (P,)."""
+    """Points (P, 3) on the parts' surfaces, their outward normals (P, 3), and weights (P,)."""
     T, limbs, found = naive.place(body.skeleton, pose)[0], body.limbs, []
     for s, joint in enumerate(limbs.joints):
         cloud = naive_limbs.samples(limbs, s, 0.03)

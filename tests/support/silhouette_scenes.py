@@ -1,4 +1,4 @@
-"""A made scene for the tests of silhouettes: a softly textured wall, and a person before it."""
+"""A synthetic scene for the tests of silhouettes: a person in front of a softly textured wall."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ WALL, SHIRT, SKIN = (150, 130, 110), (120, 45, 40), (110, 140, 190)  # blue gree
 
 
 def figure() -> np.ndarray:
-    """An upper body (H, W), with a hand on the hip, so that there is a gap, and a finger of two pixels."""
+    """An upper body (H, W), with a hand on the hip, which leaves a gap, and a finger of two pixels."""
     mask = np.zeros(SIZE, np.uint8)
     cv2.ellipse(mask, (80, 25), (9, 12), 0, 0, 360, 1, -1)
     cv2.rectangle(mask, (76, 35), (84, 45), 1, -1)
@@ -31,7 +31,7 @@ def scene(rng: np.random.Generator, colour=WALL) -> np.ndarray:
 
 
 def shot(rng: np.random.Generator, picture: np.ndarray, noise=1.5) -> np.ndarray:
-    """A picture as a camera with noise takes it."""
+    """An image with camera noise."""
     return np.clip(np.rint(picture + rng.normal(0, noise, picture.shape)), 0, 255).astype(np.uint8)
 
 
@@ -40,7 +40,7 @@ def empty_shots(rng: np.random.Generator, wall: np.ndarray, count=12) -> list[np
 
 
 def dressed(wall: np.ndarray, mask: np.ndarray, shirt=SHIRT, skin=SKIN) -> np.ndarray:
-    """The person before the wall: shirt below, skin above and at the arms' ends."""
+    """Image of the person in front of the wall: shirt below, skin above and at the ends of the arms."""
     picture = wall.copy()
     picture[mask] = shirt
     bare = mask.copy()

@@ -1,4 +1,4 @@
-"""Solids that cameras see exactly: a pixel is the person's if its ray hits one. Knows neither contours nor projection of surfaces."""
+"""Solids with exact silhouettes: a pixel is set if its ray hits a solid, without contours or projected surfaces."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Box:
 
 def looking(place: ArrayLike, at: ArrayLike = (0, 0, 0), size: tuple[int, int] = (320, 240), focal: float = 280.0,
             distortion: Sequence[float] = (), fisheye: bool = False, name: str = "cam") -> Camera:
-    """A level camera at a place (3,), looking at another, metres, world Z up."""
+    """A level camera at a position (3,), looking at another, metres, world Z up."""
     place = np.asarray(place, float)
     z = np.asarray(at, float) - place
     z /= np.linalg.norm(z)
@@ -76,7 +76,7 @@ def looking(place: ArrayLike, at: ArrayLike = (0, 0, 0), size: tuple[int, int] =
 
 
 def ring(count: int, radius: float = 2.5, height: float = 0.5, turn: float = 0.3, **more) -> list[Camera]:
-    """Cameras around the origin, alternately higher and lower."""
+    """Cameras around the origin, alternating between higher and lower."""
     angles = turn + np.arange(count) * 2 * np.pi / count
     places = [(radius * np.cos(a), radius * np.sin(a), height * (1 + k % 2)) for k, a in enumerate(angles)]
     return [looking(place, name=f"cam{k + 1}", **more) for k, place in enumerate(places)]

@@ -1,4 +1,4 @@
-"""C3D files written byte by byte, of any processor, and what a motion capture system would put in them: for the tests of motion files."""
+"""C3D files written byte by byte, for any processor, with the contents of a motion capture system."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ INTEL, DEC, MIPS = 84, 85, 86
 
 def c3d(labels, places, *, rate: float = 120.0, unit: str | None = "mm", processor: int = INTEL, scale: float = -1.0, residuals=None,
         analog: int = 0, first: int = 1, parameters=(), trial: bool = False) -> bytes:
-    """A file's bytes. `places` (T, N, 3) in the file's unit, not a number where a point was not seen; `scale`: more than zero for whole
-    numbers; `residuals` (T, N); `analog`: values a frame; `trial`: frame numbers in 32 bits."""
+    """A file's bytes. `places` (T, N, 3) in the file's unit, NaN for invisible points; `scale`: positive for integers;
+    `residuals` (T, N); `analog`: values a frame; `trial`: frame numbers in 32 bits."""
     places = np.asarray(places, float)
     T, N = places.shape[:2]
     order = ">" if processor == MIPS else "<"
@@ -45,7 +45,7 @@ def c3d(labels, places, *, rate: float = 120.0, unit: str | None = "mm", process
 
 
 def to_dec(values: np.ndarray) -> bytes:
-    """Little-endian floats as a DEC processor's."""
+    """Little-endian floats in DEC format."""
     words = (np.asarray(values, "<f4") * np.float32(4)).view("<u4")
     return ((words >> 16) | (words << 16)).astype("<u4").tobytes()
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from people import camera, picture, random_poses
+from people import BODIES, camera, picture, random_poses, shapes_of
 
 from shadowpuppet.body import forward_kinematics
 from shadowpuppet.body.segments import parts_of
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Coupling, Dof, Joint, Skeleton
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera import projection, rasterize, scanline
 from shadowpuppet.camera.rasterize import Picture, pack, unpack
 from shadowpuppet.jit import BLOCK
@@ -178,7 +177,7 @@ def test_what_is_ignored_is_seen_and_under_the_waist_only(rng):
     observation = Observation.without_legs(mask, view, pose)
     skipped = unpack(observation.ignore, 200)
     np.testing.assert_array_equal(skipped, mask & legs)
-    torso = unpack(view.draw(pose, view.body.shapes_of("torso", "head")), 200)
+    torso = unpack(view.draw(pose, shapes_of(view.body, "torso", "head")), 200)
     assert not (skipped & torso).any()
     # A person with legs costs as little as one without; a waist over empty ground still costs.
     assert observation.cost_and_overlap(view.draw(pose))[0] == 0

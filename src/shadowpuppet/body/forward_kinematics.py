@@ -1,10 +1,10 @@
-"""Forward kinematics of a block of poses side by side: kernels that know trees of joints as arrays only."""
+"""Forward kinematics of blocks of poses: kernels on trees of joints as arrays."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.jit import kernel, part
+from shadowpuppet.jit import device, kernel
 
 # Coefficients of fdlibm's kernels (Sun Microsystems 1993): sine and cosine within pi / 4, and pi / 2 in three parts.
 _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
@@ -12,13 +12,14 @@ _SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298
 _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
            -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11)  # fmt: skip
 _QUARTER = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
-SHIFT, TURN, VECTOR = 0, 1, 2
-"""Kinds of DOF: a shift along an axis, a turn about one, a component of a rotation vector (three in a row)."""
+TRANSLATION, ROTATION, VECTOR = 0, 1, 2
+DOF_KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
+"""Kinds of DOF: along an axis, about an axis, a component of a rotation vector (three in a row)."""
 
 
-@part
+@device
 def sines(angles, sine, cosine):  # pragma: no cover
-    """Sine and cosine (B,) of angles (B,), right to the last bit or two for angles under 1e5 rad; the C library's do not vectorise."""
+    """Sine and cosine (B,) of angles (B,), to the last bit or two for angles under 1e5 rad; the C library's do not vectorise."""
     s0, s1, s2, s3, s4, s5 = _SINE
     c0, c1, c2, c3, c4, c5 = _COSINE
     for n in range(angles.size):
@@ -34,9 +35,9 @@ def sines(angles, sine, cosine):  # pragma: no cover
         cosine[n] = -along if (quarter == 1) | (quarter == 2) else along
 
 
-@part
+@device
 def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no cover
-    """The transforms (3, 4, B) of joint `j` before its DOF: its parent's, shifted by its offset (3, B), which follows its couplings."""
+    """Transforms (3, 4, B) of joint `j` before its DOF: the parent's, shifted by the joint's offset (3, B) and couplings."""
     parent, coupled, shifts = tree[0][j], tree[5], tree[6]
     own, last = T[j], poses.shape[0] - 1
     for r in range(3):
@@ -62,11 +63,9 @@ def _begin_joint(poses, begin, j, tree, offsets, root, T, offset):  # pragma: no
 
 @kernel
 def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma: no cover
-    """Transforms of `joints` in a block T (J, 3, 4, B), of the B poses from `begin` on (the last again where they end).
-
-    Each is the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Called with
-    arguments of the same types from everywhere (all joints are `tree[7]`, no range), it is compiled once.
-    """
+    """Transforms of `joints` into a block T (J, 3, 4, B), for B poses from `begin` on; past the end the last pose is repeated. Each is
+    the parent's transform, its offset, its DOF; a rotation about an axis mixes the other two columns. `work`: (6, B). Always called with
+    arguments of the same types (all joints are `tree[7]`, no range), so that it is compiled once."""
     first, axes, signs, kinds = tree[1], tree[2], tree[3], tree[4]
     value, sine, cosine = work[3], work[4], work[5]
     for j in joints:
@@ -74,7 +73,7 @@ def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma:
         for d in range(first[j], first[j + 1]):
             for n in range(value.size):
                 value[n] = signs[d] * poses[min(begin + n, poses.shape[0] - 1), d]
-            if kinds[d] == TURN:
+            if kinds[d] == ROTATION:
                 sines(value, sine, cosine)
                 _turn(T[j], (axes[d] + 1) % 3, (axes[d] + 2) % 3, sine, cosine)
             elif kinds[d] == VECTOR:
@@ -89,9 +88,9 @@ def place_joints(poses, begin, joints, tree, offsets, root, T, work):  # pragma:
                         place[n] += along[n] * value[n]
 
 
-@part
+@device
 def _turn(T, a, b, sine, cosine):  # pragma: no cover
-    """Columns a and b of transforms (3, 4, B) turned by angles (B,)."""
+    """Rotate columns a and b of transforms (3, 4, B) by angles (B,)."""
     for r in range(3):
         u, v = T[r, a], T[r, b]
         for n in range(sine.size):
@@ -99,13 +98,11 @@ def _turn(T, a, b, sine, cosine):  # pragma: no cover
             u[n], v[n] = cosine[n] * x + sine[n] * y, cosine[n] * y - sine[n] * x
 
 
-@part
+@device
 def _turn_by_vector(T, work):  # pragma: no cover
-    """Transforms (3, 4, B) turned by rotation vectors, the first rows of `work` (6, B): Rodrigues' formula, row by row.
-
-    A row w becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle: no digits are lost
-    near zero.
-    """
+    """Rotate transforms (3, 4, B) by the rotation vectors in the first rows of `work` (6, B): Rodrigues' formula, row by row. A row w
+    becomes w + a (w x v) + b (w x v) x v, a = sin |v| / |v|, b = (1 - cos |v|) / |v|^2, both by half the angle, which loses no digits
+    near zero."""
     u, v, w, half, sine, cosine = work[0], work[1], work[2], work[3], work[4], work[5]
     for n in range(half.size):
         half[n] = max(0.5 * np.sqrt(u[n] * u[n] + v[n] * v[n] + w[n] * w[n]), 1e-150)
@@ -121,9 +118,9 @@ def _turn_by_vector(T, work):  # pragma: no cover
             z[n] += a * s + b * (p * v[n] - q * u[n])
 
 
-@part
+@device
 def load_joints(transforms, begin, T):  # pragma: no cover
-    """Transforms (N, J, 3, 4) from `begin` on, as far as there are any, into a block (J, 3, 4, B)."""
+    """Copy transforms (N, J, 3, 4) from `begin` on into a block (J, 3, 4, B)."""
     for n in range(min(T.shape[3], transforms.shape[0] - begin)):
         for j in range(T.shape[0]):
             for r in range(3):
@@ -133,7 +130,7 @@ def load_joints(transforms, begin, T):  # pragma: no cover
 
 @kernel
 def place_all(poses, joints, tree, offsets, root, out, T, work):  # pragma: no cover
-    """Transforms of `joints` into `out` (N, J, 3, 4), which holds those of the others. Room: T (J, 3, 4, B), work (6, B)."""
+    """Transforms of `joints` into `out` (N, J, 3, 4), which holds those of the others. Work arrays: T (J, 3, 4, B), work (6, B)."""
     for begin in range(0, poses.shape[0], T.shape[3]):
         load_joints(out, begin, T)
         place_joints(poses, begin, joints, tree, offsets, root, T, work)
@@ -146,7 +143,7 @@ def place_all(poses, joints, tree, offsets, root, out, T, work):  # pragma: no c
 
 @kernel
 def place_points(poses, tree, offsets, root, joints, places, out, T, work):  # pragma: no cover
-    """Points (N, P, 3) at `places` (P, 3) in the frames of `joints` (P,). Room: T (J, 3, 4, B), work (6, B)."""
+    """Points (N, P, 3) at `places` (P, 3) in the frames of `joints` (P,). Work arrays: T (J, 3, 4, B), work (6, B)."""
     for begin in range(0, poses.shape[0], T.shape[3]):
         place_joints(poses, begin, tree[7], tree, offsets, root, T, work)
         for i in range(joints.size):

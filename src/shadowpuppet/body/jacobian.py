@@ -1,7 +1,8 @@
-"""One pose of a skeleton: where its joints are, and how each degree of freedom moves what hangs on it.
+"""Forward kinematics of one pose with its Jacobian: where the joints are, and the screw of each degree of freedom.
 
-A DOF moves a point x by omega x (x - c) = (omega, c x omega) . (x x n, n) along a direction n: its screw. All of one pose's derivatives
-are dot products of screws with six sums over the points (Featherstone 2008, "Rigid Body Dynamics Algorithms", 2.2).
+A DOF moves a point x by omega x (x - c) = (omega, c x omega) . (x x n, n) along a direction n; (omega, c x omega) is its screw. All
+derivatives at a pose are dot products of screws with six sums over the points (Featherstone 2008, "Rigid Body Dynamics Algorithms",
+2.2).
 """
 
 from __future__ import annotations
@@ -11,16 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.skeleton import AXES, Skeleton
+from shadowpuppet.body.forward_kinematics import TRANSLATION, VECTOR
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 
-TRANSLATION, ROTATION, VECTOR = 0, 1, 2
-KINDS = {"translation": TRANSLATION, "rotation": ROTATION, "vector": VECTOR}
-STEP = 0.5
-"""No DOF moves farther than this (rad or m) in one iteration of a refinement."""
-SMALL = 1e-4
-"""Rotation vectors shorter than this (rad) are turned by their series."""
+MAX_STEP = 0.5
+"""Largest change of a DOF (rad or m) in one iteration of a refinement."""
+SMALL_ANGLE = 1e-4
+"""Below this length (rad) a rotation vector's series is used."""
 
 
 class Chain(NamedTuple):
@@ -29,7 +29,7 @@ class Chain(NamedTuple):
     parents: NDArray[np.int64]
     """Parent of each joint, -1 for a root, of shape (J,)."""
     offsets: Array
-    """Place in the parent's frame, metres, of shape (J, 3)."""
+    """Position in the parent's frame, metres, of shape (J, 3)."""
     first: NDArray[np.int64]
     """First DOF of each joint, and D at the end, of shape (J + 1,)."""
     owners: NDArray[np.int64]
@@ -39,7 +39,7 @@ class Chain(NamedTuple):
     signs: Array
     """Of shape (D,)."""
     kinds: NDArray[np.int64]
-    """`TRANSLATION`, `ROTATION` or `VECTOR`, of shape (D,)."""
+    """`TRANSLATION`, `ROTATION` or `VECTOR` of `forward_kinematics`, of shape (D,)."""
     low: Array
     """Limits, of shape (D,)."""
     high: Array
@@ -48,13 +48,9 @@ class Chain(NamedTuple):
 
 def make_chain(skeleton: Skeleton) -> Chain:
     """The arrays of a skeleton without couplings."""
-    parents, first, *_ = skeleton.tree
-    owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs], np.int64)
-    axes = np.array([AXES[dof.axis][0] for dof in skeleton.dofs], np.int64)
-    signs = np.array([AXES[dof.axis][1] for dof in skeleton.dofs])
-    kinds = np.array([KINDS[dof.kind] for dof in skeleton.dofs], np.int64)
-    return Chain(parents.astype(np.int64), np.ascontiguousarray(skeleton.offsets[0]), first.astype(np.int64), owners, axes, signs, kinds,
-                 *skeleton.limits)
+    parents, first, axes, signs, kinds, *_ = skeleton.tree
+    owners = np.repeat(np.arange(len(parents)), np.diff(first))
+    return Chain(parents, np.ascontiguousarray(skeleton.offsets[0]), first, owners, axes, signs, kinds, *skeleton.limits)
 
 
 @kernel
@@ -62,7 +58,7 @@ def exponential(x, y, z, R, J):  # pragma: no cover
     """Rotation (3, 3) of a rotation vector, and its left Jacobian (3, 3): exp(v + d) = exp(J d) exp(v) for small d."""
     square = x * x + y * y + z * z
     angle = np.sqrt(square)
-    if angle < SMALL:
+    if angle < SMALL_ANGLE:
         a, b, c = 1 - square / 6, 0.5 - square / 24, 1 / 6 - square / 120
     else:
         a, b, c = np.sin(angle) / angle, (1 - np.cos(angle)) / square, (angle - np.sin(angle)) / (square * angle)
@@ -83,8 +79,8 @@ def exponential(x, y, z, R, J):  # pragma: no cover
 
 @kernel
 def place_one(pose, chain, T, screws, work):  # pragma: no cover
-    """Transforms T (J, 3, 4) of one pose (D,), and the screws (D, 6) of its DOF: (omega, c x omega), or (0, axis) for a shift. Room:
-    work (3, 3, 3)."""
+    """Transforms T (J, 3, 4) of one pose (D,), and the screws (D, 6) of its DOF: (omega, c x omega), or (0, axis) of a translation. Work
+    array: (3, 3, 3)."""
     R, J, turned = work[0], work[1], work[2]
     for j in range(chain.parents.size):
         parent, own = chain.parents[j], T[j]
@@ -125,6 +121,6 @@ def place_one(pose, chain, T, screws, work):  # pragma: no cover
 
 @kernel
 def _set_moment(screw, T):  # pragma: no cover
-    """The second half of a rotation's screw (6,) about the origin of T (3, 4)."""
+    """The moment, the second half, of a rotation's screw (6,) about the origin of T (3, 4)."""
     x, y, z = T[0, 3], T[1, 3], T[2, 3]
     screw[3], screw[4], screw[5] = y * screw[2] - z * screw[1], z * screw[0] - x * screw[2], x * screw[1] - y * screw[0]

@@ -1,4 +1,4 @@
-"""Limbs: tapered elliptic cylinders fixed to joints, to which points of a visual hull are compared (Ni 2008, II)."""
+"""A body: a skeleton, shapes fixed to its joints (flat quads, hulls of ellipsoids, solid limbs) and named landmarks."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 
 
 @dataclass(frozen=True, eq=False)
 class Limbs:
-    """Tapered elliptic cylinders, each fixed to a joint; their cross-sections lie across one axis of their own frame."""
+    """Tapered elliptic cylinders, each fixed to a joint, that surface points are compared with (Ni 2008, II); cross-sections are
+    perpendicular to z."""
 
     joints: NDArray[np.int64]
-    """Joint that each is fixed to, of shape (S,)."""
+    """Joint of each, of shape (S,)."""
     rotations: Array
-    """Columns: a part's axes in its joint's frame, of shape (S, 3, 3); its z runs along the limb from start to end."""
+    """Columns: a limb's axes in its joint's frame, of shape (S, 3, 3); z runs from start to end."""
     starts: Array
-    """Middle of the first cross-section, joint's frame, of shape (S, 3), metres."""
+    """Centre of the first cross-section, joint's frame, of shape (S, 3), metres."""
     lengths: Array
-    """Along the part's z, of shape (S,), metres."""
+    """Along the limb's z, of shape (S,), metres."""
     shears: Array
-    """How far along the part's x and y the last cross-section's middle lies off the first's, of shape (S, 2), metres."""
+    """Offset of the last cross-section's centre from the first's along the limb's x and y, of shape (S, 2), metres."""
     radii: Array
-    """Of the ellipses at start and end, along the part's x and y, of shape (S, 2, 2), metres."""
+    """Radii at start and end along the limb's x and y, of shape (S, 2, 2), metres."""
     caps: Array
-    """Heights of the ellipsoidal domes over the start and the end, of shape (S, 2), metres; 0: flat."""
+    """Heights of the ellipsoidal domes at start and end, of shape (S, 2), metres; 0 is flat."""
     parts: tuple[str, ...]
-    """Name of each, S names."""
+    """Name of each limb."""
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """What depends on a person's sizes, and linearly so: starts, lengths, shears, radii, caps."""
+        """The arrays that depend linearly on a person's sizes: starts, lengths, shears, radii, caps."""
         return self.starts, self.lengths, self.shears, self.radii, self.caps
 
     @property
     def ends(self) -> Array:
-        """Middle of the last cross-section, joint's frame, of shape (S, 3), metres."""
+        """Centre of the last cross-section, joint's frame, of shape (S, 3), metres."""
         along = np.concatenate([self.shears, self.lengths[:, None]], 1)
         return self.starts + (self.rotations @ along[:, :, None])[..., 0]
 
@@ -58,13 +58,13 @@ class Quads:
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """What depends on a person's sizes, and linearly so."""
+        """The arrays that depend linearly on a person's sizes."""
         return (self.corners,)
 
 
 @dataclass(frozen=True, eq=False)
 class Hulls:
-    """Convex hulls of a few ellipsoids each, every ellipsoid fixed to a joint."""
+    """Convex hulls of a few ellipsoids; every ellipsoid is fixed to a joint."""
 
     joints: NDArray[np.int64]
     """Joint of each ellipsoid, of shape (S, E)."""
@@ -75,7 +75,7 @@ class Hulls:
 
     @cached_property
     def numbers(self) -> NDArray[np.int64]:
-        """Ellipsoids of each hull (S,), without copies of its last."""
+        """Number of different ellipsoids of each hull (S,): copies of the last one at its end do not count."""
         same = self.joints == self.joints[:, -1:]
         for array in self.arrays:
             same &= (array == array[:, -1:]).all(2)
@@ -83,7 +83,7 @@ class Hulls:
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """What depends on a person's sizes, and linearly so."""
+        """The arrays that depend linearly on a person's sizes."""
         return self.centres, self.radii
 
 
@@ -96,34 +96,28 @@ class Body:
     shapes: Quads | Hulls
     """S shapes."""
     parts: tuple[str, ...]
-    """Body part that each shape belongs to, S names."""
+    """Name of the body part of each shape."""
     landmarks: Mapping[str, tuple[str, tuple[float, float, float]]]
-    """Points that a motion reports: name to joint and place in its frame, metres."""
+    """Points that a motion reports: name to joint and position in its frame, metres."""
     hem: Array | None
-    """The two ends of the waist's lower edge in the pelvis' frame, of shape (2, 3), metres: the model ends here; None: it has legs."""
+    """The two ends of the waist's lower edge, where an upper body ends, in the pelvis' frame, of shape (2, 3), metres; None if it has
+    legs."""
     limbs: Limbs | None = None
-    """The same as solids that points can be compared with; None: only its picture is known."""
+    """The same body as solids, for comparison with surface points; None if there are none."""
 
     @cached_property
     def landmark_names(self) -> tuple[str, ...]:
-        """Names of the landmarks, L of them."""
+        """Names of the L landmarks."""
         return tuple(self.landmarks)
 
-    def shapes_of(self, *parts: str) -> NDArray[np.int64]:
-        """Indices of the shapes of some parts. Raises `ShadowPuppetError` for a part that the body lacks."""
-        unknown = set(parts) - set(self.parts)
-        if unknown:
-            raise ShadowPuppetError(f"body {self.name!r}: unknown part {choices(unknown)}; there are: {choices(set(self.parts))}")
-        return np.array([i for i, part in enumerate(self.parts) if part in parts], np.int64)
-
     def points(self, poses: ArrayLike, root: ArrayLike | None = None, names: Iterable[str] | None = None) -> Array:
-        """Landmarks (N, L, 3) of poses (N, D), metres, in the frame that `root` (4, 4) maps to; all, or those named."""
+        """Landmarks (N, L, 3) of poses (N, D), metres, transformed by `root` (4, 4); all, or those in `names`."""
         joints, places = self._fixed
         chosen = [self.landmark_names.index(name) for name in (self.landmark_names if names is None else names)]
         return self.skeleton.points(poses, joints[chosen], places[chosen], root)
 
     @cached_property
     def _fixed(self) -> tuple[NDArray[np.int64], Array]:
-        """Joints (L,) of the landmarks, and where in their frames these are (L, 3), metres."""
+        """Joints (L,) of the landmarks and their positions in these joints' frames (L, 3), metres."""
         joints = np.array([self.skeleton.joint_index(joint) for joint, _ in self.landmarks.values()], np.int64)
         return joints, np.array([place for _, place in self.landmarks.values()], float).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""A person's named sizes: the 18 of Liu 2011."""
+"""A person's named sizes: the 18 of Liu 2011, and those of whole bodies."""
 
 from __future__ import annotations
 
@@ -13,48 +13,48 @@ from shadowpuppet.errors import ShadowPuppetError, choices, shown
 from shadowpuppet.geometry import Array
 
 HEIGHTS, DISTANCES = (0.5, 2.5), (0.2, 30.0)
-"""What a person's height, and the distance from the camera, can be; metres."""
+"""Possible heights of a person and distances from the camera, metres."""
 
 
 def is_within(value: object, limits: tuple[float, float]) -> bool:
-    """Whether something is a number within limits."""
+    """Whether a value is a number within limits."""
     return isinstance(value, (int, float, np.integer)) and not isinstance(value, bool) and bool(limits[0] <= value <= limits[1])
 
 
 def expected_metres(value: object, limits: tuple[float, float]) -> str:
-    """What is possible in place of a value, for messages; what would be possible in centimetres is told in metres."""
+    """The end of an error message: the range in metres, and a hint where the value would fit in centimetres."""
     hint = f" ({value:g} cm are {value / 100:g})" if isinstance(value, (int, float, np.integer)) and is_within(value / 100, limits) else ""
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
-LEAST, MOST = 0.005, 2.0
-"""What a size can be, metres; offsets can be less."""
+MIN_SIZE, MAX_SIZE = 0.005, 2.0
+"""Range of a size, metres; offsets may be smaller."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Named sizes, metres; left and right share values. Raises `ShadowPuppetError` for values that no person has."""
+    """Named sizes, metres; left and right share values. Raises `ShadowPuppetError` for impossible values."""
 
     def __post_init__(self) -> None:
         """Check every size."""
         for field in fields(self):
-            value, least = getattr(self, field.name), -0.2 if field.name in self.offsets() else LEAST
-            if not least <= value <= MOST:
-                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to {MOST} metres")
+            value, least = getattr(self, field.name), -0.2 if field.name in self.offsets() else MIN_SIZE
+            if not least <= value <= MAX_SIZE:
+                raise ShadowPuppetError(f"size {field.name}: found {shown(value)}, expected {least} to {MAX_SIZE} metres")
 
     @classmethod
     def offsets(cls) -> tuple[str, ...]:
-        """Names of those that may be nothing, or negative."""
+        """Names of sizes that may be zero or negative."""
         return ()
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        """The names, in their order."""
+        """All names, in order."""
         return tuple(field.name for field in fields(cls))
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, float], source: str = "sizes") -> Self:
-        """Sizes from named values. Raises `ShadowPuppetError` for names missing or unknown."""
+        """Sizes from named values. Raises `ShadowPuppetError` for missing or unknown names."""
         unknown, missing = set(values) - set(cls.names()), set(cls.names()) - set(values)
         if unknown or missing:
             what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
@@ -66,11 +66,11 @@ class Sizes:
 
     @classmethod
     def from_array(cls, values: ArrayLike) -> Self:
-        """Sizes from an array, in the order of `names`."""
+        """Sizes from an array in the order of `names`."""
         return cls(*(float(v) for v in np.asarray(values)))
 
     def to_array(self) -> Array:
-        """The sizes as an array, in the order of `names`."""
+        """The sizes as an array in the order of `names`."""
         return np.array([getattr(self, name) for name in self.names()])
 
     def with_values(self, **values: float) -> Self:
@@ -118,14 +118,14 @@ SUBSETS = {"O1": CardboxSizes.names()[:8], "O2": CardboxSizes.names()[8:12], "O3
 
 @dataclass(frozen=True)
 class BoneSizes(Sizes):
-    """Where the joints of a whole body lie, metres; the person stands upright, X forward, Z up."""
+    """Positions of a whole body's joints, metres; the person stands upright, X forward, Z up."""
 
     hip_distance: float
-    """Between the hips' joints."""
+    """Between the hip joints."""
     hip_drop: float
-    """From the pelvis down to the hips' joints."""
+    """From the pelvis down to the hip joints."""
     hip_forward: float
-    """From the pelvis forward to the hips' joints."""
+    """From the pelvis forward to the hip joints."""
     neck_length: float
     """From the base of the neck up to the base of the skull."""
     head_forward: float
@@ -133,35 +133,35 @@ class BoneSizes(Sizes):
     head_height: float
     """From the base of the skull up to the crown."""
     shoulder_distance: float
-    """Between the shoulders' joints."""
+    """Between the shoulder joints."""
     shoulder_drop: float
-    """From the base of the neck down to the shoulders' joints."""
+    """From the base of the neck down to the shoulder joints."""
     shoulder_forward: float
-    """From the base of the neck forward to the shoulders' joints."""
+    """From the base of the neck forward to the shoulder joints."""
     upper_arm_length: float
     """From shoulder to elbow."""
     forearm_length: float
     """From elbow to wrist."""
     hand_point: float
-    """From the wrist to the base of the fingers, the point `*_hand`."""
+    """From the wrist to the base of the fingers, the landmark `*_hand`."""
     hand_length: float
-    """From the wrist to the end of a hand at ease."""
+    """From the wrist to the end of a relaxed hand."""
     thigh_length: float
     """From hip to knee."""
     shank_length: float
     """From knee to ankle."""
     ankle_height: float
-    """From the ankle's joint to the sole."""
+    """From the ankle joint to the sole."""
 
     @classmethod
     def offsets(cls) -> tuple[str, ...]:
-        """Distances of a joint from another that may lie on either side."""
+        """Distances between joints that may have either sign."""
         return "hip_drop", "hip_forward", "head_forward", "shoulder_drop", "shoulder_forward", "hand_point"
 
 
 @dataclass(frozen=True)
 class CylinderSizes(BoneSizes):
-    """Sizes of `cylinders`: the bones, and a thickness for every part, which is the same all along."""
+    """Sizes of `cylinders`: the bones, and one width for each part."""
 
     trunk_height: float
     """From the pelvis to the base of the neck."""
@@ -176,7 +176,7 @@ class CylinderSizes(BoneSizes):
 
 @dataclass(frozen=True)
 class AnatomicalSizes(BoneSizes):
-    """Sizes of `anatomical`: the bones, and widths (girths over pi where a limb is round)."""
+    """Sizes of `anatomical`: the bones, and widths (girth / pi where a limb is round)."""
 
     lumbar_height: float
     """From the pelvis up to the joint of the chest."""
@@ -185,7 +185,7 @@ class AnatomicalSizes(BoneSizes):
     foot_length: float
     """From heel to toes."""
     toe_out: float
-    """How far out the toes lie of what is straight ahead of the ankle."""
+    """Lateral offset of the toes from straight ahead of the ankle."""
     pelvis_width: float
     """At the hips."""
     pelvis_depth: float
@@ -193,15 +193,15 @@ class AnatomicalSizes(BoneSizes):
     """At the chest's joint."""
     waist_depth: float
     chest_width: float
-    """Under the armpits, arms left out."""
+    """Below the armpits, without arms."""
     chest_depth: float
     shoulder_thickness: float
-    """Of the trunk at the shoulders' joints, up and down and to front and back."""
+    """Of the trunk at the shoulder joints, vertically and front to back."""
     neck_width: float
     head_width: float
     head_depth: float
     upper_arm_width: float
-    """At the shoulder, mean of both directions, as with all limbs."""
+    """At the shoulder; mean of both directions, as for all limbs."""
     elbow_width: float
     forearm_width: float
     """At its thickest."""
@@ -217,27 +217,5 @@ class AnatomicalSizes(BoneSizes):
 
     @classmethod
     def offsets(cls) -> tuple[str, ...]:
-        """As of the bones; toes may point inward."""
+        """Those of the bones; toes may point inward."""
         return *super().offsets(), "toe_out"
-
-
-KINDS: dict[str, type[Sizes]] = {
-    **dict.fromkeys(("rounded", "cardbox", "boxes"), CardboxSizes),
-    "anatomical": AnatomicalSizes,
-    "cylinders": CylinderSizes,
-}
-"""The sizes that each body is made from."""
-WHOLE = ("anatomical", "cylinders")
-"""Bodies of the whole person, which stand in the world."""
-
-
-def sizes_kind(name: str) -> type[Sizes]:
-    """The sizes that a body is made from. Raises `ShadowPuppetError` with the names there are."""
-    if name not in KINDS:
-        raise ShadowPuppetError(f"unknown body {name!r}; there are: {choices(KINDS)}")
-    return KINDS[name]
-
-
-def kind_of(sizes: Sizes) -> str:
-    """Name of a body that is made from such sizes; of several the first."""
-    return next(name for name, kind in KINDS.items() if isinstance(sizes, kind))

@@ -10,14 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body.forward_kinematics import SHIFT, TURN, VECTOR, place_all, place_points
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import BLOCK
 
 AXES = {"x": (0, 1.0), "y": (1, 1.0), "z": (2, 1.0), "-x": (0, -1.0), "-y": (1, -1.0), "-z": (2, -1.0)}
-
-KINDS = {"translation": SHIFT, "rotation": TURN, "vector": VECTOR}
+SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -32,10 +29,8 @@ class Joint:
 
 @dataclass(frozen=True)
 class Dof:
-    """One degree of freedom: a rotation about, or a shift along, an axis of its joint's frame; or a component of a rotation vector.
-
-    The three components x, y, z of a vector stand one after another; no posture within a full turn is singular.
-    """
+    """A degree of freedom: a rotation about or a translation along an axis of its joint's frame, or a component of a rotation vector.
+    The components x, y, z of a rotation vector follow each other; no posture within a full turn is singular."""
 
     name: str
     joint: str
@@ -45,28 +40,26 @@ class Dof:
     high: float = np.inf
     kind: Literal["rotation", "translation", "vector"] = "rotation"
     rest: float = 0.0
-    """Its usual value."""
+    """The usual value."""
     spread: tuple[float, float] = (np.inf, np.inf)
-    """How far from it is still usual, below and above: deviations of a distribution with heavy tails."""
+    """Usual deviations below and above `rest`, the scales of a heavy-tailed distribution."""
 
 
 @dataclass(frozen=True)
 class Coupling:
-    """A shift of a joint, in its parent's frame, that follows a DOF (a "mimic joint")."""
+    """A shift of a joint, in its parent's frame, proportional to a DOF (a "mimic joint")."""
 
     joint: str
     dof: str
     shift: tuple[float, float, float]
-    """Metres for each radian (or metre) of the DOF."""
+    """Metres per radian (or metre) of the DOF."""
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Joints, parents before children, and degrees of freedom, grouped by joint in the order in which they act.
-
-    The transform of a joint is its parent's, times its offset and couplings, times its DOF one after another.
-    A pose is an array (D,) in the order of `dofs`; functions take arrays of poses (N, D).
-    """
+    """Joints, parents before children, and degrees of freedom, grouped by joint in the order in which they act. A joint's transform is
+    its parent's, times its offset and couplings, times its DOF one after another. A pose is an array (D,) in the order of `dofs`;
+    functions take arrays of poses (N, D)."""
 
     joints: tuple[Joint, ...]
     dofs: tuple[Dof, ...]
@@ -77,11 +70,11 @@ class Skeleton:
             names = [each.name for each in named]
             if twice := [name for name in names if names.count(name) > 1]:
                 raise ShadowPuppetError(f"{what} {twice[0]!r}: found {names.count(twice[0])} of this name, expected one")
-        seen: set[str] = set()
+        earlier: set[str] = set()
         for joint in self.joints:
-            if joint.parent is not None and joint.parent not in seen:
+            if joint.parent is not None and joint.parent not in earlier:
                 raise ShadowPuppetError(f"joint {joint.name!r}: its parent {joint.parent!r} must stand before it")
-            seen.add(joint.name)
+            earlier.add(joint.name)
         order = [self.joint_index(dof.joint) for dof in self.dofs]
         if order != sorted(order):
             raise ShadowPuppetError("degrees of freedom must be grouped by joint, in the joints' order")
@@ -108,37 +101,39 @@ class Skeleton:
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
-        """Least and greatest value of every DOF, two arrays (D,)."""
+        """Lower and upper limits of the DOF, two arrays (D,)."""
         return np.array([dof.low for dof in self.dofs]), np.array([dof.high for dof in self.dofs])
 
     @cached_property
     def offsets(self) -> Array:
-        """Place of every joint in its parent's frame, of shape (1, J, 3), metres."""
+        """Position of every joint in its parent's frame, of shape (1, J, 3), metres."""
         return np.array([[joint.offset for joint in self.joints]], float)
 
     @cached_property
     def tree(self) -> tuple:
-        """What kernels need: parents (J,), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,), of each coupling joint
-        and DOF (C, 2) and shift (C, 3), and the numbers of all joints (J,)."""
+        """The skeleton as arrays for kernels: parents (J,), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,),
+        joint and DOF of each coupling (C, 2) and its shift (C, 3), and the indices of all joints (J,)."""
+        from shadowpuppet.body.forward_kinematics import DOF_KINDS  # late, as below: bodies are named without loading Numba
+
         parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
         owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
         first = np.searchsorted(owners, np.arange(len(self.joints) + 1))
         axes = np.array([AXES[dof.axis][0] for dof in self.dofs], np.int64)
         signs = np.array([AXES[dof.axis][1] for dof in self.dofs], float)
-        kinds = np.array([KINDS[dof.kind] for dof in self.dofs], np.int64)
+        kinds = np.array([DOF_KINDS[dof.kind] for dof in self.dofs], np.int64)
         pairs = [(self.joint_index(c.joint), self.dof_indices([c.dof])[0]) for c in self.couplings]
         shifts = np.array([c.shift for c in self.couplings], float).reshape(-1, 3)
         return parents, first, axes, signs, kinds, np.array(pairs, np.int64).reshape(-1, 2), shifts, np.arange(len(self.joints))
 
     def joint_index(self, name: str) -> int:
-        """Index of a joint. Raises `ShadowPuppetError` with the names there are."""
+        """Index of a joint. Raises `ShadowPuppetError` with the names that exist."""
         for i, joint in enumerate(self.joints):
             if joint.name == name:
                 return i
         raise ShadowPuppetError(f"unknown joint {name!r}; there are: {choices(j.name for j in self.joints)}")
 
     def dof_indices(self, names: Iterable[str]) -> NDArray[np.int64]:
-        """Indices of DOF by name. Raises `ShadowPuppetError` with the names there are."""
+        """Indices of DOF by name. Raises `ShadowPuppetError` with the names that exist."""
         names = tuple(names)
         unknown = [name for name in names if name not in self.dof_names]
         if unknown:
@@ -146,58 +141,64 @@ class Skeleton:
         return np.array([self.dof_names.index(name) for name in names], np.int64)
 
     @cached_property
-    def usual(self) -> tuple[Array, Array, Array]:
-        """Rest of every DOF, and how far below and above it is still usual, three arrays (D,)."""
+    def rest_and_spread(self) -> tuple[Array, Array, Array]:
+        """Rest of every DOF, and its spread below and above, three arrays (D,)."""
         return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
 
-    def strain(self, poses: ArrayLike) -> Array:
-        """How unusual poses (N, D) are: squared deviations from rest, summed (N,); each DOF adds at most 9, three deviations' worth.
-
-        The bound leaves a posture that is plainly seen alone, and still decides where the picture says little.
-        """
-        rest, below, above = self.usual
+    def posture_penalty(self, poses: ArrayLike) -> Array:
+        """Penalty (N,) of unusual poses (N, D): squared deviations from rest in units of the spread, each bounded by 9, summed. The
+        bound lets a clearly visible posture win, while the term still decides where the image says little."""
+        rest, below, above = self.rest_and_spread
         off = np.asarray(poses, float) - rest
         squared = (off / np.where(off < 0, below, above)) ** 2
         return (squared / (1 + squared / 9)).sum(1)
 
     def pose(self, **angles: float) -> Array:
-        """One pose (D,) from named values, zero elsewhere."""
+        """A pose (D,) from named values; the others are zero."""
         pose = np.zeros(len(self.dofs))
         pose[self.dof_indices(angles)] = list(angles.values())
         return pose
 
     def clamp(self, poses: ArrayLike) -> Array:
-        """Poses (N, D) with every DOF within its limits."""
+        """Poses (N, D) clipped to the limits."""
         return np.clip(np.asarray(poses, float), *self.limits)
 
     def checked(self, poses: ArrayLike) -> Array:
-        """Poses (N, D) as kernels take them. Raises `ShadowPuppetError` for another number of values."""
+        """Poses (N, D) as a contiguous array. Raises `ShadowPuppetError` for another shape."""
         poses = np.ascontiguousarray(poses, float)
         if poses.ndim != 2 or poses.shape[1] != len(self.dofs):
             raise ShadowPuppetError(f"poses have shape {poses.shape}, expected (N, {len(self.dofs)})")
         return poses
 
     def forward(self, poses: ArrayLike, root: ArrayLike | None = None) -> Array:
-        """Forward kinematics: transforms (N, J, 3, 4) of every joint, of poses (N, D), with the root's parent frame at `root` (4, 4)."""
+        """Forward kinematics: transforms (N, J, 3, 4) of all joints of poses (N, D); `root` (4, 4) is the root's parent frame."""
         poses = self.checked(poses)
         out = np.empty((len(poses), len(self.joints), 3, 4))
         self.forward_some(poses, np.arange(len(self.joints)), out, np.eye(4) if root is None else np.asarray(root, float))
         return out
 
     def forward_some(self, poses: Array, joints: NDArray[np.int64], transforms: Array, root: Array, offsets: Array | None = None) -> None:
-        """Recompute, in place, only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are taken as they stand.
+        """Recompute in place only `joints` (parents first) of `transforms` (N, J, 3, 4); the others are used as they are. `offsets` (N,
+        J, 3): the joints' offsets of each pose, for people of different sizes."""
+        from shadowpuppet.body.forward_kinematics import place_all
 
-        `offsets` (N, J, 3) gives every pose a skeleton of its own measures.
-        """
         offsets = self.offsets if offsets is None else offsets
-        poses, size = self.checked(poses), min(BLOCK, max(len(poses), 1))
-        place_all(poses, joints, self.tree, offsets, np.ascontiguousarray(root[:3]), transforms,
-                  np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size)))
+        poses = self.checked(poses)
+        place_all(poses, joints, self.tree, offsets, np.ascontiguousarray(root[:3]), transforms, *self._buffers(len(poses)))
 
     def points(self, poses: ArrayLike, joints: NDArray[np.int64], places: Array, root: ArrayLike | None = None) -> Array:
-        """Points (N, P, 3), metres, fixed to `joints` (P,) at `places` (P, 3) in their frames, of poses (N, D); `root` as in `forward`."""
+        """Points (N, P, 3), metres, of poses (N, D), at `places` (P, 3) in the frames of `joints` (P,); `root` as in `forward`."""
+        from shadowpuppet.body.forward_kinematics import place_points
+
         poses, root = self.checked(poses), np.eye(4) if root is None else np.asarray(root, float)
-        out, size = np.empty((len(poses), len(joints), 3)), min(BLOCK, max(len(poses), 1))
+        out = np.empty((len(poses), len(joints), 3))
         place_points(poses, self.tree, self.offsets, np.ascontiguousarray(root[:3]), joints, np.ascontiguousarray(places, float), out,
-                     np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size)))
+                     *self._buffers(len(poses)))
         return out
+
+    def _buffers(self, number: int) -> tuple[Array, Array]:
+        """Memory for the kernels: joints (J, 3, 4, B) of a block of poses, and intermediate values (6, B)."""
+        from shadowpuppet.jit import BLOCK
+
+        size = min(BLOCK, max(number, 1))
+        return np.zeros((len(self.joints), 3, 4, size)), np.empty((6, size))

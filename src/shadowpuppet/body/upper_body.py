@@ -1,10 +1,9 @@
-"""Bodies: shapes on a skeleton, made from named sizes.
+"""Bodies of the upper body, made from 18 named sizes on one skeleton; each shape's silhouette is one convex polygon.
 
-`cardbox` is Liu 2011's model (III-A): two or three crossed rectangles a part. `boxes` is the volumetric model that the paper compares
-it with (Fig. 1): a closed box a part. `rounded` is ours: smooth hulls of ellipsoids, whose outline does not change as a limb rolls.
-All three stand on the same skeleton and are made from the same sizes; each shape's picture is one convex polygon.
+`cardbox` is Liu 2011's model (III-A): two or three crossed rectangles a part. `boxes` is the volumetric model of its Fig. 1: a closed box a
+part. `rounded` is ours: hulls of ellipsoids, whose outline does not change as a limb rolls.
 
-The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the left of a person who faces the camera), Z up.
+The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the left of a person facing the camera), Z up.
 """
 
 from __future__ import annotations
@@ -16,18 +15,16 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body, Hulls, Quads
 from shadowpuppet.body.sizes import CardboxSizes
-from shadowpuppet.body.skeleton import Coupling, Dof, Joint, Skeleton
+from shadowpuppet.body.skeleton import SIDES, Coupling, Dof, Joint, Skeleton
 from shadowpuppet.geometry import Array
-
-SIDES = ("left", "right")
 
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
-    """Joints and DOF of an arm that hangs straight down, thumb forward, when all its angles are zero.
+    """Joints and DOF of an arm, which hangs straight down, thumb forward, when all angles are zero.
 
-    Abduction turns the arm in the frontal plane, forward swings it out of that plane toward the front: every direction is reachable,
-    and the one singular direction is straight ahead, not hanging or level, where people begin. Roll turns the elbow's hinge about
-    the upper arm: 0 bends the forearm forward, +90 degrees bends it up when the arm is level to the side.
+    Abduction turns the arm in the frontal plane, forward out of that plane toward the front: every direction is reachable, and the
+    singular one is straight ahead, far from where people begin. Roll turns the elbow's hinge about the upper arm: 0 bends the forearm
+    forward, +90 degrees bends it up when the arm is level.
     """
     out, turn = ("x", "z") if side == "left" else ("-x", "-z")
     y = (sizes.shoulder_width / 2 - sizes.shoulder_inset) * (1 if side == "left" else -1)
@@ -43,17 +40,15 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     return joints, dofs
 
 
-RISE = 0.012
-"""How far a shoulder rises, or comes forward, as the arm does, metres a radian: about 2 cm in a level arm, by the clavicle's elevation of
-some 8 degrees (Ludewig et al. 2009)."""
+SHOULDER_RISE = 0.012
+"""Rise, or forward shift, of a shoulder per radian of its arm (m): about 2 cm for a level arm, from the clavicle's elevation of some 8
+degrees (Ludewig et al. 2009)."""
 
 
 def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleton:
-    """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm.
-
-    The pelvis shifts along Y and twists; the torso stands on it and turns about the middle of its lower edge. With `clavicles`, the
-    shoulders follow the arms a little, as in people but not in the paper.
-    """
+    """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm. The pelvis shifts along Y and twists;
+    the torso turns on it about the middle of its lower edge. With `clavicles` the shoulders follow the arms a little, which is not in
+    the paper."""
     joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
@@ -66,17 +61,17 @@ def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleto
         joints += arm_joints
         dofs += arm_dofs
     couplings = [coupling for side in SIDES for coupling in (
-        Coupling(f"{side}_shoulder", f"{side}_shoulder_abduction", (0.0, 0.0, RISE)),
-        Coupling(f"{side}_shoulder", f"{side}_shoulder_forward", (RISE, 0.0, 0.0)),
+        Coupling(f"{side}_shoulder", f"{side}_shoulder_abduction", (0.0, 0.0, SHOULDER_RISE)),
+        Coupling(f"{side}_shoulder", f"{side}_shoulder_forward", (SHOULDER_RISE, 0.0, 0.0)),
     )]
     return Skeleton(tuple(joints), tuple(dofs), tuple(couplings) if clavicles else ())
 
 
 FOREARM, TO_TIP, HAND_POINT = 0.1535, 0.254, 0.019
-"""Fractions of the stature: elbow to wrist (de Leva 1996, table 4, mean of women and men); elbow to the end of the card in a silhouette;
-wrist to the base of the fingers as CMU's mocap skeletons have it (the bone `lhand`)."""
+"""Fractions of the stature: elbow to wrist (de Leva 1996, table 4, mean of women and men); elbow to the card's end in a silhouette;
+wrist to the base of the fingers as in CMU's mocap skeletons (the bone `lhand`)."""
 WRIST_SHARE, HAND_SHARE = FOREARM / TO_TIP, (FOREARM + HAND_POINT) / TO_TIP
-"""Where wrist and base of the fingers lie on the forearm's card."""
+"""Positions of the wrist and the base of the fingers along the forearm's card."""
 
 
 def _landmarks(sizes: CardboxSizes) -> dict[str, tuple[str, tuple[float, float, float]]]:
@@ -97,7 +92,7 @@ def _landmarks(sizes: CardboxSizes) -> dict[str, tuple[str, tuple[float, float, 
 
 @dataclass(frozen=True)
 class _Part:
-    """A body part as a frustum along Z: half widths (Y) and half depths (X) at its top and bottom."""
+    """A body part as a frustum along Z: widths (Y) and depths (X) at its top and bottom."""
 
     name: str
     joint: str
@@ -117,7 +112,7 @@ class _Part:
         return [self.corner(x, 0, end) for x, end in ((-1, 0), (1, 0), (1, 1), (-1, 1))]
 
     def level_card(self, share: float = 0.5) -> list[tuple[float, float, float]]:
-        """Across the part, `share` of the way down."""
+        """A card across the part, `share` of the way down."""
         x, y = ((1 - share) * a + share * b for a, b in (self.depth, self.width))
         z = (1 - share) * self.top + share * self.bottom
         return [(i * x / 2, j * y / 2, z) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -163,15 +158,13 @@ def cardbox(sizes: CardboxSizes) -> Body:
 
 
 def boxes(sizes: CardboxSizes) -> Body:
-    """The volumetric model of Liu 2011, Fig. 1, for comparison: a closed box of six faces for each of the same seven parts."""
+    """The volumetric model of Liu 2011, Fig. 1, for comparison: a closed box for each of the seven parts."""
     return _of_quads("boxes", sizes, {part.name: part.faces() for part in _parts(sizes)})
 
 
 def rounded(sizes: CardboxSizes) -> Body:
-    """Hulls of ellipsoids, with a neck, sloping shoulders and hands, for the same 18 sizes. Not in the paper.
-
-    Two crossed cards look 0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so that width tells nearness.
-    """
+    """Hulls of ellipsoids, with neck, sloping shoulders and hands, from the same 18 sizes. Not in the paper. Two crossed cards look 0.7
+    times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance."""
     s, skeleton = sizes, upper_body_skeleton(sizes, clavicles=True)
     crown = s.torso_height + s.neck_gap + s.head_height
     neck, arm, fore, palm = 0.35 * s.head_width, s.upper_arm_width / 2, s.elbow_width / 2, s.hand_width / 2
@@ -207,5 +200,3 @@ def rounded(sizes: CardboxSizes) -> Body:
                 _landmarks(sizes), _hem(sizes))
 
 
-BODIES = {"cardbox": cardbox, "boxes": boxes, "rounded": rounded}
-"""Upper bodies, from 18 sizes."""

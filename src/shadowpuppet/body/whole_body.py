@@ -1,8 +1,7 @@
-"""Bodies of the whole person, made from named sizes: `anatomical`, whose limbs taper and lie off the bone as real ones do, and
-`cylinders`, the ten parts of Ni 2008 (II).
+"""Bodies of the whole person: `anatomical`, with tapered limbs that lie off the bone, and `cylinders`, the ten parts of Ni 2008 (II).
 
-Both have limbs, to which points are compared, and draw the same limbs as silhouettes. The body's frame is X forward, Y to the person's
-left, Z up.
+Each is a skeleton and a table of limbs, which are both compared with surface points and drawn as silhouettes. The body's frame is X
+forward, Y to the person's left, Z up.
 """
 
 from __future__ import annotations
@@ -14,199 +13,53 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
 from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CylinderSizes
-from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
+from shadowpuppet.body.skeleton import SIDES, Dof, Joint, Skeleton
 
-ALONG = {
-    "up": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-    "down": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
-    "forward": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
-    "left": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
-}
-"""Axes x, y, z of a limb's own frame, as columns, in its joint's: z runs along it; x is forward, or up for a foot."""
-FLAT = 0.02
-"""A flat end is drawn as an ellipsoid of so little height, as a share of its radii."""
 Pair = tuple[float, float]
-
-
-class _Limb(NamedTuple):
-    """A limb, metres; places along it are counted from the joint, radii are along its own x and y."""
-
-    part: str
-    joint: str
-    along: str
-    reach: Pair
-    """Where it begins and ends."""
-    radii: tuple[Pair, Pair]
-    """At the start and the end."""
-    off: Pair = (0.0, 0.0)
-    """How far along its x the middle of its cross-sections lies off the joint's axis, at the start and the end."""
-    caps: Pair = (0.0, 0.0)
-    aside: Pair = (0.0, 0.0)
-    """As `off`, along its y."""
-
-
-def _limbs(skeleton: Skeleton, parts: Sequence[_Limb]) -> Limbs:
-    frames = np.array([ALONG[part.along] for part in parts], float)
-    starts, ends = np.array([[*zip(part.off, part.aside, part.reach)] for part in parts]).swapaxes(0, 1)
-    return Limbs(np.array([skeleton.joint_index(part.joint) for part in parts], np.int64), frames, (frames @ starts[:, :, None])[..., 0],
-                 (ends - starts)[:, 2], (ends - starts)[:, :2], np.array([part.radii for part in parts], float),
-                 np.array([part.caps for part in parts], float), tuple(part.part for part in parts))  # fmt: skip
-
-
-def _drawn(limbs: Limbs) -> Hulls:
-    """Limbs as hulls of two ellipsoids, one at either end."""
-    flat = FLAT * limbs.radii.mean(2)
-    radii = np.concatenate([limbs.radii, np.maximum(limbs.caps, flat)[..., None]], 2)
-    in_joint = (np.abs(limbs.rotations)[:, None] @ radii[..., None])[..., 0]
-    return Hulls(np.stack([limbs.joints, limbs.joints], 1), np.stack([limbs.starts, limbs.ends], 1), in_joint)
-
-
-def _landmarks(sizes: BoneSizes, neck: tuple[str, float]) -> dict[str, tuple[str, tuple[float, float, float]]]:
-    """The 17 joints that a motion reports; `neck`: the joint under its base, and how far under."""
-    points = {"pelvis": ("pelvis", (0.0, 0.0, 0.0)), "neck": (neck[0], (0.0, 0.0, neck[1])),
-              "head": ("head", (sizes.head_forward, 0.0, sizes.neck_length))}  # fmt: skip
-    for side in SIDES:
-        down = {"shoulder": ("shoulder", 0.0), "elbow": ("elbow", 0.0), "wrist": ("elbow", sizes.forearm_length),
-                "hand": ("elbow", sizes.forearm_length + sizes.hand_point)}  # fmt: skip
-        points |= {f"{side}_{name}": (f"{side}_{joint}", (0.0, 0.0, -z)) for name, (joint, z) in down.items()}
-    for side in SIDES:
-        down = {"hip": ("hip", 0.0), "knee": ("knee", 0.0), "ankle": ("knee", sizes.shank_length)}
-        points |= {f"{side}_{name}": (f"{side}_{joint}", (0.0, 0.0, -z)) for name, (joint, z) in down.items()}
-    return points
-
-
-def _body(name: str, skeleton: Skeleton, parts: Sequence[_Limb], landmarks: dict[str, tuple[str, tuple[float, float, float]]]) -> Body:
-    limbs = _limbs(skeleton, parts)
-    return Body(name, skeleton, _drawn(limbs), limbs.parts, landmarks, None, limbs)
-
-
-def _section(width: float, x: float = 1.0, y: float = 1.0) -> Pair:
-    """Radii of a cross-section of a mean width; x and y are shares."""
-    return x * width / 2, y * width / 2
-
-
-def _trunk(s: AnatomicalSizes) -> list[_Limb]:
-    """Two parts that meet at the waist, and a yoke from shoulder to shoulder; the neck leans forward, and the face lies before it."""
-    hips, waist, chest = ((depth / 2, width / 2) for depth, width in (
-        (s.pelvis_depth, s.pelvis_width), (s.waist_depth, s.waist_width), (s.chest_depth, s.chest_width)))  # fmt: skip
-    neck, jaw, skull = _section(s.neck_width), (0.36 * s.head_depth, 0.40 * s.head_width), (0.5 * s.head_depth, 0.5 * s.head_width)
-    high, yoke = s.thorax_height - s.shoulder_drop, _section(s.shoulder_thickness)
-    armpit = 0.65 * high
-    return [
-        _Limb("pelvis", "pelvis", "up", (-s.hip_drop, s.lumbar_height), (hips, waist), caps=(0.4 * s.pelvis_depth, 0.2 * s.waist_depth)),
-        _Limb("chest", "chest", "up", (0.0, armpit), (waist, chest), caps=(0.2 * s.waist_depth, s.thorax_height - armpit)),
-        _Limb("shoulders", "chest", "left", (-0.5 * s.shoulder_distance, 0.5 * s.shoulder_distance), (yoke, yoke),
-              (s.shoulder_forward, s.shoulder_forward), (0.3 * s.shoulder_thickness, 0.3 * s.shoulder_thickness), (-high, -high)),
-        _Limb("neck", "head", "up", (-0.1 * s.neck_length, s.neck_length), (neck, neck), (0.0, s.head_forward),
-              (0.2 * s.neck_width, 0.2 * s.neck_width)),
-        _Limb("head", "head", "up", (s.neck_length - 0.15 * s.head_height, s.neck_length + 0.45 * s.head_height), (jaw, skull),
-              (s.head_forward + 0.16 * s.head_depth, s.head_forward + 0.03 * s.head_depth), (0.35 * s.head_height, 0.55 * s.head_height)),
-    ]  # fmt: skip
-
-
-def _arm(side: str, s: AnatomicalSizes) -> list[_Limb]:
-    """The upper arm lies behind the bone at the shoulder, before it at the elbow; the palm faces the thigh."""
-    elbow, fist = f"{side}_elbow", s.forearm_length + s.hand_length - 0.2 * s.hand_width
-    bend, wrist = _section(s.elbow_width, 1.16, 0.84), _section(s.wrist_width, 1.16, 0.84)
-    return [
-        _Limb(f"{side}_upper_arm", f"{side}_shoulder", "down", (0.0, s.upper_arm_length), (_section(s.upper_arm_width, 0.98, 1.02), bend),
-              (-0.075 * s.upper_arm_width, 0.05 * s.elbow_width), (0.5 * s.shoulder_thickness, 0.25 * s.elbow_width)),
-        _Limb(f"{side}_forearm", elbow, "down", (0.0, s.forearm_length), (_section(s.forearm_width, 0.9, 1.1), wrist),
-              caps=(0.25 * s.elbow_width, 0.1 * s.wrist_width)),
-        _Limb(f"{side}_hand", elbow, "down", (s.forearm_length, fist), (wrist, _section(s.hand_width, 0.9, 0.42)),
-              caps=(0.1 * s.wrist_width, 0.2 * s.hand_width)),
-    ]  # fmt: skip
-
-
-def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
-    """The thigh lies before the bone, the calf behind it; the sole is flat, its toes turned out."""
-    heel, toes, out = 0.45 * s.ankle_height, 0.22 * s.ankle_height, s.toe_out if side == "left" else -s.toe_out
-    return [
-        _Limb(f"{side}_thigh", f"{side}_hip", "down", (0.0, s.thigh_length),
-              (_section(s.thigh_width, 1.09, 0.91), _section(s.knee_width, 1.03, 0.97)),
-              (0.107 * s.thigh_width, 0.126 * s.knee_width), (0.4 * s.thigh_width, 0.4 * s.knee_width)),
-        _Limb(f"{side}_shank", f"{side}_knee", "down", (0.0, s.shank_length),
-              (_section(s.calf_width, 1.04, 0.96), _section(s.ankle_width, 1.12, 0.88)),
-              (-0.132 * s.calf_width, -0.182 * s.ankle_width), (0.3 * s.calf_width, 0.4 * s.ankle_width)),
-        _Limb(f"{side}_foot", f"{side}_ankle", "forward", (-0.14 * s.foot_length, 0.68 * s.foot_length),
-              ((heel, 0.38 * s.foot_width), (toes, 0.48 * s.foot_width)),
-              (heel - s.ankle_height, toes - s.ankle_height), (0.09 * s.foot_length, 0.09 * s.foot_length), (0.2 * out, -out)),
-    ]  # fmt: skip
-
-
-def anatomical(sizes: AnatomicalSizes) -> Body:
-    """32 DOF, 17 tapered elliptic limbs.
-
-    Tapers of arms and legs, and how far they lie off the bone, are shares of the widths, found on a mesh of a person; the rest of the shape
-    is our own.
-    """
-    sides = [limb for limbs in (_arm, _leg) for side in SIDES for limb in limbs(side, sizes)]
-    return _body("anatomical", anatomical_skeleton(sizes), [*_trunk(sizes), *sides], _landmarks(sizes, ("chest", sizes.thorax_height)))
-
-
-def cylinders(sizes: CylinderSizes) -> Body:
-    """25 DOF, ten cylinders with flat ends: the torso's elliptic, the others circular (Ni 2008, II). The lower legs end at the soles."""
-    s = sizes
-    torso = (s.trunk_depth / 2, s.trunk_width / 2)
-    parts = [_Limb("torso", "pelvis", "up", (-s.hip_drop - 0.3 * s.trunk_depth, s.trunk_height - 0.3 * s.shoulder_drop), (torso, torso))]
-    tubes = [("head", "head", (0.0, s.neck_length + s.head_height), s.head_width)]
-    for side in SIDES:
-        tubes += [(f"{side}_upper_arm", f"{side}_shoulder", (-0.3 * s.upper_arm_width, s.upper_arm_length), s.upper_arm_width),
-                  (f"{side}_lower_arm", f"{side}_elbow", (0.0, s.forearm_length + s.hand_length), s.forearm_width)]
-    for side in SIDES:
-        tubes += [(f"{side}_upper_leg", f"{side}_hip", (0.0, s.thigh_length), s.thigh_width),
-                  (f"{side}_lower_leg", f"{side}_knee", (0.0, s.shank_length + s.ankle_height), s.shank_width)]
-    parts += [_Limb(part, joint, "up" if joint == "head" else "down", reach, (_section(width), _section(width)))
-              for part, joint, reach, width in tubes]
-    return _body("cylinders", cylinder_skeleton(sizes), parts, _landmarks(sizes, ("pelvis", sizes.trunk_height)))
-
-
-SIDES = ("left", "right")
-Bounds = tuple[float, float]
 Three = tuple[float, float, float]
 FREE = (-np.inf, np.inf)
-GLOBAL = ("root_x", "root_y", "root_z", "root_heading")
-"""Degrees of freedom that say where a person is and whither they look, which no prior of articulation models."""
+GLOBAL_DOFS = ("root_x", "root_y", "root_z", "root_heading")
+"""Degrees of freedom for position and heading in the world, which no articulation prior models."""
 SWING = {"left": ("-y", "x", "z"), "right": ("-y", "-x", "-z")}
-"""Axes about which a hanging limb swings forward, swings outward, and twists outward."""
+"""Axes about which a hanging limb swings forward, outward, and twists outward."""
 
 
-def _dof(name: str, joint: str, axis: str, limits: Bounds, rest: float = 0.0, spread: Bounds = FREE, kind: str = "rotation") -> Dof:
+def _dof(name: str, joint: str, axis: str, limits: Pair, rest: float = 0.0, spread: Pair = FREE, kind: str = "rotation") -> Dof:
     """A degree of freedom; angles in degrees."""
     below, above = np.abs(np.radians(spread)).tolist()
     return Dof(name, joint, axis, *np.radians(limits).tolist(), kind=kind,  # pyright: ignore[reportArgumentType]
                rest=float(np.radians(rest)), spread=(below, above))  # fmt: skip
 
 
-def _ball(joint: str, limits: tuple[Bounds, Bounds, Bounds], rest: Three,
-          spread: tuple[float | Bounds, float | Bounds, float | Bounds]) -> list[Dof]:
+def _ball(joint: str, limits: tuple[Pair, Pair, Pair], rest: Three,
+          spread: tuple[float | Pair, float | Pair, float | Pair]) -> list[Dof]:
     """The rotation vector of a ball joint, degrees; a spread may differ below and above the rest."""
     return [_dof(f"{joint}_{axis}", joint, axis, within, usual, wide if isinstance(wide, tuple) else (-wide, wide), "vector")
             for axis, within, usual, wide in zip("xyz", limits, rest, spread)]
 
 
-def _sided(side: str, limits: tuple[Bounds, Bounds, Bounds], rest: Three, spread: Three) -> tuple:
-    """What `_ball` wants, for a side, from what the left one has: about x and z the right one's is its mirror's."""
+def _sided(side: str, limits: tuple[Pair, Pair, Pair], rest: Three, spread: Three) -> tuple:
+    """Limits, rest and spread for `_ball` on a side, from those of the left side; the right mirrors rotations about x and z."""
     (x, y, z), (a, b, c) = limits, rest
     return (limits, rest, spread) if side == "left" else (((-x[1], -x[0]), y, (-z[1], -z[0])), (-a, b, -c), spread)
 
 
-def _angles(joint: str, axes: tuple[str, str, str], names: tuple[str, str, str], limits: tuple[Bounds, Bounds, Bounds],
+def _angles(joint: str, axes: tuple[str, str, str], names: tuple[str, str, str], limits: tuple[Pair, Pair, Pair],
             rest: Three, spread: Three) -> list[Dof]:
-    """Three turns one after another, degrees: about Y, then X, then Z."""
+    """Three rotations one after another, degrees: about Y, then X, then Z."""
     return [_dof(f"{joint}_{name}", joint, axis, within, usual, (-wide, wide))
             for axis, name, within, usual, wide in zip(axes, names, limits, rest, spread)]
 
 
 def _root() -> list[Dof]:
-    """The pelvis in the world: place; heading, then bow (positive forward), then tilt (positive to the right)."""
+    """The pelvis in the world: position; then heading, bow (positive forward) and tilt (positive to the right)."""
     places = [_dof(f"root_{axis}", "pelvis", axis, FREE, kind="translation") for axis in "xyz"]
     return [*places, _dof("root_heading", "pelvis", "z", FREE), _dof("root_bow", "pelvis", "y", (-100, 130), spread=(5, 10)),
             _dof("root_tilt", "pelvis", "x", (-80, 80), spread=(8, 8))]  # fmt: skip
 
 
 def _places(side: str, s: BoneSizes) -> tuple[Three, Three]:
-    """Where a side's shoulder lies from the base of the neck, and its hip from the pelvis."""
+    """Positions of a side's shoulder from the base of the neck, and of its hip from the pelvis."""
     out = 0.5 if side == "left" else -0.5
     return (s.shoulder_forward, out * s.shoulder_distance, -s.shoulder_drop), (s.hip_forward, out * s.hip_distance, -s.hip_drop)
 
@@ -236,10 +89,8 @@ def anatomical_skeleton(sizes: AnatomicalSizes) -> Skeleton:
 
 
 def cylinder_skeleton(sizes: CylinderSizes) -> Skeleton:
-    """The 25 DOF of Ni 2008 (II): the torso 6; head, upper arms and upper legs 3 each, as angles about Y, X, Z; lower arms and legs 1 each.
-
-    Where a limb is level to the side (abduction 90 degrees) flexion and twist are one and the same; angles stay unwrapped.
-    """
+    """The 25 DOF of Ni 2008 (II): torso 6; head, upper arms and upper legs 3 each, as angles about Y, X, Z; lower arms and legs 1 each.
+    With a limb level to the side (abduction 90 degrees) flexion and twist coincide; angles stay unwrapped."""
     s = sizes
     joints = [Joint("pelvis", None), Joint("head", "pelvis", (0.0, 0.0, s.trunk_height))]
     dofs = [*_root(), *_angles("head", ("y", "x", "z"), ("flexion", "bend", "twist"), ((-70, 75), (-55, 55), (-90, 90)), (0, 0, 0),
@@ -257,3 +108,144 @@ def cylinder_skeleton(sizes: CylinderSizes) -> Skeleton:
         dofs += _angles(hip, SWING[side], swing, ((-60, 150), (-60, 95), (-75, 75)), (5, 4, 0), (25, 15, 12))
         dofs += [_dof(f"{knee}_flexion", knee, "y", (0, 155), 10, (10, 30))]
     return Skeleton(tuple(joints), tuple(dofs))
+
+
+LIMB_AXES = {
+    "up": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "down": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    "forward": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
+    "left": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+}
+"""Columns: a limb's own axes x, y, z in its joint's frame. z runs along the limb; x is forward, or up for a foot."""
+FLAT_END = 0.02
+"""Height of the ellipsoid that a flat end is drawn as, as a share of its radii."""
+
+
+class _Limb(NamedTuple):
+    """A limb, metres. Positions along it are measured from the joint; radii are along its own x and y."""
+
+    part: str
+    joint: str
+    along: str
+    reach: Pair
+    """Start and end."""
+    radii: tuple[Pair, Pair]
+    """At the start and the end."""
+    off: Pair = (0.0, 0.0)
+    """Offsets of the cross-sections' centres from the joint's axis along x, at the start and the end."""
+    caps: Pair = (0.0, 0.0)
+    aside: Pair = (0.0, 0.0)
+    """The same along y."""
+
+
+def _limbs(skeleton: Skeleton, parts: Sequence[_Limb]) -> Limbs:
+    frames = np.array([LIMB_AXES[part.along] for part in parts], float)
+    starts, ends = np.array([[*zip(part.off, part.aside, part.reach)] for part in parts]).swapaxes(0, 1)
+    return Limbs(np.array([skeleton.joint_index(part.joint) for part in parts], np.int64), frames, (frames @ starts[:, :, None])[..., 0],
+                 (ends - starts)[:, 2], (ends - starts)[:, :2], np.array([part.radii for part in parts], float),
+                 np.array([part.caps for part in parts], float), tuple(part.part for part in parts))  # fmt: skip
+
+
+def _drawn(limbs: Limbs) -> Hulls:
+    """Limbs as hulls of two ellipsoids, one at each end."""
+    flat = FLAT_END * limbs.radii.mean(2)
+    radii = np.concatenate([limbs.radii, np.maximum(limbs.caps, flat)[..., None]], 2)
+    in_joint = (np.abs(limbs.rotations)[:, None] @ radii[..., None])[..., 0]
+    return Hulls(np.stack([limbs.joints, limbs.joints], 1), np.stack([limbs.starts, limbs.ends], 1), in_joint)
+
+
+def _landmarks(sizes: BoneSizes, neck: tuple[str, float]) -> dict[str, tuple[str, Three]]:
+    """The 17 joints that a motion reports. `neck`: the joint that carries the base of the neck, and how far above it that lies."""
+    points = {"pelvis": ("pelvis", (0.0, 0.0, 0.0)), "neck": (neck[0], (0.0, 0.0, neck[1])),
+              "head": ("head", (sizes.head_forward, 0.0, sizes.neck_length))}  # fmt: skip
+    for side in SIDES:
+        down = {"shoulder": ("shoulder", 0.0), "elbow": ("elbow", 0.0), "wrist": ("elbow", sizes.forearm_length),
+                "hand": ("elbow", sizes.forearm_length + sizes.hand_point)}  # fmt: skip
+        points |= {f"{side}_{name}": (f"{side}_{joint}", (0.0, 0.0, -z)) for name, (joint, z) in down.items()}
+    for side in SIDES:
+        down = {"hip": ("hip", 0.0), "knee": ("knee", 0.0), "ankle": ("knee", sizes.shank_length)}
+        points |= {f"{side}_{name}": (f"{side}_{joint}", (0.0, 0.0, -z)) for name, (joint, z) in down.items()}
+    return points
+
+
+def _body(name: str, skeleton: Skeleton, parts: Sequence[_Limb], landmarks: dict[str, tuple[str, Three]]) -> Body:
+    limbs = _limbs(skeleton, parts)
+    return Body(name, skeleton, _drawn(limbs), limbs.parts, landmarks, None, limbs)
+
+
+def _section(width: float, x: float = 1.0, y: float = 1.0) -> Pair:
+    """Radii of a cross-section of a mean width; `x` and `y` are factors."""
+    return x * width / 2, y * width / 2
+
+
+def _trunk(s: AnatomicalSizes) -> list[_Limb]:
+    """Two parts that meet at the waist, shoulders, neck and head; the neck leans forward."""
+    hips, waist, chest = ((depth / 2, width / 2) for depth, width in (
+        (s.pelvis_depth, s.pelvis_width), (s.waist_depth, s.waist_width), (s.chest_depth, s.chest_width)))  # fmt: skip
+    neck, jaw, skull = _section(s.neck_width), (0.36 * s.head_depth, 0.40 * s.head_width), (0.5 * s.head_depth, 0.5 * s.head_width)
+    high, yoke = s.thorax_height - s.shoulder_drop, _section(s.shoulder_thickness)
+    armpit = 0.65 * high
+    return [
+        _Limb("pelvis", "pelvis", "up", (-s.hip_drop, s.lumbar_height), (hips, waist), caps=(0.4 * s.pelvis_depth, 0.2 * s.waist_depth)),
+        _Limb("chest", "chest", "up", (0.0, armpit), (waist, chest), caps=(0.2 * s.waist_depth, s.thorax_height - armpit)),
+        _Limb("shoulders", "chest", "left", (-0.5 * s.shoulder_distance, 0.5 * s.shoulder_distance), (yoke, yoke),
+              (s.shoulder_forward, s.shoulder_forward), (0.3 * s.shoulder_thickness, 0.3 * s.shoulder_thickness), (-high, -high)),
+        _Limb("neck", "head", "up", (-0.1 * s.neck_length, s.neck_length), (neck, neck), (0.0, s.head_forward),
+              (0.2 * s.neck_width, 0.2 * s.neck_width)),
+        _Limb("head", "head", "up", (s.neck_length - 0.15 * s.head_height, s.neck_length + 0.45 * s.head_height), (jaw, skull),
+              (s.head_forward + 0.16 * s.head_depth, s.head_forward + 0.03 * s.head_depth), (0.35 * s.head_height, 0.55 * s.head_height)),
+    ]  # fmt: skip
+
+
+def _arm(side: str, s: AnatomicalSizes) -> list[_Limb]:
+    """An arm; the upper arm lies behind the bone at the shoulder, before it at the elbow, and the palm faces the thigh."""
+    elbow, fist = f"{side}_elbow", s.forearm_length + s.hand_length - 0.2 * s.hand_width
+    bend, wrist = _section(s.elbow_width, 1.16, 0.84), _section(s.wrist_width, 1.16, 0.84)
+    return [
+        _Limb(f"{side}_upper_arm", f"{side}_shoulder", "down", (0.0, s.upper_arm_length), (_section(s.upper_arm_width, 0.98, 1.02), bend),
+              (-0.075 * s.upper_arm_width, 0.05 * s.elbow_width), (0.5 * s.shoulder_thickness, 0.25 * s.elbow_width)),
+        _Limb(f"{side}_forearm", elbow, "down", (0.0, s.forearm_length), (_section(s.forearm_width, 0.9, 1.1), wrist),
+              caps=(0.25 * s.elbow_width, 0.1 * s.wrist_width)),
+        _Limb(f"{side}_hand", elbow, "down", (s.forearm_length, fist), (wrist, _section(s.hand_width, 0.9, 0.42)),
+              caps=(0.1 * s.wrist_width, 0.2 * s.hand_width)),
+    ]  # fmt: skip
+
+
+def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
+    """A leg; the thigh lies before the bone, the calf behind it, and the toes of the flat foot are turned out."""
+    heel, toes, out = 0.45 * s.ankle_height, 0.22 * s.ankle_height, s.toe_out if side == "left" else -s.toe_out
+    return [
+        _Limb(f"{side}_thigh", f"{side}_hip", "down", (0.0, s.thigh_length),
+              (_section(s.thigh_width, 1.09, 0.91), _section(s.knee_width, 1.03, 0.97)),
+              (0.107 * s.thigh_width, 0.126 * s.knee_width), (0.4 * s.thigh_width, 0.4 * s.knee_width)),
+        _Limb(f"{side}_shank", f"{side}_knee", "down", (0.0, s.shank_length),
+              (_section(s.calf_width, 1.04, 0.96), _section(s.ankle_width, 1.12, 0.88)),
+              (-0.132 * s.calf_width, -0.182 * s.ankle_width), (0.3 * s.calf_width, 0.4 * s.ankle_width)),
+        _Limb(f"{side}_foot", f"{side}_ankle", "forward", (-0.14 * s.foot_length, 0.68 * s.foot_length),
+              ((heel, 0.38 * s.foot_width), (toes, 0.48 * s.foot_width)),
+              (heel - s.ankle_height, toes - s.ankle_height), (0.09 * s.foot_length, 0.09 * s.foot_length), (0.2 * out, -out)),
+    ]  # fmt: skip
+
+
+def anatomical(sizes: AnatomicalSizes) -> Body:
+    """32 DOF, 17 tapered elliptic limbs. Tapers of arms and legs and their offsets from the bone are fractions of the widths, measured
+    on a mesh of a person; the rest of the shape is our own."""
+    sides = [limb for limbs in (_arm, _leg) for side in SIDES for limb in limbs(side, sizes)]
+    return _body("anatomical", anatomical_skeleton(sizes), [*_trunk(sizes), *sides], _landmarks(sizes, ("chest", sizes.thorax_height)))
+
+
+def cylinders(sizes: CylinderSizes) -> Body:
+    """25 DOF, ten cylinders with flat ends, the torso's elliptic, the others circular (Ni 2008, II). Lower legs end at the soles."""
+    s = sizes
+    torso = (s.trunk_depth / 2, s.trunk_width / 2)
+    parts = [_Limb("torso", "pelvis", "up", (-s.hip_drop - 0.3 * s.trunk_depth, s.trunk_height - 0.3 * s.shoulder_drop), (torso, torso))]
+    tubes = [("head", "head", (0.0, s.neck_length + s.head_height), s.head_width)]
+    for side in SIDES:
+        tubes += [(f"{side}_upper_arm", f"{side}_shoulder", (-0.3 * s.upper_arm_width, s.upper_arm_length), s.upper_arm_width),
+                  (f"{side}_lower_arm", f"{side}_elbow", (0.0, s.forearm_length + s.hand_length), s.forearm_width)]
+    for side in SIDES:
+        tubes += [(f"{side}_upper_leg", f"{side}_hip", (0.0, s.thigh_length), s.thigh_width),
+                  (f"{side}_lower_leg", f"{side}_knee", (0.0, s.shank_length + s.ankle_height), s.shank_width)]
+    parts += [_Limb(part, joint, "up" if joint == "head" else "down", reach, (_section(width), _section(width)))
+              for part, joint, reach, width in tubes]
+    return _body("cylinders", cylinder_skeleton(sizes), parts, _landmarks(sizes, ("pelvis", sizes.trunk_height)))

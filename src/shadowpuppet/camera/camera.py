@@ -1,4 +1,4 @@
-"""The camera: OpenCV's pinhole with distortion, and where it stands in the world."""
+"""The camera: OpenCV's pinhole or fisheye model with distortion, and its pose in the world."""
 
 from __future__ import annotations
 
@@ -11,18 +11,16 @@ from numpy.typing import ArrayLike
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 
-ABSURD = 1e6
-"""A coefficient of distortion that no lens has."""
-STEPS = 1000
-"""Angles off the optical axis at which a lens is tried."""
+MAX_DISTORTION = 1e6
+"""Bound of plausible distortion coefficients."""
+REACH_STEPS = 1000
+"""Angles off the optical axis at which a lens' formula is checked."""
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A calibrated camera. Axes follow OpenCV: x right, y down, z forward; pixel centres are at integers.
-
-    Raises `CalibrationError`, naming the camera and the field, where a value cannot be a camera's.
-    """
+    """A calibrated camera. Axes follow OpenCV: x right, y down, z forward; pixel centres are at integers. Raises `CalibrationError`,
+    naming the camera and the field, for impossible values."""
 
     name: str
     size: tuple[int, int]
@@ -35,10 +33,10 @@ class Camera:
     """World to camera, of shape (4, 4), metres: X_camera = R X_world + t."""
     fisheye: bool = False
     oriented: bool = True
-    """Whether `T_camera_world` was measured; False when only a field of view is known (`from_fov`)."""
+    """Whether `T_camera_world` was measured; False if only the field of view is known (`from_fov`)."""
 
     def __post_init__(self) -> None:
-        """Check every field, and bring each to its shape."""
+        """Check every field and convert it to its shape."""
         numbers, check = self._numbers, self._check
         size = numbers("size", self.size, (2,))
         check(bool((size >= 1).all() and (size % 1 == 0).all()), "size", size.tolist(), "two positive whole numbers of pixels")
@@ -50,7 +48,7 @@ class Camera:
         distortion = numbers("distortions", self.distortion)
         allowed = (4,) if self.fisheye else (0, 4, 5, 8)
         check(distortion.size in allowed, "distortions", f"{distortion.size} numbers", " or ".join(map(str, allowed)))
-        check(bool((np.abs(distortion) < ABSURD).all()), "distortions", distortion.tolist(), f"numbers under {ABSURD:g}")
+        check(bool((np.abs(distortion) < MAX_DISTORTION).all()), "distortions", distortion.tolist(), f"numbers under {MAX_DISTORTION:g}")
         distortion = distortion if self.fisheye else np.pad(distortion, (0, 8 - distortion.size))
         T = numbers("rotation and translation", self.T_camera_world, (4, 4))
         R = T[:3, :3]
@@ -77,10 +75,8 @@ class Camera:
 
     @classmethod
     def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam") -> Camera:
-        """A level camera of which only the horizontal field of view (radians) is known, at the world's origin.
-
-        The world is then the camera's own: x to its right, y along the optical axis, z up.
-        """
+        """A level camera at the world's origin, known only by its horizontal field of view (radians). The world is the camera's own: x
+        to its right, y along the optical axis, z up."""
         if not 0 < fov < np.pi:
             raise CalibrationError(f"camera {name!r}: fov: found {np.degrees(fov):g} degrees, expected between 0 and 180")
         focal = size[0] / (2 * np.tan(fov / 2))
@@ -90,15 +86,13 @@ class Camera:
 
     @property
     def centre(self) -> Array:
-        """The camera's place in the world, of shape (3,), metres."""
+        """The camera's position in the world, of shape (3,), metres."""
         return inverse(self.T_camera_world)[:3, 3]
 
     def project(self, points_world: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera.
-
-        Points beyond the lens's `reach` go on outward in proportion, as `projection` draws them: the polynomials of distortion, fitted
-        to the picture, turn back there and would bring what lies far outside into it.
-        """
+        """Pixels (..., 2) of world points (..., 3); not a number for points at or behind the camera. Points beyond the lens's `reach`
+        are extrapolated in proportion, as in `projection`: distortion polynomials, fitted inside the picture, turn back there and would
+        map points far outside into it."""
         points = transform(self.T_camera_world, points_world)
         flat = points.reshape(-1, 3)
         ahead = flat[:, 2] > 1e-9
@@ -110,7 +104,7 @@ class Camera:
         return pixels.reshape(*points.shape[:-1], 2)
 
     def _bent(self, xy: Array) -> Array:
-        """Pixels (N, 2) of points (N, 2) on the plane z = 1, by OpenCV's formulas, wherever these lead."""
+        """Pixels (N, 2) of points (N, 2) on the plane z = 1, by OpenCV's formulas without bounds."""
         import cv2
 
         if not len(xy):
@@ -121,15 +115,15 @@ class Camera:
 
     @cached_property
     def reach(self) -> float:
-        """Radius on the plane z = 1 up to which the lens's formula leads outward; infinite where it does so everywhere."""
+        """Radius on the plane z = 1 up to which the lens' formula increases; infinite if it does everywhere."""
         if not (self.fisheye or self.distortion.any()):
             return np.inf
-        radii = np.tan(np.arange(STEPS) * np.pi / 2 / STEPS)
-        outward = np.diff(self._bent(np.stack([radii, np.zeros(STEPS)], 1))[:, 0]) > 0
+        radii = np.tan(np.arange(REACH_STEPS) * np.pi / 2 / REACH_STEPS)
+        outward = np.diff(self._bent(np.stack([radii, np.zeros(REACH_STEPS)], 1))[:, 0]) > 0
         return np.inf if outward.all() else float(radii[max(int(np.argmin(outward)), 1)])
 
     def rays(self, pixels: ArrayLike) -> Array:
-        """Directions in the camera's frame (..., 3), z = 1, of pixels (..., 2): the inverse of `project` up to depth."""
+        """Directions (..., 3) in the camera's frame, z = 1, of pixels (..., 2): the inverse of `project` up to depth."""
         import cv2
 
         pixels = np.ascontiguousarray(pixels, float)  # OpenCV's fisheye reads others wrongly
@@ -146,7 +140,7 @@ class Camera:
         return np.concatenate([xy, np.ones((len(xy), 1))], 1).reshape(*pixels.shape[:-1], 3)
 
     def resized(self, size: tuple[int, int]) -> Camera:
-        """The same camera for pictures scaled to `size` (pixel centres stay at integers: the principal point moves by halves)."""
+        """The same camera for pictures scaled to `size` (pixel centres stay at integers, so the principal point moves by halves)."""
         sx, sy = size[0] / self.size[0], size[1] / self.size[1]
         matrix = self.matrix.copy()
         matrix[0] *= sx

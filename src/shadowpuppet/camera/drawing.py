@@ -1,4 +1,4 @@
-"""The picture of a fit, as Liu 2011 shows it (Fig. 10-12): best estimate, matching result, raw picture, one below the other."""
+"""Drawing of a fit as in Liu 2011 (Fig. 10-12): best estimate, matching result and raw picture, one below the other."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ if TYPE_CHECKING:  # both bring much with them
 # Colours (blue, green, red) that people who see colours differently tell apart: Okabe & Ito 2008.
 BLACK, GREY, WHITE = (0, 0, 0), (96, 96, 96), (255, 255, 255)
 MODEL_ONLY, SILHOUETTE_ONLY = (0, 159, 230), (233, 180, 86)
-SIDES = {"left": (115, 158, 0), "right": (167, 121, 204)}
-MIDDLE = (66, 228, 240)
-"""The colour of what is neither left nor right."""
+SIDE_COLOURS = {"left": (115, 158, 0), "right": (167, 121, 204)}
+MIDDLE_COLOUR = (66, 228, 240)
+"""The colour of parts that are neither left nor right."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
-"""Colours of the matching row by model + 2 silhouette + 4 ignored."""
+"""Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
 SUBPIXEL = 4
-"""Bits of a pixel's fraction in OpenCV's drawing."""
+"""Fractional bits of pixel coordinates in OpenCV's drawing."""
 
 
 def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLike, *, status: str, time: float,
                   overlap: float = np.nan, ignore: ArrayLike | None = None) -> Image:
     """The three rows (3 H, W, 3), blue green red, of a frame.
 
-    Top: the model over the darkened picture, its cards brighter the more they face the camera. Middle: where model and silhouette
-    `mask` (H, W) agree (white), where there is only one of them, and what does not count, `ignore` (H, W), in greys. Bottom: the
-    picture with the skeleton, the time (s), the status and the overlap. A `pose` (D,) that is not numbers is not drawn.
-    Raises `ShadowPuppetError` where a picture has not the camera's size.
+    Top: the model over the darkened picture, cards brighter the more they face the camera. Middle: where model and silhouette `mask` (H,
+    W) agree (white) or differ, and what does not count, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
+    the status and the overlap. A `pose` (D,) that is not finite is not drawn. Raises `ShadowPuppetError` for a picture that has not the
+    camera's size.
     """
     image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
     size = picture.camera.size
@@ -55,7 +55,7 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
 
 
 def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLike | None = None) -> Image:
-    """Where a drawn model and a silhouette (H, W) agree and differ, (H, W, 3); the colours are `MATCHING`."""
+    """Comparison (H, W, 3) of a drawn model and a silhouette (H, W), in the colours `MATCHING`."""
     index = model.astype(np.uint8) + 2 * mask.astype(np.uint8)
     if ignore is not None:
         index += 4 * np.asarray(ignore, bool).astype(np.uint8)
@@ -63,7 +63,7 @@ def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLik
 
 
 def draw_model(image: Image, picture: Picture, pose: Array) -> None:
-    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, nearer shapes over farther ones."""
+    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, farthest shapes first."""
     import cv2
 
     from shadowpuppet.body.shapes import Quads
@@ -83,10 +83,10 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
     points = picture.body.points(pose[None], picture.T_camera_base)[0]
     names = picture.body.landmark_names
     pixels = dict(zip(names, _pixels(picture, points)))
-    seen = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
-    bones = [(seen[a], seen[b], _side(b)) for a, b in BONES if a in seen and b in seen]
+    visible = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
+    bones = [(visible[a], visible[b], _side(b)) for a, b in BONES if a in visible and b in visible]
     joints = {name for bone in BONES for name in bone}
-    dots = [_point(seen[name]) for name in names if name in seen and name in joints]
+    dots = [_point(visible[name]) for name in names if name in visible and name in joints]
     unit = max(1.0, image.shape[0] / 240)
     for extra, dark in ((2, True), (0, False)):  # a dark rim, so that bones stand out from any clothes
         for a, b, colour in bones:
@@ -97,13 +97,13 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
 
 
 def in_colour(image: Image) -> Image:
-    """A picture (H, W, 3) of one (H, W, 3) or (H, W)."""
+    """A picture (H, W, 3) from one (H, W, 3) or (H, W)."""
     image = np.asarray(image, np.uint8)
     return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image
 
 
 def _darkened(image: Image) -> Image:
-    """Grey and dark, so that the model's colours stand out."""
+    """The picture in dark grey, before which the model's colours stand out."""
     import cv2
 
     grey = cv2.convertScaleAbs(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), alpha=0.4)
@@ -111,22 +111,22 @@ def _darkened(image: Image) -> Image:
 
 
 def _side(name: str) -> tuple[int, int, int]:
-    return SIDES.get(name.split("_")[0], MIDDLE)
+    return SIDE_COLOURS.get(name.split("_")[0], MIDDLE_COLOUR)
 
 
 class _Piece(NamedTuple):
-    """Something flat to draw."""
+    """A flat piece of the model."""
 
     depth: float
-    """Metres from the camera."""
+    """Distance from the camera, metres."""
     fills: list[tuple[Array, tuple[float, ...]]]
-    """Convex polygons (K, 2), pixels, and their colours, one upon the other."""
+    """Convex polygons (K, 2), pixels, and their colours, drawn in order."""
     edge: Array
     """The line (K, 2), pixels, that is outlined."""
 
 
 def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
-    """Quads, each cut in four: cards cross one another, their quarters mostly do not."""
+    """Pieces of quads, each cut in four: crossing cards overlap, their quarters mostly do not."""
     body = picture.body
     quarters = _quarters(picture.transforms(pose[None])[0], body.shapes.arrays[0], body.shapes.joints[:, 0])
     pixels, depths = _pixels(picture, quarters), quarters[..., 2].mean(2)
@@ -137,7 +137,7 @@ def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
 
 
 def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
-    """Hulls by their outlines, brighter toward the middle."""
+    """Pieces of hulls: their outlines, brighter toward the middle."""
     body, T = picture.body, picture.transforms(pose[None])
     corners, counts = picture.polygons(T, np.arange(len(body.parts)))
     T = T[0, body.shapes.joints]
@@ -152,7 +152,7 @@ def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
 
 
 def _quarters(transforms: Array, quads: Array, joints: NDArray[np.int64]) -> Array:
-    """Quads cut in four, (Q, 4, 4, 3) in the camera's frame; of each quarter's corners the last is the quad's middle."""
+    """Quads cut in four, (Q, 4, 4, 3) in the camera's frame; the last corner of each quarter is the quad's centre."""
     T = transforms[joints]
     corners = np.einsum("qij,qvj->qvi", T[..., :3], quads) + T[:, None, :, 3]
     after = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -178,7 +178,7 @@ def _pixels(picture: Picture, points_camera: Array) -> Array:
 
 
 def _fixed(pixels: Array) -> NDArray[np.int32]:
-    """Pixels as OpenCV's fixed-point numbers, those far outside the picture nearer to it."""
+    """Pixels as OpenCV's fixed-point numbers, clipped far outside the picture."""
     return np.clip(np.round(pixels * (1 << SUBPIXEL)), -(1 << 20), 1 << 20).astype(np.int32)
 
 
@@ -196,7 +196,7 @@ def _label(out: Image, height: int, status: str, time: float, overlap: float) ->
 
 
 def write_text(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0, size: float | None = None) -> int:
-    """Write a line of text below `top`, with a dark rim, for a picture so many pixels high; returns where it ends."""
+    """Write a line of text with a dark rim below `top`, scaled for a picture of height `size`; returns the text's right end."""
     import cv2
 
     scale = max(0.35, (out.shape[0] / 3 if size is None else size) / 600)

@@ -1,4 +1,4 @@
-"""What a mask must be before it is worked with: of the camera's size, and a person's."""
+"""Masks (silhouettes): their type, and checks of their size and plausibility."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from shadowpuppet.errors import TrackingError
 Mask = NDArray[np.bool_]
 """A silhouette, of shape (H, W)."""
 NEARLY_ALL = 0.8
-"""Share of the picture from which on a silhouette is no person's."""
+"""Share of the picture from which on a silhouette is implausible."""
 
 
 def check_mask(mask: ArrayLike, size: tuple[int, int], what: str = "mask") -> Mask:
-    """A mask (H, W) as true and false. Raises `TrackingError` where it has not the size (width, height) of the camera's pictures."""
+    """A mask (H, W) as booleans. Raises `TrackingError` if it has not the camera's size (width, height)."""
     found = np.shape(mask)
     if found != size[::-1]:
         raise TrackingError(f"{what}: found shape {found}, expected {size[::-1]}, the camera's rows and columns")

@@ -1,4 +1,4 @@
-"""Pictures of quads and of hulls of ellipsoids as convex polygons, for many poses at once: what `rasterize` draws."""
+"""Projection of quads and hulls of ellipsoids to convex polygons, for blocks of poses: kernels."""
 
 from __future__ import annotations
 
@@ -6,32 +6,28 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import kernel, part
+from shadowpuppet.jit import device, kernel
 
 DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) * np.pi / 5)], 1)
-"""Directions in which a hull's outline is taken: the corners of its polygon."""
-NEAR = 0.05
-"""What is nearer to the camera than this (m) is cut off, so that nothing behind it is drawn."""
+"""Directions in which a hull's outline is sampled: one corner of its polygon each."""
+NEAR_PLANE = 0.05
+"""Depth (m) at which shapes are clipped, so that nothing behind the camera is drawn."""
 Lens = tuple[Array, Array, bool, bool, float]
-"""Matrix (3, 3); distortion (8,) or (4,); whether it is a fisheye's; whether it bends; the radius on the plane z = 1 to which it holds."""
+"""Matrix (3, 3); distortion (8,) or (4,); whether fisheye; whether there is any distortion; the radius on the plane z = 1 up to which it
+is valid."""
 
 
 def make_lens(camera: Camera) -> Lens:
-    """What the kernels know of a camera.
-
-    Polynomials of distortion are fitted to the picture; somewhere outside it they turn back, or mirror, and would draw into the picture
-    what lies far out. Where they turn they end here, and points go on outward in proportion.
-    """
+    """A camera as kernels use it. Distortion polynomials are fitted inside the picture; somewhere outside they turn back, or mirror, and
+    would draw into the picture what lies far out. Beyond that radius points are extrapolated in proportion."""
     bends = bool(camera.fisheye or camera.distortion.any())
     return camera.matrix, camera.distortion, camera.fisheye, bends, camera.reach
 
 
 @kernel
 def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # pragma: no cover
-    """Quads (1 or N, S, 4, 3) of a block of joints T (J, 3, 4, B), cut at the near plane: corners X, Y (S, 5, B), `counts` (S, B) of them.
-
-    Corners that a polygon has not got are its last one again. `quads` of N people: those from `begin` on. `work`: (12, B).
-    """
+    """Quads (1 or N, S, 4, 3) of a block of joints T (J, 3, 4, B), clipped at the near plane: corners X, Y (S, 5, B), `counts` (S, B).
+    Unused corners repeat the last one. `quads` of N people: those from `begin` on. `work`: (12, B)."""
     size = X.shape[2]
     for i in range(which.size):
         q, behind = which[i], 0
@@ -40,8 +36,8 @@ def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # 
             x, y, z, u, w = work[3 * v], work[3 * v + 1], work[3 * v + 2], along[v], down[v]
             _move(joint, quads[:, q, v], begin, work[3 * v : 3 * v + 3])
             for n in range(size):
-                behind += z[n] < NEAR
-                ahead = 1 / max(z[n], NEAR)
+                behind += z[n] < NEAR_PLANE
+                ahead = 1 / max(z[n], NEAR_PLANE)
                 u[n], w[n] = x[n] * ahead, y[n] * ahead
         u, w, x, y = along[3], down[3], along[4], down[4]
         for n in range(size):
@@ -52,10 +48,9 @@ def project_quads(T, begin, quads, joints, which, lens, X, Y, counts, work):  # 
         _to_pixels(X[i], Y[i], lens)
 
 
-@part
+@device
 def _move(T, points, begin, place):  # pragma: no cover
-    """Where transforms (3, 4, B) take one point (1, 3), or the points of the people from `begin` on (N, 3), the last again where they end;
-    into `place` (3, B)."""
+    """One point (1, 3), or points of the people from `begin` on (N, 3), transformed by (3, 4, B) into `place` (3, B)."""
     for r in range(3):
         a, b, c, d, out = T[r, 0], T[r, 1], T[r, 2], T[r, 3], place[r]
         if points.shape[0] == 1:
@@ -70,11 +65,11 @@ def _move(T, points, begin, place):  # pragma: no cover
 
 @kernel
 def project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, counts, work):  # pragma: no cover
-    """Outlines of hulls of ellipsoids of a block of joints T (J, 3, 4, B): corners X, Y (S, K, B), `counts` (S, B), 0 where all is behind.
+    """Outlines of hulls of ellipsoids of a block of joints T (J, 3, 4, B): corners X, Y (S, K, B), `counts` (S, B), 0 if all is behind.
 
-    In each direction a corner is the farthest point of any of the ellipses that the ellipsoids look like. An ellipse of centre c and
-    matrix M, the sum of s s' over its conjugate half axes s, reaches c + M n / h in direction n, h = sqrt(n' M n); and c - M n / h in
-    the opposite one. `numbers` (S,): how many of a shape's ellipsoids differ. `work`: (5 E + 4, B).
+    In each direction the corner is the farthest point of the ellipsoids' projections. An ellipse of centre c and matrix M, the sum of s
+    s' over its conjugate half axes s, reaches c + M n / h in direction n, h = sqrt(n' M n), and c - M n / h in the opposite one.
+    `numbers` (S,): different ellipsoids of each shape. `work`: (5 E + 4, B).
     """
     half, room = DIRECTIONS.shape[0] // 2, work[work.shape[0] - 4 :]
     for i in range(which.size):
@@ -88,15 +83,15 @@ def project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, 
         _to_pixels(X[i], Y[i], lens)
 
 
-@part
+@device
 def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no cover
-    """The ellipse (5, B), centre and matrix (xx, xy, yy), that ellipsoids with centres and radii (1 or N, 3) look like. `room`: (4, B)."""
+    """The ellipse (5, B), centre and matrix (xx, xy, yy), that ellipsoids with centres and radii (1 or N, 3) project to. `room`: (4, B)."""
     x, y, z = room[0], room[1], room[2]
     _move(T, centres, begin, room[0:3])
     cx, cy, xx, xy, yy, near = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4], room[3]
     for n in range(x.size):
-        counts[n] = DIRECTIONS.shape[0] if z[n] > NEAR else counts[n]
-        near[n] = 1 / max(z[n], NEAR)
+        counts[n] = DIRECTIONS.shape[0] if z[n] > NEAR_PLANE else counts[n]
+        near[n] = 1 / max(z[n], NEAR_PLANE)
         cx[n], cy[n] = x[n] * near[n], y[n] * near[n]
         xx[n], xy[n], yy[n] = 0.0, 0.0, 0.0
     for a in range(3):
@@ -113,9 +108,9 @@ def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no c
             yy[n] += v * v
 
 
-@part
+@device
 def _reach_to(u, v, number, ellipses, x, y, other_x, other_y):  # pragma: no cover
-    """The farthest points x, y (B,) of the first ellipses in the direction (u, v), and those in the opposite one."""
+    """The farthest points x, y (B,) of the first `number` ellipses in the direction (u, v) and in the opposite one."""
     for e in range(number):
         cx, cy, xx = ellipses[5 * e], ellipses[5 * e + 1], ellipses[5 * e + 2]
         xy, yy = ellipses[5 * e + 3], ellipses[5 * e + 4]
@@ -130,27 +125,27 @@ def _reach_to(u, v, number, ellipses, x, y, other_x, other_y):  # pragma: no cov
             x[n], y[n], other_x[n], other_y[n] = a, b, c, d
 
 
-@part
+@device
 def _clip(points, n, X, Y):  # pragma: no cover
-    """Cut quad `n` of points (12, B) at the near plane; x / z and y / z of the up to five corners left into X, Y (5, B); their number."""
+    """Clip quad `n` of points (12, B) at the near plane: x / z and y / z of up to five corners into X, Y (5, B); returns their number."""
     m = 0
     for v in range(4):
         a, b = 3 * v, 3 * ((v + 1) & 3)
         z, after = points[a + 2, n], points[b + 2, n]
-        if z >= NEAR:
+        if z >= NEAR_PLANE:
             X[m, n], Y[m, n] = points[a, n] / z, points[a + 1, n] / z
             m += 1
-        if (z >= NEAR) != (after >= NEAR):
-            s = (NEAR - z) / (after - z)
-            X[m, n] = (points[a, n] + s * (points[b, n] - points[a, n])) / NEAR
-            Y[m, n] = (points[a + 1, n] + s * (points[b + 1, n] - points[a + 1, n])) / NEAR
+        if (z >= NEAR_PLANE) != (after >= NEAR_PLANE):
+            s = (NEAR_PLANE - z) / (after - z)
+            X[m, n] = (points[a, n] + s * (points[b, n] - points[a, n])) / NEAR_PLANE
+            Y[m, n] = (points[a + 1, n] + s * (points[b + 1, n] - points[a + 1, n])) / NEAR_PLANE
             m += 1
     for v in range(m, 5):
         X[v, n], Y[v, n] = (X[m - 1, n], Y[m - 1, n]) if m else (0.0, 0.0)
     return m
 
 
-@part
+@device
 def _to_pixels(X, Y, lens):  # pragma: no cover
     """Points (K, B) on the plane z = 1 to pixels, in place."""
     K, k, fisheye, bends, reach = lens
@@ -163,17 +158,17 @@ def _to_pixels(X, Y, lens):  # pragma: no cover
             x[n], y[n] = K[0, 0] * x[n] + K[0, 2], K[1, 1] * y[n] + K[1, 2]
 
 
-@part
+@device
 def bend_within(x, y, k, fisheye, reach):  # pragma: no cover
-    """Distortion of a point on the plane z = 1. Edges between bent corners stay straight: a card is small beside the lens's bend."""
+    """Distort a point on the plane z = 1. Edges between distorted corners stay straight: a card is small beside the lens' curvature."""
     beyond = max(np.sqrt(x * x + y * y) / reach, 1.0)
     x, y = _bend(x / beyond, y / beyond, k, fisheye)
     return x * beyond, y * beyond
 
 
-@part
+@device
 def _bend(x, y, k, fisheye):  # pragma: no cover
-    """OpenCV's formulas."""
+    """OpenCV's distortion formulas."""
     if fisheye:
         r = np.sqrt(x * x + y * y)
         a = np.arctan(r)

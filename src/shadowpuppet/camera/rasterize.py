@@ -1,7 +1,7 @@
-"""Drawing a body as a silhouette, and counting the pixels in which drawings differ from one, for many poses at once.
+"""Silhouettes of a body as a camera sees it, and their difference from a mask (eq. 2), for many poses at once.
 
-Masks are packed as bits `[word_column][row]`, 64 pixels of a row in a 64-bit word, so that the inner loops run over rows and are
-vectorised. A pixel belongs to a polygon if its centre, at integer coordinates, does (half open: left and top edges count).
+Masks are packed as bits `[word_column][row]`, 64 pixels of a row in a 64-bit word, so that inner loops run over rows and vectorise. A
+pixel belongs to a polygon if its centre, at integer coordinates, does (half open: left and top edges count).
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.body.forward_kinematics import load_joints, place_joints
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.projection import DIRECTIONS, NEAR, Lens, make_lens, project_hulls, project_quads
+from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE, Lens, make_lens, project_hulls, project_quads
 from shadowpuppet.camera.scanline import count_and_clear, draw_outline, find_edges, make_page
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
-from shadowpuppet.jit import BLOCK, kernel, part
+from shadowpuppet.jit import BLOCK, device, kernel
 
 Bits = NDArray[np.uint64]
 Shapes = tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]
-"""Quads (1 or N, S, 4, 3); ellipsoids' centres and radii (1 or N, S, E, 3), how many of them differ (S,); joints (S, E)."""
+"""Quads (1 or N, S, 4, 3); ellipsoids' centres and radii (1 or N, S, E, 3) and numbers (S,); joints (S, E)."""
 
 
 def pack(mask: ArrayLike) -> Bits:
-    """Mask (H, W) to bits (ceil(W / 64), H)."""
+    """Bits (ceil(W / 64), H) of a mask (H, W)."""
     mask = np.asarray(mask, bool)
     height, width = mask.shape
     padded = np.zeros((height, -(-width // 64) * 64), bool)
@@ -39,23 +39,23 @@ def pack(mask: ArrayLike) -> Bits:
 
 
 def unpack(bits: Bits, width: int) -> NDArray[np.bool_]:
-    """Bits (C, H) to the mask (H, W)."""
+    """The mask (H, W) of bits (C, H)."""
     rows = np.ascontiguousarray(bits.T).astype("<u8").view(np.uint8)
     return np.unpackbits(rows, axis=1, bitorder="little")[:, :width].astype(bool)
 
 
 def count(bits: Bits) -> int:
-    """Number of pixels set."""
+    """Number of set pixels."""
     return int(np.bitwise_count(bits).sum())
 
 
-IN_USE = Lock()
-"""Held while a kernel draws: pictures keep room for it, and may be used by several threads."""
+BUFFER_LOCK = Lock()
+"""Held while a kernel draws: pictures reuse their buffers and may be shared between threads."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """How a camera sees a body: the body, the camera, and the body's frame in the camera's."""
+    """A camera's view of a body."""
 
     body: Body
     camera: Camera
@@ -72,10 +72,8 @@ class Picture:
 
     def polygons(self, transforms: Array, which: NDArray[np.int64],
                  arrays: tuple[Array, ...] | None = None) -> tuple[Array, NDArray[np.int64]]:
-        """Pictures of some shapes: corners (N, S, K, 2) in pixels and their number (N, S), 0 where all is behind the camera.
-
-        `arrays` are those of `Body.shapes`, each with a leading axis N, for poses of bodies of different sizes.
-        """
+        """Outlines of some shapes: corners (N, S, K, 2), pixels, and their number (N, S), 0 if all is behind the camera. `arrays`: those
+        of `Body.shapes` with a leading axis N, for bodies of different sizes."""
         block = self._block(len(which), min(BLOCK, max(len(transforms), 1)))
         corners = np.empty((len(transforms), len(which), block[1].shape[1], 2))
         counts = np.empty((len(transforms), len(which)), np.int64)
@@ -84,12 +82,12 @@ class Picture:
 
     @cached_property
     def _frame(self) -> tuple:
-        """What kernels know of the skeleton and of where it stands."""
+        """The skeleton as kernels use it, and its root's transform."""
         return self.body.skeleton.tree, self.body.skeleton.offsets, np.ascontiguousarray(self.T_camera_base[:3], float)
 
     def _block(self, shapes: int, size: int) -> tuple:
-        """Room for `size` poses side by side: joints T (J, 3, 4, B), corners X, Y (S, K, B) and their numbers (S, B), boxes (S, 6, B),
-        lines (S, K, 3, B), and what lies between, (R, B)."""
+        """Buffers for `size` poses: joints T (J, 3, 4, B), corners X, Y (S, K, B) and their numbers (S, B), boxes (S, 6, B), lines (S,
+        K, 3, B), intermediate values (R, B)."""
         joints, ellipsoids = len(self.body.skeleton.joints), self.body.shapes.joints.shape[1]
         corners = 5 if isinstance(self.body.shapes, Quads) else len(DIRECTIONS)
         X, Y = np.zeros((2, shapes, corners, size))
@@ -97,7 +95,7 @@ class Picture:
                 np.zeros((shapes, corners, 3, size)), np.zeros((max(12, 5 * ellipsoids + 4), size)))
 
     def _shapes(self, arrays: tuple[Array, ...] | None = None) -> Shapes:
-        """What kernels know of the body's shapes; one of the two kinds is empty."""
+        """The body's shapes as kernels use them; one of the two kinds is empty."""
         shapes = self.body.shapes
         if arrays is None:
             return self._own_shapes
@@ -111,20 +109,20 @@ class Picture:
         return self._shapes(tuple(array[None] for array in self.body.shapes.arrays))
 
     def points(self, poses: Array, names: Iterable[str] | None = None) -> Array:
-        """Landmarks (N, L, 3), metres, in the camera's frame, of poses (N, D); all, or those named."""
+        """Landmarks (N, L, 3), metres, in the camera's frame, of poses (N, D); all, or those in `names`."""
         return self.body.points(poses, self.T_camera_base, names)
 
     def points_world(self, poses: ArrayLike, names: Iterable[str] | None = None) -> Array:
-        """Landmarks (N, L, 3), metres, in the world, of poses (N, D); all, in the order of the body's `landmark_names`, or those named."""
+        """Landmarks (N, L, 3), metres, in the world, of poses (N, D); all, in the order of `Body.landmark_names`, or those in `names`."""
         return self.body.points(poses, inverse(self.camera.T_camera_world) @ self.T_camera_base, names)
 
     def empty(self) -> Bits:
-        """An empty mask's bits (ceil(W / 64), H)."""
+        """Bits (ceil(W / 64), H) of an empty mask."""
         width, height = self.camera.size
         return np.zeros((-(-width // 64), height), np.uint64)
 
     def draw(self, pose: ArrayLike, which: NDArray[np.int64] | None = None) -> Bits:
-        """The silhouette of one pose (D,) as bits; of all shapes, or of some."""
+        """The silhouette of one pose (D,) as bits; of all shapes, or those in `which`."""
         which = np.arange(len(self.body.parts)) if which is None else which
         bits = self.empty()
         self._compare(np.asarray(pose, float)[None], which, bits, bits, drawn=bits[None])
@@ -135,16 +133,14 @@ class Picture:
         return unpack(self.leg_bits(pose, spread), self.camera.size[0])
 
     def leg_bits(self, pose: ArrayLike, spread: float = np.radians(25)) -> Bits:
-        """Bits of where the legs of a pose (D,) may be: under the waist's lower edge, wider by `spread` (rad) to each side.
-
-        An upper body ends at the waist; what is seen below says nothing about it. A whole one has legs: there are no such bits.
-        """
+        """Bits of the region where the legs of a pose (D,) may be: below the waist's lower edge, widening by `spread` (rad) to each
+        side. An upper body ends at the waist, so pixels below say nothing about it. For a body with legs the region is empty."""
         width, height = self.camera.size
         if self.body.hem is None:
             return self.empty()
         T = self.transforms(np.asarray(pose, float)[None])[0, self.body.skeleton.joint_index("pelvis")]
         low = self.body.hem @ T[:, :3].T + T[:, 3]
-        if low[:, 2].min() < NEAR:
+        if low[:, 2].min() < NEAR_PLANE:
             return self.empty()
         pixels = self.camera.project(transform(inverse(self.camera.T_camera_world), low))
         left, right, top = pixels[:, 0].min(), pixels[:, 0].max(), np.median(pixels[:, 1])
@@ -158,12 +154,9 @@ class Picture:
 
     def added(self, poses: Array, which: NDArray[np.int64], silhouette: Bits, fixed: Bits, joints: NDArray[np.int64] | None = None,
               measures: tuple[Array, ...] | None = None) -> NDArray[np.int64]:
-        """What drawing some shapes of poses (N, D) over the mask `fixed` adds to eq. 2, pixels (N,): those outside the silhouette less
-        those inside.
-
-        `joints`: those that move, if not all do; the others stand as in the first pose. `measures`: of bodies of different sizes, the
-        joints' offsets (N, J, 3) and the arrays of `Body.shapes` with a leading axis N.
-        """
+        """Change of eq. 2, pixels (N,), by drawing some shapes of poses (N, D) over the mask `fixed`: new pixels outside the silhouette
+        less those inside. `joints`: those that move, if not all; the others stay as in the first pose. `measures`: for bodies of
+        different sizes, the joints' offsets (N, J, 3) and the arrays of `Body.shapes` with a leading axis N."""
         shape = self.empty().shape
         if silhouette.shape != shape or fixed.shape != shape:  # the kernel would write past their ends
             raise ShadowPuppetError(f"masks of {silhouette.shape} and {fixed.shape} words x rows, expected the camera's {shape}")
@@ -173,16 +166,16 @@ class Picture:
                  measures: tuple[Array, ...] | None = None, drawn: Bits | None = None) -> NDArray[np.int64]:
         tree, offsets, root = self._frame
         frame, shapes = (tree, offsets if measures is None else measures[0], root), self._shapes(measures and measures[1:])
-        joints = self._every if joints is None else joints
+        joints = tree[7] if joints is None else joints
         block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses), np.int64)
-        with IN_USE:
+        with BUFFER_LOCK:
             _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
                      (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
         return out
 
     def _room(self, shapes: int, size: int) -> tuple:
-        """Room for a comparison, made once: a kernel has it for itself (`IN_USE`), and leaves nothing in it that counts."""
+        """Buffers for a comparison, made once and used under `BUFFER_LOCK`; a kernel leaves nothing in them that counts."""
         if (shapes, size) not in self._rooms:
             block = self._block(shapes, size)
             words, height = self.empty().shape
@@ -191,20 +184,14 @@ class Picture:
         return self._rooms[shapes, size]
 
     @cached_property
-    def _every(self) -> NDArray[np.int64]:
-        return np.arange(len(self.body.skeleton.joints))
-
-    @cached_property
     def _rooms(self) -> dict[tuple[int, int], tuple]:
         return {}
 
 
 def place(camera: Camera, distance: float, elevation: float) -> Array:
-    """T_camera_base (4, 4): the frame of Liu 2011's model, X toward the camera, Y to the image's right, Z up.
-
-    Its origin, the middle of the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation`
-    metres above it. Z is the world's up where the camera knows it, else the camera's own, as in the paper.
-    """
+    """T_camera_base (4, 4): the frame of Liu 2011's model, X toward the camera, Y to the image's right, Z up. Its origin, the middle of
+    the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation` metres above it. Z is the
+    world's up if the camera is oriented, else the camera's own, as in the paper."""
     up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -1.0, 0.0])
     if abs(up[2]) > 0.9:  # it looks straight down or up: its own frame
         up = np.array([0.0, -1.0, 0.0])
@@ -214,13 +201,8 @@ def place(camera: Camera, distance: float, elevation: float) -> Array:
     return rigid(R, R @ np.array([-distance, 0.0, elevation]))
 
 
-def draw_polygon(corners: ArrayLike, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """One convex polygon of corners (K, 2), pixels, drawn into an empty mask (H, W)."""
-    return unpack(polygon_bits(corners, size), size[0])
-
-
 def polygon_bits(corners: ArrayLike, size: tuple[int, int]) -> Bits:
-    """One convex polygon of corners (K, 2), pixels, as bits of a mask."""
+    """A convex polygon of corners (K, 2), pixels, as bits of a mask."""
     corners = np.asarray(corners, float).reshape(-1, 2)
     count, page = len(corners), make_page(-(-size[0] // 64), size[1], len(corners))
     X, Y = (np.ascontiguousarray(corners[None, :, i, None]) for i in range(2))
@@ -232,7 +214,7 @@ def polygon_bits(corners: ArrayLike, size: tuple[int, int]) -> Bits:
 # Kernels
 
 
-@part
+@device
 def _project(begin, shapes, which, lens, block):  # pragma: no cover
     """Corners of a block's shapes from its joints."""
     quads, centres, radii, numbers, joints = shapes
@@ -245,11 +227,9 @@ def _project(begin, shapes, which, lens, block):  # pragma: no cover
 
 @kernel
 def _compare(poses, joints, frame, shapes, which, lens, width, masks, block, page, added, drawn):  # pragma: no cover
-    """For each pose the pixels that its shapes add to the mask `fixed` outside the silhouette, less those inside, (N,).
-
-    Joints that do not move stand as in the first pose. `masks`: silhouette and fixed, (C, H) each, and room for what counts outside and
-    inside, (C, rows). `drawn` (N or 0, C, H) gets what is drawn.
-    """
+    """For each pose the pixels (N,) that its shapes add to the mask `fixed` outside the silhouette, less those inside. Joints that do
+    not move stay as in the first pose. `masks`: silhouette and fixed, (C, H) each, and work arrays for outside and inside, (C, rows).
+    `drawn` (N or 0, C, H) receives the drawn masks."""
     tree, offsets, root = frame
     silhouette, fixed, outside, inside = masks
     words, height = silhouette.shape

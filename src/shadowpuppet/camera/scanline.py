@@ -1,7 +1,7 @@
-"""Convex polygons as bit rows: the lines of their edges, the spans between them, bits set and counted.
+"""Scanline rasterisation of convex polygons into bit masks: edges, row spans, setting and counting of bits. Kernels.
 
-Masks are cut into strips of `ROWS` rows, bits `[word column][strip][row]`, 64 pixels of a row in a 64-bit word: a strip of a word column
-is eight words side by side, which one instruction works off. Polygons come `BLOCK` at a time, the same corner of all side by side.
+Masks are cut into strips of `ROWS` rows, bits `[word column][strip][row]`, 64 pixels of a row in a 64-bit word: one instruction works on
+the eight words of a strip. Polygons come `BLOCK` at a time, the same corner of all side by side.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from numba.core import config, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from shadowpuppet.jit import joined, kernel, part
+from shadowpuppet.jit import device, inline_kernel, kernel
 
 ROWS = 8
 """Rows of a strip."""
 Page = tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int32]]
-"""Bits (C, rows), rows being filled up to strips; dirty rows and words (first, end, first, end), outside which it is empty; and for the
-polygon that is drawn lines on the left and on the right (2, corners + 6, 2), and every row's first pixel and end (2, rows)."""
+"""Bits (C, rows), rows rounded up to strips; range of dirty rows and words (first, end, first, end), outside which it is empty; and work
+arrays for a polygon: its lines on the left and right (2, corners + 6, 2), and each row's first pixel and end (2, rows)."""
 SNAP = 1e-9
-"""An edge this near (pixels) to a pixel's centre goes through it: rounding must not decide which of two neighbours gets the pixel."""
+"""An edge this near (pixels) to a pixel's centre passes through it, so that rounding does not decide which neighbour owns the pixel."""
 
 
 @intrinsic
 def _ctpop(typingctx, word):  # pragma: no cover
-    """Number of bits set in a 64-bit word: LLVM's ctpop, which vectorises."""
+    """Population count of a 64-bit word: LLVM's ctpop, which vectorises."""
 
     def codegen(context, builder, signature, args):
         return builder.ctpop(args[0])
@@ -39,11 +39,9 @@ _popcount: Any = np.bitwise_count if config.DISABLE_JIT else _ctpop  # pyright: 
 
 @kernel
 def find_edges(X, Y, counts, width, height, boxes, lines):  # pragma: no cover
-    """Of polygons with corners X, Y (S, K, B), `counts` (S, B) of them: boxes (S, 6, B) and the lines of edges (S, K, 3, B).
-
-    A box: first row, end of rows, least and greatest x; no rows where nothing is to be drawn. A line: x in the first row of the box's
-    first strip, x gained a row, and on which side it bounds the polygon: below 0 left, above 0 right, 0 not at all.
-    """
+    """Boxes (S, 6, B) and edge lines (S, K, 3, B) of polygons with corners X, Y (S, K, B), `counts` (S, B) of them. A box: first row,
+    end of rows, least and greatest x; no rows if nothing is visible. A line: x in the first row of the box's first strip, x increment
+    per row, and its side: negative bounds the polygon on the left, positive on the right, 0 not at all."""
     size = X.shape[2]
     for s in range(X.shape[0]):
         x, y, box, count = X[s], Y[s], boxes[s], 0
@@ -65,9 +63,9 @@ def find_edges(X, Y, counts, width, height, boxes, lines):  # pragma: no cover
                     line[2, n] = 0.0
 
 
-@part
+@device
 def _follow(x, y, to_x, to_y, base, area, start, slope, side):  # pragma: no cover
-    """The lines (B,) of edges from one corner to the next: x in row `base`, x gained a row, and on which side they bound."""
+    """Lines (B,) of the edges from one corner to the next: x in row `base`, x increment per row, side."""
     for n in range(x.size):
         dy = to_y[n] - y[n]
         slope[n] = (to_x[n] - x[n]) / (dy if dy != 0 else 1.0)
@@ -75,9 +73,9 @@ def _follow(x, y, to_x, to_y, base, area, start, slope, side):  # pragma: no cov
         start[n] = x[n] + (base[n] - y[n]) * slope[n] - SNAP
 
 
-@part
+@device
 def _enclose(x, y, count, box, area):  # pragma: no cover
-    """Least and greatest y and x of the first `count` corners x, y (K, B) into box (4, B), and twice the area (B,), signed."""
+    """Least and greatest y and x of the first `count` corners x, y (K, B) into box (4, B), and twice the signed area (B,)."""
     top, bottom, west, east = box[0], box[1], box[2], box[3]
     for n in range(area.size):
         area[n], top[n], bottom[n], west[n], east[n] = 0.0, y[0, n], y[0, n], x[0, n], x[0, n]
@@ -90,12 +88,10 @@ def _enclose(x, y, count, box, area):  # pragma: no cover
             west[n], east[n] = min(west[n], a[n]), max(east[n], a[n])
 
 
-@part
+@device
 def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma: no cover
-    """First pixel and end of each row's span between three lines on the left and three on the right, (3, 2) each: x, x gained a row.
-
-    Rows before `begin` and from `stop` on have none. `again`: within the spans that are there already.
-    """
+    """First pixel and end of each row's span between three lines on the left and three on the right, (3, 2) each: x, x increment per
+    row. Rows before `begin` and from `stop` on are empty. `again`: intersect with the spans that are there already."""
     x0, x1, x2 = lefts[0, 0], lefts[1, 0], lefts[2, 0]
     s0, s1, s2 = lefts[0, 1], lefts[1, 1], lefts[2, 1]
     y0, y1, y2 = rights[0, 0], rights[1, 0], rights[2, 0]
@@ -110,12 +106,10 @@ def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma:
         end[r] = min(end[r], j) if again else j
 
 
-@part
+@device
 def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
-    """The lines (K, 3, B) of polygon `n` that bound it on the left and on the right, (K + 3, 2) each; how many on the richer side.
-
-    Both sides are filled up with lines that bound nothing, to three more than these.
-    """
+    """Lines (K, 3, B) of polygon `n` sorted into left and right, (K + 3, 2) each; returns the larger number. Both sides are padded with
+    lines that bound nothing, to three more than that."""
     nl, nr = 0, 0
     for v in range(lines.shape[0]):
         x, slope, side = lines[v, 0, n], lines[v, 1, n], lines[v, 2, n]
@@ -130,12 +124,10 @@ def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
     return most
 
 
-@joined
+@inline_kernel
 def draw_outline(s, n, boxes, lines, width, page):  # pragma: no cover
-    """Set the bits of polygon `n` of shape `s` on a page; the page's dirty strips and words grow to hold it.
-
-    The span of a row is where it lies inside the half planes of all edges, so the edges' lines may be followed past their ends.
-    """
+    """Set the bits of polygon `n` of shape `s` on a page, and extend the page's dirty range. A row's span is the intersection of all
+    edges' half planes, so the edges' lines may be extended past their ends."""
     bits, dirty, lefts, rights, first, end = page[0], page[1], page[2][0], page[2][1], page[3][0], page[3][1]
     r0, r1 = np.int64(boxes[s, 0, n]), np.int64(boxes[s, 1, n])
     if r1 <= r0:
@@ -159,9 +151,9 @@ def draw_outline(s, n, boxes, lines, width, page):  # pragma: no cover
     dirty[2], dirty[3] = min(dirty[2], c0), max(dirty[3], c1)
 
 
-@joined
+@inline_kernel
 def count_and_clear(outside, inside, page):  # pragma: no cover
-    """Bits of a page that are set in `outside`, less those set in `inside`, (C, rows) each; the page is empty then."""
+    """Number of a page's bits set in `outside` less those set in `inside`, (C, rows) each; clears the page."""
     bits, dirty = page[0], page[1]
     total = np.int64(0)
     for c in range(dirty[2], dirty[3]):
@@ -174,14 +166,14 @@ def count_and_clear(outside, inside, page):  # pragma: no cover
     return total
 
 
-@part
+@device
 def clean(page):  # pragma: no cover
-    """Say that a page is empty."""
+    """Mark a page as empty."""
     bits, dirty = page[0], page[1]
     dirty[0], dirty[1], dirty[2], dirty[3] = bits.shape[1], 0, bits.shape[0], 0
 
 
 def make_page(words: int, height: int, corners: int) -> Page:
-    """An empty page of `words` x 64 columns and `height` rows, with room to draw polygons of some corners on it."""
+    """An empty page of `words` x 64 columns and `height` rows for polygons of up to `corners` corners."""
     rows = (height + ROWS - 1) // ROWS * ROWS
     return (np.zeros((words, rows), np.uint64), np.array([rows, 0, words, 0]), np.empty((2, corners + 6, 2)), np.empty((2, rows), np.int32))

@@ -154,11 +154,11 @@ def _has_codec(av: object, name: str) -> bool:
 
 def _processor() -> Iterator[Finding]:
     from shadowpuppet.evaluation.bench.machine import environment
-    from shadowpuppet.threads import LIMIT, thread_limit, usable_cores
+    from shadowpuppet.threads import THREADS_VARIABLE, thread_limit, usable_cores
 
     known = environment()
     told = f"{known['cpu']}; {usable_cores()} of {known['cores']} cores may be used; Numba sees {known['vectors']}"
-    told += f"; {LIMIT} is {thread_limit()}" if thread_limit() is not None else ""
+    told += f"; {THREADS_VARIABLE} is {thread_limit()}" if thread_limit() is not None else ""
     slow = known["vectors"] in ("AVX", "none known") and platform.machine().lower() in ("x86_64", "amd64")
     yield Finding("processor", "missing" if slow else "works", told, "all works, at half the speed or less" if slow else "")
 

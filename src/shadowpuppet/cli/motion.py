@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from shadowpuppet.body.models import WholeBodyName
 from shadowpuppet.cli.flags import OutletFlags, PriorFlags, Quiet, given, output
 
 ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
@@ -16,7 +17,7 @@ ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, .npz, .parquet, or .amc "
                                                                              "beside its .asf.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
-              rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
+              rate: float = 60.0, body: WholeBodyName = "anatomical", seed: int = 0,
               quiet: Quiet = False, flags: ForPrior = None) -> None:  # fmt: skip
     """Learn what a motion is like from motion capture; `track --prior` uses it. Clips may differ in frame rate, person and format.
 

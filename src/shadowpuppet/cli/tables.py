@@ -14,7 +14,7 @@ from rich.text import Text
 from shadowpuppet.body.sizes import CardboxSizes, Sizes
 from shadowpuppet.io.humaneva import HumanEva
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.motion.metrics import FAR, LOST
+from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.training import Trained
 from shadowpuppet.pipeline.look import Look
@@ -50,7 +50,7 @@ def pairs(rows: Iterable[tuple[str, str]]) -> RenderableType:
 def error_table(errors: Mapping[str, Any]) -> RenderableType:
     """Joint errors, a row a joint."""
     keys = [key for key in ("mean_mm", "rmse_mm", "plane_mm", "depth_mm", "p95_mm", "max_mm") if key in errors]
-    table = plain_table("joint errors, mm", ("joint", *(key.removesuffix("_mm") for key in keys), f"over {1000 * FAR:.0f}"))
+    table = plain_table("joint errors, mm", ("joint", *(key.removesuffix("_mm") for key in keys), f"over {1000 * FAR_ERROR:.0f}"))
     rows = [*errors["joints"].items(), ("all", errors)]
     for name, row in rows:
         if name == "all":
@@ -86,9 +86,9 @@ def measures_table(metrics: Mapping[str, Any]) -> RenderableType:
     if errors:
         parts = f"rmse {errors['rmse_mm']:.1f}" if several else f"plane {errors['plane_mm']:.1f}, depth {errors['depth_mm']:.1f}"
         rows.append(("error", f"{errors['mean_mm']:.1f} mm ({parts}); aligned "
-                              f"{errors['aligned_mean_mm']:.1f} mm; {100 * errors['far']:.1f} % off by over {1000 * FAR:.0f} mm"))
+                              f"{errors['aligned_mean_mm']:.1f} mm; {100 * errors['far']:.1f} % off by over {1000 * FAR_ERROR:.0f} mm"))
         lost, known, frames = errors["lost"], errors["frames"], metrics["frames"]
-        rows += [("lost", f"{lost} of the truth's {known} frames have no pose: {1000 * LOST:.0f} mm off each")] if lost else []
+        rows += [("lost", f"{lost} of the truth's {known} frames have no pose: {1000 * LOST_ERROR:.0f} mm off each")] if lost else []
         if known != frames and "clock" not in metrics:
             rows.append(("compared", f"the truth has {known} frames, the run {frames}: is it this recording's?"))
     return pairs(rows)

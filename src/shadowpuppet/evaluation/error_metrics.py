@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Alignment, Array, align, vector_from_rotation
-from shadowpuppet.motion.metrics import GROUPS, LOST, JointErrors, accelerations, bone_lengths, joint_errors
+from shadowpuppet.motion.metrics import GROUPS, LOST_ERROR, JointErrors, accelerations, bone_lengths, joint_errors
 from shadowpuppet.motion.motion import BLANK, JointTable, Motion
 
 ROOTS = (("pelvis",), ("left_hip", "right_hip"), ("neck",), ("left_shoulder", "right_shoulder"))
@@ -35,7 +35,7 @@ def axis_errors(errors: JointErrors) -> dict[str, Any]:
 
 
 def aligned_distances(errors: JointErrors, run: JointTable, truth: JointTable) -> dict[str, Array]:
-    """Distances (T, J), metres, of the same joints after less and less is asked of a run; `metrics.LOST` in each where one is lost.
+    """Distances (T, J), metres, of the same joints after less and less is asked of a run; `metrics.LOST_ERROR` in each where one is lost.
 
     `none`: as they stand. `whole`: after one rigid motion of the whole run. `frame_offset`: less each frame's mean offset. `root`: from
     the root on (`root_of`), where there is one. `rigid`, `similar`: after the best rigid motion of each frame, and with a scale (the
@@ -51,7 +51,7 @@ def aligned_distances(errors: JointErrors, run: JointTable, truth: JointTable) -
     for name, scaled in (("rigid", False), ("similar", True)):
         moved = _distance(align(ours, theirs, scaled).apply(ours) - theirs)
         found[name] = np.where(np.isfinite(moved), moved, errors.distance)
-    return {name: np.where(errors.lost | ~np.isfinite(d) & errors.known, LOST, d) for name, d in found.items()}
+    return {name: np.where(errors.lost | ~np.isfinite(d) & errors.known, LOST_ERROR, d) for name, d in found.items()}
 
 
 def aligned_errors(errors: JointErrors, run: JointTable, truth: JointTable) -> dict[str, Any]:

@@ -33,7 +33,7 @@ from shadowpuppet.io.motion.truth import names_in, read_truth
 from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.synchronization import at_times, find_offset, in_step, step_of
+from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
 
 __all__ = ["Comparison", "Evaluation", "angle_errors", "evaluate_run", "measure_run", "update_metrics", "write_evaluation"]
 
@@ -106,7 +106,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
         names = names_in(table)
         raise ShadowPuppetError(f"{error}" + (f" ({table} calls them {names})" if "which the truth lacks" in str(error) and names else "")
                                 ) from None
-    ours, theirs = in_step(run.motion.table, reference)
+    ours, theirs = at_common_times(run.motion.table, reference)
     errors = joint_errors(ours, theirs, list(measured["errors"]["joints"]))
     measured |= lost | {"clock": clock | {"frames_compared": len(theirs.times)}, "world": world} | _wider(run, ours, theirs, errors)
     if how.angles:
@@ -186,7 +186,7 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTa
     another and was not moved."""
     if not len(run.motion):
         return truth, {}
-    ours, theirs = in_step(run.motion.table, truth)
+    ours, theirs = at_common_times(run.motion.table, truth)
     errors = joint_errors(ours, theirs, _named(how.joints))
     told = worlds(errors, ours, theirs)
     if how.align and not told:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.body.sizes import HEIGHTS, KINDS, CardboxSizes, Sizes, expected_metres, is_within, kind_of, sizes_kind
+from shadowpuppet.body.models import MODELS, kind_of, sizes_kind
+from shadowpuppet.body.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.io.files.text import write_whole
@@ -49,8 +50,8 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
     if unknown:
         raise FormatError(f"{path}: found the key {min(unknown)!r}; keys known: {choices(KEYS)}")
     sizes, body = data.pop("sizes", None), data.pop("body", UPPER)
-    if not isinstance(body, str) or body not in KINDS:
-        raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(KINDS)}")
+    if not isinstance(body, str) or body not in MODELS:
+        raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(MODELS)}")
     kind = sizes_kind(body)
     if not isinstance(sizes, dict):
         raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")

@@ -23,7 +23,7 @@ from shadowpuppet.pipeline.footage import Mask, Shot, Silhouettes, clear_setting
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.track import motion_frame, named_body, next_state
 from shadowpuppet.silhouette import learn_background
-from shadowpuppet.tracking.monocular.initialization import Fit, find_person
+from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.status import LOST
 from shadowpuppet.video import Image
@@ -54,14 +54,14 @@ class Session:
     """Seconds that never go back: those that pictures are stamped with."""
     vigil: Vigil
     timing: Timing
-    work: Callable[[Callable[[], Fit]], Callable[[], Fit | None]] = lambda task: partial(lambda fit: fit, task())
+    work: Callable[[Callable[[], SizeFit]], Callable[[], SizeFit | None]] = lambda task: partial(lambda fit: fit, task())
     """Does what takes seconds; the answer is asked for its result until that is not None. As it is here, done at once."""
     person: Person | None = None
     """Whose sizes are known."""
     scene: list[Image] = field(default_factory=list)
     """Pictures of the empty scene, of the worked size; where there are none they are learnt."""
     phase: str = "learning"
-    fit: Fit | None = None
+    fit: SizeFit | None = None
     """Sizes and place, once they are found."""
     trouble: str = ""
     """Why no pictures come; empty where they do."""
@@ -108,7 +108,7 @@ class Session:
             self._waiter, self.phase, self._recent = Waiter(self.settings.still), "waiting", []
 
     @property
-    def measured(self) -> Fit:
+    def measured(self) -> SizeFit:
         """Sizes and place of the person, who was found."""
         assert self.fit is not None
         return self.fit
@@ -134,7 +134,7 @@ class Session:
             self.phase, self._measured = "measuring", self.work(self._fitting(masks))
         return Outcome(self._view(image, mask))
 
-    def _fitting(self, masks: list[Mask]) -> Callable[[], Fit]:
+    def _fitting(self, masks: list[Mask]) -> Callable[[], SizeFit]:
         """Finds sizes and place of who stood still; of whom they are known, the place alone."""
         known = self.fit.guess if self.fit else self.person
         sizes, height = (known.sizes, known.height) if known else (None, None)

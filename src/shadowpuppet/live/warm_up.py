@@ -11,14 +11,15 @@ from shadowpuppet.body.models import average_sizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import learn_background
-from shadowpuppet.tracking.monocular.initialization import Guess, find_person
+from shadowpuppet.tracking.monocular.initialization import PersonEstimate, find_person
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 
 def warm_up(camera: Camera, options: Options) -> None:
     """Segment, measure and track somebody drawn, in pictures of the camera's size, and forget all of it."""
     rng = np.random.default_rng(0)
-    picture = Guess(average_sizes(options.tracker.body, AVERAGE_HEIGHT), AVERAGE_HEIGHT, 2.5, -0.3).picture(camera, options.tracker.body)
+    body = options.tracker.body
+    picture = PersonEstimate(average_sizes(body, AVERAGE_HEIGHT), AVERAGE_HEIGHT, 2.5, -0.3).picture(camera, body)
     mask = picture.mask(np.zeros(len(picture.body.skeleton.dofs)))
     empty = [rng.integers(100, 110, (*mask.shape, 3), dtype=np.uint8) for _ in range(2)]
     image = empty[0].copy()

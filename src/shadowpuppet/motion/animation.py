@@ -1,8 +1,8 @@
-"""A skeleton that moves, as files of skeletons have it: constant offsets, and how each joint is turned against the one above it."""
+"""A moving skeleton as animation files have it: constant offsets, and each joint's rotation against its parent."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,33 +14,30 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
-"""From our world (Z up) to that of files with Y up: (x, z, -y), which Blender and OpenSim undo. Who looks along X does so there, too."""
-STILL = 1e-9
-"""Metres within which a place does not move."""
+"""From our world (Z up) to that of files with Y up: (x, z, -y), which Blender and OpenSim undo. X stays."""
+SAME_PLACE = 1e-9
+"""Metres within which a joint does not move."""
 
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """Joints, parents before children, over time.
-
-    The world is ours, in metres, Z up. A joint's own axes at rest are those of such files: a person stands along Y and looks along Z.
-    Raises `ShadowPuppetError` where shapes do not fit.
-    """
+    """Joints, parents before children, over time. The world is in metres, Z up. The joints' own axes at rest are those of animation
+    files: a person stands along Y and looks along Z. Raises `ShadowPuppetError` for wrong shapes."""
 
     names: tuple[str, ...]
-    """J of them."""
+    """Names of the J joints."""
     parents: tuple[int, ...]
-    """Index of the joint above each; -1: none, the root, which is the first and only one."""
+    """Index of each joint's parent; -1 for the root, which is the first joint and the only one."""
     offsets: Array
-    """Place at rest in the parent's axes, of shape (J, 3), metres; of the root none."""
+    """Position at rest in the parent's axes, of shape (J, 3), metres; zero for the root."""
     ends: Mapping[int, tuple[float, float, float]]
-    """Where bones end without a joint: a joint's index, and the place in its axes, metres."""
+    """Ends of bones that have no joint: a joint's index, and the position in its axes, metres."""
     times: Array
     """Seconds, of shape (T,)."""
     rotations: Array
-    """Against the parent, the root's against the world, of shape (T, J, 3, 3); not a number in frames that are not known."""
+    """Against the parent, the root's against the world, of shape (T, J, 3, 3); not a number in unknown frames."""
     shifts: Array
-    """Place in the parent's axes, the root's in the world, of shape (T, J, 3), metres; but for the root mostly the offset."""
+    """Position in the parent's axes, the root's in the world, of shape (T, J, 3), metres; mostly equal to the offset."""
 
     def __post_init__(self) -> None:
         """Check."""
@@ -61,12 +58,12 @@ class Animation:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Joints but the root whose place against the parent changes."""
+        """Joints but the root whose position against the parent changes."""
         strays = np.abs(self.shifts[self.known] - self.offsets).max((0, 2), initial=0.0)
-        return tuple(j for j in range(1, len(self.names)) if strays[j] > STILL)
+        return tuple(j for j in range(1, len(self.names)) if strays[j] > SAME_PLACE)
 
     def world(self) -> tuple[Array, Array]:
-        """Places (T, J, 3), metres, and rotations (T, J, 3, 3) of the joints in the world."""
+        """Positions (T, J, 3), metres, and rotations (T, J, 3, 3) of the joints in the world."""
         places, turns = self.shifts.copy(), self.rotations.copy()
         for j, parent in enumerate(self.parents):
             if parent >= 0:
@@ -76,23 +73,17 @@ class Animation:
 
     @property
     def table(self) -> JointTable:
-        """Where the joints are."""
+        """Positions of the joints."""
         return JointTable(self.times, self.names, self.world()[0])
 
     @cached_property
     def rest(self) -> Array:
-        """Places of the joints at rest, the root at the origin, of shape (J, 3), metres, their own axes."""
-        places = self.offsets.copy()
-        for j, parent in enumerate(self.parents):
-            if parent >= 0:
-                places[j] += places[parent]
-        return places
+        """Positions of the joints at rest, the root at the origin, of shape (J, 3), metres."""
+        return rest_positions(self.offsets, self.parents)
 
     def at(self, times: ArrayLike) -> Animation:
-        """The same at other times (K,): on the shortest turn between the nearest known frames, and held before and after them.
-
-        Raises `ShadowPuppetError` where no frame is known.
-        """
+        """The animation at other times (K,): interpolated along the shortest rotation between known frames, held before and after them.
+        Raises `ShadowPuppetError` if no frame is known."""
         times, frames = np.asarray(times, float), np.flatnonzero(self.known)
         if not len(frames):
             raise ShadowPuppetError("found no frame in which the whole skeleton is known, expected one at least")
@@ -104,6 +95,15 @@ class Animation:
         a, b = frames[before], frames[after]
         shifts = self.shifts[a] + share.clip(0, 1)[:, None, None] * (self.shifts[b] - self.shifts[a])
         return replace(self, times=times, rotations=_between(self.rotations[a], self.rotations[b], share.clip(0, 1)), shifts=shifts)
+
+
+def rest_positions(offsets: Array, parents: Sequence[int]) -> Array:
+    """Positions (J, 3) of joints whose offsets (J, 3) from their parents are summed up."""
+    places = offsets.copy()
+    for j, parent in enumerate(parents):
+        if parent >= 0:
+            places[j] += places[parent]
+    return places
 
 
 def _between(a: Array, b: Array, share: Array) -> Array:

@@ -1,4 +1,4 @@
-"""A body's poses as an animated skeleton, which other programs read: its joints and landmarks as one tree, under the landmarks' names."""
+"""A body's poses as an animated skeleton for other programs: its joints and landmarks as one tree, under the landmarks' names."""
 
 from __future__ import annotations
 
@@ -6,37 +6,35 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.geometry import Array, align
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.motion import Motion
 
 TO_REST = np.array([[0.0, 1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From a body's axes (forward, left, up) to those of skeletons at rest (left, up, forward)."""
-NEAR = 1e-9
-"""Metres within which two places are one."""
-SAME = 1e-4
-"""Metres by which a run's joints may stray from its body's for these to be the same."""
-SHORTEST = 0.01
-"""Metres; of a bone's end."""
+SAME_POINT = 1e-9
+"""Metres within which two positions are equal."""
+JOINT_TOLERANCE = 1e-4
+"""Metres by which a run's joints may differ from its body's."""
+MIN_END = 0.01
+"""Shortest end of a bone, metres."""
 Three = tuple[float, float, float]
-Known = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Node:
+class TreeNode:
     """A joint of the body, or a landmark fixed to one."""
 
     name: str
     parent: int
-    """Index of the node above it; -1: none."""
+    """Index of the parent node; -1 for none."""
     joint: int
-    """The body's joint that it turns with."""
+    """The body's joint that it moves with."""
     place: Three | None
-    """Where in that joint's frame a landmark lies, metres; None: it is the joint."""
+    """Position of a landmark in that joint's frame, metres; None for the joint itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,30 +44,30 @@ class BodyTree:
     body: Body
 
     @cached_property
-    def nodes(self) -> tuple[Node, ...]:
-        """Parents before children; a joint where a landmark lies has the landmark's name."""
+    def nodes(self) -> tuple[TreeNode, ...]:
+        """Parents before children; a joint with a landmark at its place has the landmark's name."""
         skeleton, names = self.body.skeleton, self._names
-        nodes = list[Node]()
+        nodes = list[TreeNode]()
         for j, joint in enumerate(skeleton.joints):
             above = -1 if joint.parent is None else self._joint_node(nodes, skeleton.joint_index(joint.parent))
-            nodes.append(Node(names[j], above, j, None))
+            nodes.append(TreeNode(names[j], above, j, None))
         for name, (joint, place) in self._fixed:
-            nodes.append(Node(name, self._above(nodes, joint, place), joint, place))
+            nodes.append(TreeNode(name, self._above(nodes, joint, place), joint, place))
         return tuple(nodes)
 
     def node_of(self, joint: int) -> int:
-        """The node that is a joint of the body."""
+        """The node of a joint of the body."""
         return self._joint_node(self.nodes, joint)
 
     @cached_property
     def ends(self) -> dict[int, Three]:
-        """Crown, tips of the hands, toes or soles: where the last node of a chain ends, in the body's axes."""
+        """Ends of the last node of each chain (crown, fingertips, toes or soles), in the body's axes."""
         leaves = [n for n in range(len(self.nodes)) if n not in {node.parent for node in self.nodes}]
         return {n: self._end(self.nodes[n]) for n in leaves}
 
     def animation(self, times: Array, poses: Array, roots: Array) -> Animation:
-        """The tree in poses (T, D) at times (T,), seconds; `roots` (4, 4) or (T, 4, 4): the body's frame to the world."""
-        known: Known = np.asarray(np.isfinite(poses).all(1))
+        """The tree in poses (T, D) at times (T,), seconds; `roots` (4, 4) or (T, 4, 4): the body's frame in the world."""
+        known = np.asarray(np.isfinite(poses).all(1))
         frames = self.body.skeleton.forward(np.where(known[:, None], poses, 0.0))
         rotations, shifts = (np.empty((len(poses), len(self.nodes), *shape)) for shape in ((3, 3), (3,)))
         for n, node in enumerate(self.nodes):
@@ -83,13 +81,12 @@ class BodyTree:
 
     @cached_property
     def offsets(self) -> Array:
-        """Places (N, 3) of the nodes against those above them, metres, at rest."""
-        none = np.zeros((1, len(self.body.skeleton.dofs)))
-        frames = self.body.skeleton.forward(none)
+        """Positions (N, 3) of the nodes relative to their parents, metres, at rest."""
+        frames = self.body.skeleton.forward(np.zeros((1, len(self.body.skeleton.dofs))))
         return np.array([np.zeros(3) if node.parent < 0 else self._against(frames, node)[1][0] for node in self.nodes])
 
-    def _against(self, frames: Array, node: Node) -> tuple[Array, Array]:
-        """Rotations (T, 3, 3) and places (T, 3) of a node against the one above it, rest axes, from the joints' frames (T, J, 3, 4)."""
+    def _against(self, frames: Array, node: TreeNode) -> tuple[Array, Array]:
+        """Rotations (T, 3, 3) and positions (T, 3) of a node relative to its parent, rest axes, from the joints' frames (T, J, 3, 4)."""
         if node.parent < 0:
             return frames[:, node.joint, :, :3], frames[:, node.joint, :, 3]
         above = self.nodes[node.parent]
@@ -104,7 +101,7 @@ class BodyTree:
 
     @cached_property
     def _names(self) -> list[str]:
-        """The joints' names: of the landmark that lies there, or their own."""
+        """The joints' names: of the landmark at their place, or their own."""
         skeleton = self.body.skeleton
         names = [joint.name for joint in skeleton.joints]
         for name, (joint, place) in self.body.landmarks.items():
@@ -115,26 +112,26 @@ class BodyTree:
 
     @cached_property
     def _fixed(self) -> list[tuple[str, tuple[int, Three]]]:
-        """Landmarks that are no joints, those nearer to the joint first."""
+        """Landmarks that are not joints, nearest to their joint first."""
         found = [(name, (self.body.skeleton.joint_index(joint), place)) for name, (joint, place) in self.body.landmarks.items()
                  if not name.endswith("_fist")]  # fmt: skip
         loose = [(name, (joint, place)) for name, (joint, place) in found if self._joint_at(joint, place) is None]
         return sorted(loose, key=lambda each: float(np.linalg.norm(each[1][1])))
 
     def _joint_at(self, joint: int, place: Three) -> int | None:
-        """The joint that lies at a place in a joint's frame, if any does in every pose."""
-        if np.linalg.norm(place) < NEAR:
+        """The joint that coincides with a position in a joint's frame in every pose, if there is one."""
+        if np.linalg.norm(place) < SAME_POINT:
             return joint
         skeleton = self.body.skeleton
         moved = {coupling.joint for coupling in skeleton.couplings} | {dof.joint for dof in skeleton.dofs if dof.kind == "translation"}
         for j, other in enumerate(skeleton.joints):
-            near = np.abs(np.subtract(other.offset, place)).max() < NEAR
+            near = np.abs(np.subtract(other.offset, place)).max() < SAME_POINT
             if near and other.parent == skeleton.joints[joint].name and other.name not in moved:
                 return j
         return None
 
-    def _above(self, nodes: list[Node], joint: int, place: Three) -> int:
-        """The node on which a landmark hangs: the last landmark on the way to it from its joint, or that joint."""
+    def _above(self, nodes: list[TreeNode], joint: int, place: Three) -> int:
+        """The parent node of a landmark: the last landmark between it and its joint, or that joint."""
         length = float(np.linalg.norm(place))
         for n in range(len(nodes) - 1, -1, -1):
             node = nodes[n]
@@ -143,11 +140,11 @@ class BodyTree:
         return self._joint_node(nodes, joint)
 
     @staticmethod
-    def _joint_node(nodes: list[Node] | tuple[Node, ...], joint: int) -> int:
+    def _joint_node(nodes: list[TreeNode] | tuple[TreeNode, ...], joint: int) -> int:
         return next(n for n, node in enumerate(nodes) if node.joint == joint and node.place is None)
 
-    def _end(self, leaf: Node) -> Three:
-        """How far the body's shapes reach beyond a leaf, along its bone; from a joint, toward the farthest of them."""
+    def _end(self, leaf: TreeNode) -> Three:
+        """How far the body's shapes extend beyond a leaf, along its bone; from a joint, toward the farthest of them."""
         start = np.zeros(3) if leaf.place is None else np.array(leaf.place)
         shapes = self.body.shapes
         joints = np.broadcast_to(shapes.joints, (*shapes.joints.shape[:1], 4)) if isinstance(shapes, Quads) else shapes.joints
@@ -155,57 +152,42 @@ class BodyTree:
         radii = np.zeros_like(centres) if isinstance(shapes, Quads) else shapes.radii
         own = joints == leaf.joint
         if not own.any():
-            return (0.0, 0.0, -SHORTEST)
+            return (0.0, 0.0, -MIN_END)
         centres, radii = centres[own], radii[own]
         toward = start if leaf.place is not None else centres[np.linalg.norm(centres, axis=1).argmax()]
-        along = toward / max(float(np.linalg.norm(toward)), NEAR)
+        along = toward / max(float(np.linalg.norm(toward)), SAME_POINT)
         reach = (centres @ along + np.sqrt(((radii * along) ** 2).sum(1))).max() - start @ along
-        x, y, z = (max(float(reach), SHORTEST) * along).tolist()
+        x, y, z = (max(float(reach), MIN_END) * along).tolist()
         return (x, y, z)
 
 
 def motion_animation(body: Body, motion: Motion) -> tuple[Animation, float]:
-    """A run's motion as an animated skeleton, and by how many metres its joints lie off the run's at most.
-
-    Raises `ShadowPuppetError` where no frame is known.
-    """
+    """A run's motion as an animated skeleton, and the largest distance (m) of its joints from the run's. Raises `ShadowPuppetError`
+    without any pose."""
     root, off = base_in_world(body, motion)
-    known: Known = np.asarray(np.isfinite(motion.poses).all(1) & np.isfinite(motion.joints).all((1, 2)))
-    poses = np.where(known[:, None], motion.poses, np.nan)
+    poses = np.where(motion.known[:, None], motion.poses, np.nan)
     return BodyTree(body).animation(motion.times, poses, root), off
 
 
 def base_in_world(body: Body, motion: Motion) -> tuple[Array, float]:
-    """Where a body's frame stands in a run's world, found from the joints, and by how many metres these lie off at most.
-
-    The same (4, 4) in all frames, as with cameras that stay; where that does not fit, as after somebody was measured anew in a live run,
-    in each frame (T, 4, 4). Raises `ShadowPuppetError` where no frame is known.
-    """
-    known: Known = np.asarray(np.isfinite(motion.poses).all(1) & np.isfinite(motion.joints).all((1, 2)))
+    """The body's frame in a run's world, aligned to the joints, and the largest distance (m) left. One transform (4, 4) for all frames,
+    as for fixed cameras; one for each frame (T, 4, 4) where that does not fit, as after a live run measured the person anew. Raises
+    `ShadowPuppetError` without any pose."""
+    known = motion.known
     if not known.any():
         raise ShadowPuppetError("found no frame with a pose, expected one at least")
     names = [name for name in motion.joint_names if name in body.landmark_names]
     wanted = motion.joints[known][:, [motion.joint_names.index(name) for name in names]]
     ours = body.points(motion.poses[known], names=names)
-    root = fitted(ours.reshape(-1, 3), wanted.reshape(-1, 3))
+    root = align(ours.reshape(-1, 3), wanted.reshape(-1, 3)).matrix
     off = _off(root, ours, wanted)
-    if off > SAME:
-        some = np.stack([fitted(a, b) for a, b in zip(ours, wanted)])
+    if off > JOINT_TOLERANCE:
+        some = align(ours, wanted).matrix
         off, root = _off(some, ours, wanted), np.tile(np.eye(4), (len(motion), 1, 1))
         root[known] = some
     return root, off
 
 
-def fitted(points: Array, targets: Array) -> Array:
-    """The rigid transform (4, 4) that brings points (N, 3) as near to targets (N, 3) as can be (Kabsch 1976)."""
-    a, b = points.mean(0), targets.mean(0)
-    U, _, V = np.linalg.svd((points - a).T @ (targets - b))
-    R = V.T @ np.diag([1, 1, np.sign(np.linalg.det(V.T @ U.T))]) @ U.T
-    return rigid(R, b - R @ a)
-
-
 def _off(root: Array, points: Array, targets: Array) -> float:
     moved = points @ np.swapaxes(root[..., :3, :3], -1, -2) + root[..., None, :3, 3]
     return float(np.linalg.norm(moved - targets, axis=2).max())
-
-

@@ -1,4 +1,4 @@
-"""Times at a constant rate, which some files have instead of times."""
+"""Motion at a constant rate: uniform sampling times of a film, and resampling by splines."""
 
 from __future__ import annotations
 
@@ -11,87 +11,83 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 
-NEAR = 0.2
-"""Share of a step by which a frame may lie off its place: films' times are rounded to milliseconds, cameras' tremble."""
-MOST = 10_000_000
-"""Frames; so many make no motion."""
-ALONE = 30.0
-"""Frames/s of one frame."""
+FRAME_TOLERANCE = 0.2
+"""Share of a step by which a frame may lie off a uniform time: films' times are rounded to milliseconds, cameras' jitter."""
+MAX_FRAMES = 10_000_000
+"""Upper bound of the number of frames."""
+SINGLE_FRAME_RATE = 30.0
+"""Rate (frames/s) of a single frame."""
 
 
-class Steady(NamedTuple):
-    """Times that are a step apart, and the frames that belong to them."""
+class UniformSampling(NamedTuple):
+    """Uniform times, and the frames at them."""
 
     rate: float
     """Frames/s."""
     times: Array
     """Seconds, of shape (K,)."""
     frames: NDArray[np.int64] | None
-    """The frame of each time (K,), -1 where there is none; None: frames lie between, and values must be found anew."""
+    """The frame at each time (K,), -1 where it is missing; None if frames lie between the times and values must be interpolated."""
 
 
-def steady(times: ArrayLike) -> Steady:
-    """Times a step apart that go through frames at times (T,), seconds: those of a film with frames missing, or of their median step.
-
-    Raises `ShadowPuppetError` where there is no frame, or far too many would be missing.
-    """
+def uniform_sampling(times: ArrayLike) -> UniformSampling:
+    """Uniform times through frames at times (T,), seconds: those of a film with frames missing, else in steps of their median. Raises
+    `ShadowPuppetError` without any frame, or if far too many would be missing."""
     times = np.asarray(times, float)
     if len(times) < 2:
         if not len(times):
             raise ShadowPuppetError("found no frame, expected one at least")
-        return Steady(ALONE, times, np.zeros(1, np.int64))
+        return UniformSampling(SINGLE_FRAME_RATE, times, np.zeros(1, np.int64))
     steps = np.diff(times)
     step = float(np.median(steps))
-    if (times[-1] - times[0]) / step > MOST:
-        raise ShadowPuppetError(f"times: found {times[-1] - times[0]:g} s in steps of {step:g} s, expected at most {MOST} of them")
+    if (times[-1] - times[0]) / step > MAX_FRAMES:
+        raise ShadowPuppetError(f"times: found {times[-1] - times[0]:g} s in steps of {step:g} s, expected at most {MAX_FRAMES} of them")
     numbers = np.concatenate([[0], np.cumsum(np.round(steps / step))])
     slope, start = np.polyfit(numbers, times, 1) if numbers[-1] > 0 else (step, times[0])
-    if (np.diff(numbers) > 0).all() and (np.abs(start + slope * numbers - times) <= NEAR * slope).all():
+    if (np.diff(numbers) > 0).all() and (np.abs(start + slope * numbers - times) <= FRAME_TOLERANCE * slope).all():
         frames = np.full(int(numbers[-1]) + 1, -1)
         frames[numbers.astype(int)] = np.arange(len(times))
-        return Steady(_rounded(1 / slope), times[0] + slope * np.arange(len(frames)), frames)
-    count = int((times[-1] - times[0]) / step + 1 + NEAR)
-    return Steady(_rounded(1 / step), np.minimum(times[0] + step * np.arange(count), times[-1]), None)
+        return UniformSampling(_rounded(1 / slope), times[0] + slope * np.arange(len(frames)), frames)
+    count = int((times[-1] - times[0]) / step + 1 + FRAME_TOLERANCE)
+    return UniformSampling(_rounded(1 / step), np.minimum(times[0] + step * np.arange(count), times[-1]), None)
 
 
 def _rounded(rate: float) -> float:
-    """A rate as it was meant, where it is nearly that of films: 29.97 for 29.97003."""
+    """A rate to six digits: 29.97 for 29.97003."""
     return float(f"{rate:.6g}")
 
 
-FIT = 1e-6
-"""Share of a step by which the last new time may lie past the end, for rounding's sake."""
+END_TOLERANCE = 1e-6
+"""Share of a step by which the last new time may exceed the end, for rounding."""
 
 
-def resampled(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
-    """Times (K,), a step of 1 / rate apart from the first on, and the values (K, ...) there of values (T, ...) at times (T,), seconds.
-
-    By cubic splines through what is known; not a number where either neighbour in time is none. Angles must have been unwrapped.
-    Nothing is smoothed: what is faster than half the new rate is not taken out. Raises `ShadowPuppetError`.
-    """
+def resample(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
+    """Times (K,) at `rate` from the first on, and values (K, ...) there, of values (T, ...) at times (T,), seconds. Cubic splines
+    through runs of known values; not a number between unknown ones. Angles must be unwrapped. Frequencies above half the new rate are
+    not filtered out. Raises `ShadowPuppetError`."""
     times, values = np.asarray(times, float), np.asarray(values, float)
     if times.ndim != 1 or not len(times) or len(times) != len(values) or not (np.diff(times) > 0).all() or not np.isfinite(times).all():
         raise ShadowPuppetError(f"times: found {times.shape} for values {values.shape}, expected a finite, increasing one for each value")
     if not 0 < rate < np.inf:
         raise ShadowPuppetError(f"rate: found {rate}, expected frames a second, more than zero")
-    steps = np.arange(int((times[-1] - times[0]) * rate + 1 + FIT))
+    steps = np.arange(int((times[-1] - times[0]) * rate + 1 + END_TOLERANCE))
     wanted = np.minimum(times[0] + steps / rate, times[-1])
     columns = [_interpolated(times, column, wanted) for column in values.reshape(len(times), -1).T]
     return wanted, np.reshape(np.transpose(columns), (len(wanted), *values.shape[1:]))
 
 
-def resampled_table(table: JointTable, rate: float) -> JointTable:
-    """Joints at another frame rate; see `resampled`."""
-    times, positions = resampled(table.times, table.positions, rate)
+def resample_table(table: JointTable, rate: float) -> JointTable:
+    """A joint table at another frame rate; see `resample`."""
+    times, positions = resample(table.times, table.positions, rate)
     return JointTable(times, table.names, positions)
 
 
 def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
-    """Values (T,) at wanted times (K,): a spline for each run of known ones."""
+    """Values (T,) at wanted times (K,), by one spline for each run of known values."""
     from scipy.interpolate import make_interp_spline
 
     out = np.full(len(wanted), np.nan)
-    for start, end in _runs(np.isfinite(values)):
+    for start, end in true_runs(np.isfinite(values)):
         inside = (wanted >= times[start]) & (wanted <= times[end - 1])
         if inside.any():
             spline = make_interp_spline(times[start:end], values[start:end], k=min(3, end - start - 1))
@@ -99,7 +95,7 @@ def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
     return out
 
 
-def _runs(known: ArrayLike) -> list[tuple[int, int]]:
-    """Starts and ends of the runs of what is true in (T,)."""
+def true_runs(known: ArrayLike) -> list[tuple[int, int]]:
+    """Starts and ends of the runs of true values in (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], np.asarray(known, bool), [False]]).astype(int)))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]

@@ -1,4 +1,4 @@
-"""A body's shapes as a mesh that its joints carry: for programs that show skinned puppets."""
+"""Triangle meshes of bodies and skeletons, carried by their joints, for programs that show skinned models."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body, Hulls, Limbs, Quads
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.animation import Animation, rest_positions
 from shadowpuppet.motion.body_animation import TO_REST, BodyTree
 
-AROUND, ALONG, DOME = 24, 6, 5
+POINTS_AROUND, RINGS_ALONG, DOME_RINGS = 24, 6, 5
 """Points around a limb; rings along it; rings of a dome."""
-BALL = 10
+BALL_RINGS = 10
 """Rings of an ellipsoid."""
-LEFT, RIGHT, MIDDLE = (0.86, 0.48, 0.30), (0.30, 0.56, 0.80), (0.72, 0.72, 0.70)
-"""Colours by which a mirror image is seen at once, linear RGB."""
-STICK = 0.12
-"""Radius of a bone of whose shape nothing is known, as a share of its length."""
-THICKEST = 0.05
-"""Metres, of such a bone."""
+LEFT_COLOUR, RIGHT_COLOUR, MIDDLE_COLOUR = (0.86, 0.48, 0.30), (0.30, 0.56, 0.80), (0.72, 0.72, 0.70)
+"""Colours that make a mirror image obvious, linear RGB."""
+BONE_THICKNESS = 0.12
+"""Radius of a bone of unknown shape, as a share of its length."""
+MAX_BONE_RADIUS = 0.05
+"""Its upper bound, metres."""
 
 
 class Mesh(NamedTuple):
-    """Triangles, each corner carried by one joint."""
+    """Triangles whose corners are each carried by one joint."""
 
     points: Array
     """In the axes of skeletons at rest, the root at the origin, of shape (V, 3), metres."""
@@ -39,7 +39,7 @@ class Mesh(NamedTuple):
     colours: Array
     """Linear RGB, 0..1, of shape (V, 3)."""
     two_sided: bool = False
-    """Whether it is made of sheets that are seen from either side."""
+    """Whether it consists of sheets that are visible from both sides."""
 
 
 class _Patch(NamedTuple):
@@ -50,10 +50,10 @@ class _Patch(NamedTuple):
 
 
 def body_mesh(body: Body) -> Mesh:
-    """The body's shapes, as `BodyTree.animation` of it carries them: limbs where it has them, else hulls of ellipsoids, or cards."""
+    """The mesh of a body for `BodyTree.animation`: of its limbs if it has them, else of its hulls or cards."""
     tree = BodyTree(body)
     nodes = np.array([tree.node_of(j) for j in range(len(body.skeleton.joints))])
-    at = _rest(tree.offsets, [node.parent for node in tree.nodes])[nodes]
+    at = rest_positions(tree.offsets, [node.parent for node in tree.nodes])[nodes]
     shapes = body.shapes
     if body.limbs is not None:
         patches = [_of_limb(body.limbs, n) for n in range(len(body.limbs.parts))]
@@ -67,34 +67,26 @@ def body_mesh(body: Body) -> Mesh:
 
 
 def bone_mesh(animation: Animation) -> Mesh:
-    """A tapered stick along every bone of a skeleton of which no more is known."""
+    """A tapered stick along every bone of a skeleton."""
     patches, rest = list[_Patch](), animation.rest
     bones = [(parent, animation.offsets[n]) for n, parent in enumerate(animation.parents) if parent >= 0]
     bones += [(n, np.array(end)) for n, end in animation.ends.items()]
     for joint, along in bones:
         length = float(np.linalg.norm(along))
         if length > 1e-6:
-            wide = min(STICK * length, THICKEST) * np.array([1.0, 0.4])
+            wide = min(BONE_THICKNESS * length, MAX_BONE_RADIUS) * np.array([1.0, 0.4])
             points, triangles = _tube(np.stack([wide, wide], 1), length, np.zeros(2), wide)
             turned = points @ _toward(along / length).T + rest[joint]
             patches.append(_Patch(turned, triangles, np.full(len(points), joint), _colour(animation.names[joint])))
     if not patches:  # one joint alone
-        points, triangles = _tube(np.full((2, 2), THICKEST), THICKEST, np.zeros(2), np.full(2, THICKEST))
-        patches = [_Patch(points, triangles, np.zeros(len(points), np.int64), MIDDLE)]
+        points, triangles = _tube(np.full((2, 2), MAX_BONE_RADIUS), MAX_BONE_RADIUS, np.zeros(2), np.full(2, MAX_BONE_RADIUS))
+        patches = [_Patch(points, triangles, np.zeros(len(points), np.int64), MIDDLE_COLOUR)]
     return _joined(patches)
-
-
-def _rest(offsets: Array, parents: Sequence[int]) -> Array:
-    places = offsets.copy()
-    for n, parent in enumerate(parents):
-        if parent >= 0:
-            places[n] += places[parent]
-    return places
 
 
 def _colour(part: str) -> tuple[float, float, float]:
     small = part.lower()
-    return LEFT if small.startswith(("left", "l_")) else RIGHT if small.startswith(("right", "r_")) else MIDDLE
+    return LEFT_COLOUR if small.startswith(("left", "l_")) else RIGHT_COLOUR if small.startswith(("right", "r_")) else MIDDLE_COLOUR
 
 
 def _joined(patches: Sequence[_Patch], two_sided: bool = False) -> Mesh:
@@ -107,7 +99,7 @@ def _joined(patches: Sequence[_Patch], two_sided: bool = False) -> Mesh:
 
 
 def _normals(points: Array, triangles: NDArray[np.int64]) -> Array:
-    """Normals (V, 3) by the triangles around each point, the larger ones counting more."""
+    """Normals (V, 3) from the triangles around each point, weighted by area."""
     a, b, c = (points[triangles[:, n]] for n in range(3))
     sums = np.zeros_like(points)
     for n in range(3):
@@ -123,34 +115,33 @@ def _of_limb(limbs: Limbs, n: int) -> _Patch:
 
 
 def _tube(radii: Array, length: float, shear: Array, caps: Array) -> tuple[Array, NDArray[np.int64]]:
-    """A tapered elliptic cylinder along z from the origin, with domes of heights `caps`, closed: points (V, 3) and triangles (F, 3).
-
-    radii (2, 2): of the ellipses at start and end, along x and y; shear (2,): how far the end lies off along them.
-    """
-    falls = np.pi / 2 * np.arange(1, DOME) / DOME
+    """A closed tapered elliptic cylinder along z from the origin, with domes of heights `caps`: points (V, 3) and triangles (F, 3).
+    radii (2, 2): of the ellipses at start and end, along x and y; shear (2,): offset of the end along them."""
+    falls = np.pi / 2 * np.arange(1, DOME_RINGS) / DOME_RINGS
     start = [(0.0, np.cos(fall), -caps[0] * np.sin(fall)) for fall in falls[::-1]]
     end = [(1.0, np.cos(fall), caps[1] * np.sin(fall)) for fall in falls]
-    rings = [*start, *((share, 1.0, 0.0) for share in np.linspace(0, 1, ALONG)), *end]
-    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    rings = [*start, *((share, 1.0, 0.0) for share in np.linspace(0, 1, RINGS_ALONG)), *end]
+    turn = 2 * np.pi * np.arange(POINTS_AROUND) / POINTS_AROUND
     circle = np.stack([np.cos(turn), np.sin(turn)], 1)
     points = [np.concatenate([shear * share + wide * ((1 - share) * radii[0] + share * radii[1]) * circle,
-                              np.full((AROUND, 1), share * length + up)], 1) for share, wide, up in rings]  # fmt: skip
+                              np.full((POINTS_AROUND, 1), share * length + up)], 1) for share, wide, up in rings]  # fmt: skip
     poles = np.array([[0.0, 0.0, -caps[0]], [*shear, length + caps[1]]])
     return np.concatenate([*points, poles]), _closed(len(rings))
 
 
 def _closed(rings: int) -> NDArray[np.int64]:
-    """Triangles of rings of `AROUND` points, one above the other, counterclockwise from above, and a pole beneath and above."""
-    n, last = np.arange(AROUND), rings * AROUND
-    after = (n + 1) % AROUND
-    sides = [np.stack([AROUND * ring + step for step in corner], 1) for ring in range(rings - 1)
-             for corner in ((n, after, AROUND + after), (n, AROUND + after, AROUND + n))]  # fmt: skip
-    beneath, top = np.stack([np.full(AROUND, last), after, n], 1), (rings - 1) * AROUND
-    return np.concatenate([*sides, beneath, np.stack([np.full(AROUND, last + 1), top + n, top + after], 1)])
+    """Triangles of rings of `POINTS_AROUND` points, one above the other, counterclockwise from above, and poles at both ends."""
+    n, last = np.arange(POINTS_AROUND), rings * POINTS_AROUND
+    after = (n + 1) % POINTS_AROUND
+    sides = [np.stack([POINTS_AROUND * ring + step for step in corner], 1) for ring in range(rings - 1)
+             for corner in ((n, after, POINTS_AROUND + after), (n, POINTS_AROUND + after, POINTS_AROUND + n))]  # fmt: skip
+    beneath, top = np.stack([np.full(POINTS_AROUND, last), after, n], 1), (rings - 1) * POINTS_AROUND
+    return np.concatenate([*sides, beneath, np.stack([np.full(POINTS_AROUND, last + 1), top + n, top + after], 1)])
 
 
 def _of_hull(shapes: Hulls, n: int, part: str, at: Array) -> _Patch:
-    """The convex hull at rest of a shape's ellipsoids; each point is carried by its ellipsoid's joint. `at`: the joints' places (J, 3)."""
+    """The convex hull at rest of a shape's ellipsoids; each point is carried by its ellipsoid's joint. `at`: the joints' positions (J,
+    3)."""
     from scipy.spatial import ConvexHull
 
     count = int(shapes.numbers[n])
@@ -166,9 +157,10 @@ def _of_hull(shapes: Hulls, n: int, part: str, at: Array) -> _Patch:
 
 
 def _ball() -> Array:
-    """Points (V, 3) all over a unit ball."""
-    up, turn = np.linspace(-np.pi / 2, np.pi / 2, BALL + 1)[1:-1], 2 * np.pi * np.arange(AROUND) / AROUND
-    rings = np.stack([np.outer(np.cos(up), np.cos(turn)), np.outer(np.cos(up), np.sin(turn)), np.repeat(np.sin(up)[:, None], AROUND, 1)], 2)
+    """Points (V, 3) of a unit sphere."""
+    up, turn = np.linspace(-np.pi / 2, np.pi / 2, BALL_RINGS + 1)[1:-1], 2 * np.pi * np.arange(POINTS_AROUND) / POINTS_AROUND
+    heights = np.repeat(np.sin(up)[:, None], POINTS_AROUND, 1)
+    rings = np.stack([np.outer(np.cos(up), np.cos(turn)), np.outer(np.cos(up), np.sin(turn)), heights], 2)
     return np.concatenate([rings.reshape(-1, 3), [[0, 0, -1.0], [0, 0, 1.0]]])
 
 

@@ -1,4 +1,4 @@
-"""How good a motion is: errors against a truth, and what is known without one. Metres throughout; summaries have millimetres."""
+"""Quality of a motion: errors against a truth, and figures that need none. Metres; summaries are in millimetres."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable, Motion
-from shadowpuppet.motion.synchronization import in_step, match
+from shadowpuppet.motion.synchronization import at_common_times, match
 
-UPPER = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
-"""What is compared where one camera saw the upper body."""
-LIMBS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
-"""What is compared where the whole body was seen."""
-GROUPS = {"upper": UPPER, "limbs": LIMBS, "humaneva": ("pelvis", "neck", "head", *LIMBS)}
-"""Joints that are compared together, by a name; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
-LOST, FAR = 0.5, 0.3
-"""Metres: what a joint that is not there counts, so that leaving out bad frames never helps; and beyond which one is far off."""
-LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""World to camera of a level camera that looks along the world's y."""
+UPPER_JOINTS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
+"""Joints compared where one camera saw the upper body."""
+LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
+"""Joints compared where the whole body was seen."""
+GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS, "humaneva": ("pelvis", "neck", "head", *LIMB_JOINTS)}
+"""Named groups of joints; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
+LOST_ERROR, FAR_ERROR = 0.5, 0.3
+"""Metres: the error of a joint that is missing, so that leaving out bad frames never helps; and the error from which a joint counts as
+far off."""
+LEVEL_CAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""World to camera of a level camera looking along the world's y."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointErrors:
-    """Distances between joints and their truth. Joints that the run lacks count as `LOST` in every distance."""
+    """Distances between joints and their truth. Joints that the run lacks count as `LOST_ERROR` in every distance."""
 
     names: tuple[str, ...]
     """Joints compared, J of them."""
     known: NDArray[np.bool_]
     """Where there is a truth, of shape (T, J)."""
     lost: NDArray[np.bool_]
-    """Where there is a truth but no joint, of shape (T, J)."""
+    """Where there is a truth but no estimate, of shape (T, J)."""
     distance: Array
     """In space, of shape (T, J), metres."""
     plane: Array
@@ -45,13 +46,13 @@ class JointErrors:
     depth: Array
     """Along the camera's optical axis."""
     aligned: Array
-    """In space, less each frame's mean offset over the joints."""
+    """In space, after removing each frame's mean offset over the joints."""
     delta: Array
-    """From the truth to the run's joint, of shape (T, J, 3), metres; not a number where either is unknown."""
+    """Estimate minus truth, of shape (T, J, 3), metres; not a number where either is unknown."""
 
     def summary(self, across: bool = True) -> dict[str, Any]:
-        """Figures in millimetres, over all joints and for each: mean, RMSE, percentiles, share that is far off; `across` and along the
-        camera's axis, too."""
+        """Figures in millimetres over all joints and for each: mean, RMSE, percentiles, share far off; with `across` also along and
+        across the camera's axis."""
         kinds = ("distance", *(("plane", "depth") if across else ()), "aligned")
         joints = {name: _summary(self._values(kinds, k)) for k, name in enumerate(self.names) if self.known[:, k].any()}
         return {"frames": len(self.known), "lost": int(self.lost.any(1).sum()), **_summary(self._values(kinds)), "joints": joints}
@@ -66,9 +67,12 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
                  start: int = 0) -> JointErrors:
     """Compare joints with a truth, frame by frame of the truth from `start` on.
 
-    Frames belong together that are nearest in time, within half a step of the truth. `joints`: those compared, by default
-    `default_joints`. `camera` says what is plane and depth; left out, it is level and looks along the world's y.
-    Raises `ShadowPuppetError` where joints are missing, or there is nothing to compare.
+    Args:
+            joints: those compared, by default `default_joints`.
+            camera: defines plane and depth; left out, a level one that looks along the world's y.
+
+    Frames are matched by the nearest time, within half a step of the truth. Raises `ShadowPuppetError` if joints are missing or nothing
+    can be compared.
     """
     names = default_joints(run, truth) if joints is None else tuple(joints)
     _check_joints(names, run, truth)
@@ -81,20 +85,20 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
         raise ShadowPuppetError("the truth has no position of any of the joints compared, so there is nothing to compare")
     lost = known & ~np.asarray(np.isfinite(found).all(2))
     delta = found - reference
-    across = delta @ (LEVEL if camera is None else camera.T_camera_world[:3, :3]).T
+    across = delta @ (LEVEL_CAMERA if camera is None else camera.T_camera_world[:3, :3]).T
     distances = (np.linalg.norm(delta, axis=2), np.linalg.norm(across[..., :2], axis=2), np.abs(across[..., 2]),
                  np.linalg.norm(delta - _offsets(delta), axis=2))
-    return JointErrors(names, known, lost, *(np.where(lost, LOST, d) for d in distances), delta=delta)
+    return JointErrors(names, known, lost, *(np.where(lost, LOST_ERROR, d) for d in distances), delta=delta)
 
 
 def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:
-    """`LIMBS` of a run that has legs, else `UPPER`; those that both have."""
-    group = LIMBS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER
+    """`LIMB_JOINTS` for a run with legs, else `UPPER_JOINTS`; only those that both tables have."""
+    group = LIMB_JOINTS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER_JOINTS
     return tuple(name for name in group if name in run.names and name in truth.names)
 
 
 def overlap(model: NDArray[np.bool_], silhouette: NDArray[np.bool_], ignore: NDArray[np.bool_] | None = None) -> float:
-    """Intersection over union of two masks (H, W); not a number where both are empty. `ignore`: pixels that do not count."""
+    """Intersection over union of two masks (H, W), without the pixels of `ignore`; not a number if both are empty."""
     if ignore is not None:
         model, silhouette = model & ~ignore, silhouette & ~ignore
     union = np.count_nonzero(model | silhouette)
@@ -102,7 +106,7 @@ def overlap(model: NDArray[np.bool_], silhouette: NDArray[np.bool_], ignore: NDA
 
 
 def statistics(values: ArrayLike) -> dict[str, float]:
-    """Count, mean, standard deviation, percentiles and extremes of the finite `values`; the count alone where there is none."""
+    """Count, mean, standard deviation, percentiles and extremes of the finite `values`; only the count if there are none."""
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     if not values.size:
@@ -113,27 +117,23 @@ def statistics(values: ArrayLike) -> dict[str, float]:
 
 
 def accelerations(table: JointTable) -> Array:
-    """Accelerations (T - 2, J, 3), m/s^2, by second differences: a constant one is exact whatever the steps of time."""
+    """Accelerations (T - 2, J, 3), m/s^2, by second differences: exact for constant ones whatever the time steps."""
     step = np.diff(table.times)[:, None, None]
     speed = np.diff(table.positions, axis=0) / step
     return np.diff(speed, axis=0) / (0.5 * (step[1:] + step[:-1]))
 
 
 def jitter(table: JointTable) -> float:
-    """Root mean square acceleration of joints, m/s^2, over the frames that have neighbours; not a number where none has.
-
-    It has the motion's own in it and grows with the frame rate: compare it with that of the truth, or of another run of the film.
-    """
+    """Root mean square acceleration of joints, m/s^2; not a number without three consecutive known frames. It includes the motion's own
+    and grows with the frame rate: compare it with that of the truth, or of another run of the film."""
     squares = (accelerations(table) ** 2).sum(2)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(squares.mean())) if squares.size else np.nan
 
 
 def bone_lengths(table: JointTable) -> dict[str, dict[str, float]]:
-    """`statistics` of the length (m) of every limb bone whose joints are there, by the bone's name `<joint>-<joint>`.
-
-    A skeleton's are constant by its making; those of triangulated or measured joints are not.
-    """
+    """`statistics` of the length (m) of every limb bone in the table, by `<joint>-<joint>`. A skeleton's are constant, measured ones are
+    not."""
     bones = [(a, b) for a, b in BONES if a.split("_")[0] == b.split("_")[0] and a in table.names and b in table.names]
     ends = {name: table.positions[:, i] for i, name in enumerate(table.names)}
     return {f"{a}-{b}": statistics(np.linalg.norm(ends[a] - ends[b], axis=1)) for a, b in bones}
@@ -141,22 +141,20 @@ def bone_lengths(table: JointTable) -> dict[str, dict[str, float]]:
 
 def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[str] | None = None, *,
              camera: Camera | None = None, start: int = 0, cameras: int = 1) -> dict[str, Any]:
-    """All that this module can say of a motion, for metrics.json; see `joint_errors` for the arguments.
-
-    Run and truth are compared at the same times (`synchrony.in_step`), whatever their rates. Where several `cameras` saw it costs are
-    m^2, and no error is told along or across the axis of one.
-    """
+    """All metrics of a motion, for metrics.json; see `joint_errors` for the arguments. Run and truth are compared at common times
+    (`synchronization.at_common_times`), whatever their rates. With several `cameras` costs are m^2, and no errors along or across one
+    camera's axis are given."""
     run = motion.table
     if truth is not None and len(motion):
-        run, truth = in_step(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))
+        run, truth = at_common_times(run, JointTable(truth.times[start:], truth.names, truth.positions[start:]))
     errors = None if truth is None else joint_errors(run, truth, joints, camera=camera)
     names = errors.names if errors else joints or default_joints(run, run)
-    said: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
+    figures: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
                             "overlap": statistics(motion.overlap), "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
                             "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(motion.table)}
     if truth is not None and errors is not None:
-        said |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
-    return said
+        figures |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}
+    return figures
 
 
 def _check_joints(names: tuple[str, ...], run: JointTable, truth: JointTable) -> None:
@@ -171,9 +169,9 @@ def _check_joints(names: tuple[str, ...], run: JointTable, truth: JointTable) ->
 
 
 def _offsets(delta: Array) -> Array:
-    """Each frame's mean difference (T, 1, 3) over the joints that are there."""
-    seen = np.isfinite(delta).all(2, keepdims=True)
-    return np.where(seen, delta, 0).sum(1, keepdims=True) / np.maximum(seen.sum(1, keepdims=True), 1)
+    """Each frame's mean difference (T, 1, 3) over the known joints."""
+    known = np.isfinite(delta).all(2, keepdims=True)
+    return np.where(known, delta, 0).sum(1, keepdims=True) / np.maximum(known.sum(1, keepdims=True), 1)
 
 
 def _summary(values: dict[str, Array]) -> dict[str, float]:
@@ -181,6 +179,6 @@ def _summary(values: dict[str, Array]) -> dict[str, float]:
     d = values["distance"] * 1000
     p50, p90, p95 = np.percentile(d, [50, 90, 95]).tolist()
     return {"mean_mm": float(d.mean()), "rmse_mm": float(np.sqrt((d**2).mean())), "p50_mm": p50, "p90_mm": p90, "p95_mm": p95,
-            "max_mm": float(d.max()), "far": float((d > 1000 * FAR).mean()),
+            "max_mm": float(d.max()), "far": float((d > 1000 * FAR_ERROR).mean()),
             **{f"{key}_mm": float(values[kind].mean() * 1000)
                for key, kind in (("plane", "plane"), ("depth", "depth"), ("aligned_mean", "aligned")) if kind in values}}

@@ -1,4 +1,4 @@
-"""Motion: what a tracker found over time, as arrays; and joints over time, whoever measured them."""
+"""Motion: a tracker's estimates over time as arrays; and joints over time, from any source."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 
 STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
-"""What can be said of a frame: followed; followed, but in doubt; carried on without a picture; not known where; nobody there."""
+"""Statuses of a frame: tracked; tracked but doubtful; extrapolated without a picture; position unknown; no person visible."""
 BLANK = ("lost", "absent")
-"""Statuses of frames that have no pose and no joints: there is no honest value."""
-SERIES = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
-"""The fields of a `Motion` that have a row a frame."""
+"""Statuses of frames without pose and joints."""
+PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
+"""Fields of a `Motion` with one row a frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointTable:
-    """Joints over time. Raises `ShadowPuppetError` where shapes do not fit or times do not increase."""
+    """Joints over time. Raises `ShadowPuppetError` for wrong shapes or times that do not increase."""
 
     times: Array
     """Seconds, of shape (T,)."""
@@ -38,7 +38,7 @@ class JointTable:
         _check_shape("positions", self.positions, (len(self.times), len(self.names), 3))
 
     def select(self, names: Sequence[str]) -> JointTable:
-        """The same with only these joints. Raises `ShadowPuppetError` with the names there are."""
+        """The table with these joints only. Raises `ShadowPuppetError` with the names that exist."""
         missing = [name for name in names if name not in self.names]
         if missing:
             raise ShadowPuppetError(f"unknown joint {missing[0]!r}; there are: {choices(self.names)}")
@@ -46,7 +46,7 @@ class JointTable:
 
 
 class MotionFrame(NamedTuple):
-    """What is known of one frame; what is left out is not known."""
+    """One frame of a motion; fields that are left out are unknown."""
 
     time: float
     """Seconds."""
@@ -68,11 +68,8 @@ class MotionFrame(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """A tracked motion; `motion[10:20]` is a part of it.
-
-    Values are not numbers where there is no honest one: poses and joints of frames that are lost or absent always.
-    Raises `ShadowPuppetError` where shapes do not fit, times do not increase, or a status is unknown.
-    """
+    """A tracked motion; `motion[10:20]` is a part of it. Unknown values are not a number: poses and joints of lost and absent frames
+    always. Raises `ShadowPuppetError` for wrong shapes, times that do not increase, or an unknown status."""
 
     body_name: str
     dof_names: tuple[str, ...]
@@ -97,7 +94,7 @@ class Motion:
     """Of `STATUSES`, of shape (T,)."""
 
     def __post_init__(self) -> None:
-        """Check every field, and bring each to its type."""
+        """Check every field and convert it to its type."""
         _set(self, dof_names=_names("degrees of freedom", self.dof_names), joint_names=_names("joints", self.joint_names),
              times=_times(self.times), status=_statuses(self.status))
         T, D, J = len(self.times), len(self.dof_names), len(self.joint_names)
@@ -114,7 +111,7 @@ class Motion:
 
     def __getitem__(self, frames: slice | NDArray[np.bool_]) -> Motion:
         """Some frames: a slice, or a mask (T,)."""
-        return replace(self, **{name: getattr(self, name)[frames] for name in SERIES})
+        return replace(self, **{name: getattr(self, name)[frames] for name in PER_FRAME})
 
     def _check_blank(self) -> None:
         blank = np.flatnonzero(np.isin(self.status, BLANK))
@@ -131,16 +128,21 @@ class Motion:
         return {status: int(count) for status in STATUSES if (count := (self.status == status).sum())}
 
     @property
+    def known(self) -> NDArray[np.bool_]:
+        """Frames (T,) whose pose and joints are known."""
+        return np.asarray(np.isfinite(self.poses).all(1) & np.isfinite(self.joints).all((1, 2)))
+
+    @property
     def table(self) -> JointTable:
         """The joints alone."""
         return JointTable(self.times, self.joint_names, self.joints)
 
 
 class MotionBuilder:
-    """Collects a motion frame by frame, in as many numbers a frame as there are."""
+    """Collects a motion frame by frame in compact arrays."""
 
     def __init__(self, body_name: str, dof_names: Iterable[str], joint_names: Iterable[str]) -> None:
-        """Names as `Motion` has them."""
+        """Names as in `Motion`."""
         self.body_name = body_name
         self.dof_names, self.joint_names = _names("degrees of freedom", dof_names), _names("joints", joint_names)
         self._rows, self._status = array("d"), bytearray()
@@ -151,10 +153,8 @@ class MotionBuilder:
         return len(self._status)
 
     def append(self, frame: MotionFrame) -> MotionFrame:
-        """Add a frame, later than those before it; returns it as it is kept: arrays all, blank where it is lost or absent.
-
-        Raises `ShadowPuppetError` where a shape, the time or the status does not fit; nothing is added then.
-        """
+        """Add a frame, later than those before; returns it as stored: all arrays, blank if lost or absent. Raises `ShadowPuppetError`,
+        and adds nothing, for a wrong shape, time or status."""
         kept = self._checked(frame)
         self._rows.extend([kept.time, kept.cost, kept.overlap])
         for values in (kept.pose, kept.pose_sd, kept.joints, kept.joint_sd):
@@ -194,7 +194,7 @@ def _set(target: object, **values: object) -> None:
 
 
 def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
-    """Names that can head the columns of a table."""
+    """Checked names of table columns."""
     names = tuple(str(name) for name in names)
     bad = [name for i, name in enumerate(names) if name != name.strip() or not name or name.endswith("_sd") or name in names[:i]]
     if bad:

@@ -1,8 +1,8 @@
-"""Two tables of joints brought to the same times, and the offset between two clocks."""
+"""Joint tables at common times, and the offset between two clocks."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,45 +11,41 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
 
-REACH = 1.5
-"""Steps that two frames may be apart to be interpolated between; over longer gaps nothing is known."""
-NEAR = 0.1
-"""Of a step: a frame so near in time is taken as it is where nothing can be interpolated, so that rounded times lose none at the ends."""
-DENSER = 0.75
-"""A truth whose steps are less than so much of the run's is interpolated, not the run."""
-SHARED, LEAST = 0.5, 12
-"""Share of the shorter motion's speeds that must meet for an offset to count, and how many at least."""
-SPAN = 0.25
-"""Seconds over which a speed is taken: over a frame it would be mostly the run's jitter."""
-CLEAR = 0.7
-"""An offset is found where the error of speed is less than so much of the usual one."""
-ELSEWHERE, RIVAL, ALIKE = 0.3, 1.15, 0.01
-"""Seconds beyond which an offset is another one, and by what factor, and m/s more, its error may be larger and still in doubt."""
+MAX_GAP = 1.5
+"""Largest gap, in steps, that is interpolated."""
+NEAREST_WITHIN = 0.1
+"""A frame this near (in steps) is used as it is where nothing can be interpolated, so that rounded times lose no frames at the ends."""
+DENSER_TRUTH = 0.75
+"""If the truth's step is less than this times the run's, the truth is interpolated, not the run."""
+MIN_SHARED, MIN_SPEEDS = 0.5, 12
+"""Share of the shorter motion's speeds that must overlap at an offset, and their minimum number."""
+SPEED_SPAN = 0.25
+"""Time (s) over which a speed is taken: over one frame it would be mostly jitter."""
+STANDS_OUT = 0.7
+"""An offset is accepted if its speed error is less than this times the usual one."""
+OTHER_OFFSET, RIVAL_FACTOR, RIVAL_MARGIN = 0.3, 1.15, 0.01
+"""Offsets this far apart (s) are different; one is a rival if its error is below `RIVAL_FACTOR` times the best plus `RIVAL_MARGIN`
+(m/s)."""
 
 
 def match(times: ArrayLike, truth_times: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """For each time of the truth (T,) the index of the nearest of `times` (increasing), and whether it is within half a step.
-
-    The step is the truth's median one; a truth of one frame takes any.
-    """
+    """For each time of the truth (T,) the index of the nearest of `times` (increasing), and whether it is within half a step. The step
+    is the truth's median one; a truth of one frame accepts any."""
     times, truth_times = np.asarray(times, float), np.asarray(truth_times, float)
-    index = _nearest(times, truth_times)
+    index = nearest(times, truth_times)
     half = 0.5 * np.median(np.diff(truth_times)) if len(truth_times) > 1 else np.inf
     return index, np.abs(times[index] - truth_times) <= half + 1e-9
 
 
 def step_of(times: ArrayLike) -> float:
-    """The median time from frame to frame, seconds; infinite where there is one frame or none."""
+    """The median time between frames, seconds; infinite for fewer than two."""
     times = np.asarray(times, float)
     return float(np.median(np.diff(times))) if len(times) > 1 else np.inf
 
 
 def at_times(table: JointTable, times: ArrayLike) -> JointTable:
-    """A table's joints at other times (T,), seconds, increasing: on the straight line between the two frames around each.
-
-    Not a number where a frame around it lacks the joint or the two are more than 1.5 steps apart, and beyond the ends: nothing is
-    extrapolated. A frame within a tenth of a step is taken as it is where there is no such line.
-    """
+    """A table's joints at other times (T,), seconds, increasing, by linear interpolation. Not a number where a neighbouring frame lacks
+    the joint, the two are more than 1.5 steps apart, or beyond the ends; there a frame within a tenth of a step is used as it is."""
     times, own, places = np.asarray(times, float), table.times, table.positions
     if len(own) == 0:
         return JointTable(times, table.names, np.full((len(times), *places.shape[1:]), np.nan))
@@ -57,49 +53,45 @@ def at_times(table: JointTable, times: ArrayLike) -> JointTable:
     before, after = after - 1, np.minimum(after, len(own) - 1)
     span = own[after] - own[before]
     share = np.divide(times - own[before], span, out=np.zeros(len(times)), where=span > 0)
-    usable = (span > 0) & (span <= REACH * step_of(own)) & (share >= 0) & (share <= 1)
+    usable = (span > 0) & (span <= MAX_GAP * step_of(own)) & (share >= 0) & (share <= 1)
     weight = np.where(usable, share, 0)[:, None, None]
     found = np.where(usable[:, None, None], (1 - weight) * places[before] + weight * places[after], np.nan)
-    nearest = _nearest(own, times)
-    near = np.abs(own[nearest] - times) <= (NEAR * step_of(own) if len(own) > 1 else 1e-6)
-    return JointTable(times, table.names, np.where(near[:, None, None] & ~np.isfinite(found), places[nearest], found))
+    closest = nearest(own, times)
+    near = np.abs(own[closest] - times) <= (NEAREST_WITHIN * step_of(own) if len(own) > 1 else 1e-6)
+    return JointTable(times, table.names, np.where(near[:, None, None] & ~np.isfinite(found), places[closest], found))
 
 
-def in_step(run: JointTable, truth: JointTable) -> tuple[JointTable, JointTable]:
-    """Both at the same times: the truth's; or, where the truth has more frames a second, the run's, between whose frames less is known.
-
-    Where the run has no frames the truth's own times remain, as many a second as the run has, so that what is left out counts as lost.
-    """
+def at_common_times(run: JointTable, truth: JointTable) -> tuple[JointTable, JointTable]:
+    """Both tables at the same times: the truth's, or the run's if the truth has more frames a second. Where the run has no frames the
+    truth's times remain, thinned to the run's rate, so that left-out frames count as lost."""
     slow = step_of(run.times)
-    if len(run.times) == 0 or not step_of(truth.times) < DENSER * slow < np.inf:
+    if len(run.times) == 0 or not step_of(truth.times) < DENSER_TRUTH * slow < np.inf:
         return at_times(run, truth.times), truth
-    within = (run.times >= truth.times[0] - NEAR * step_of(truth.times)) & (run.times <= truth.times[-1] + NEAR * step_of(truth.times))
-    alone = truth.times[np.abs(run.times[_nearest(run.times, truth.times)] - truth.times) > REACH / 2 * slow]
+    margin = NEAREST_WITHIN * step_of(truth.times)
+    within = (run.times >= truth.times[0] - margin) & (run.times <= truth.times[-1] + margin)
+    alone = truth.times[np.abs(run.times[nearest(run.times, truth.times)] - truth.times) > MAX_GAP / 2 * slow]
     thinned = alone[np.unique(np.floor((alone - alone[:1]) / slow + 1e-6), return_index=True)[1]]
     times = np.sort(np.concatenate([run.times[within], thinned]))
     return at_times(run, times), at_times(truth, times)
 
 
 class Offset(NamedTuple):
-    """How one clock stands to another."""
+    """Offset between two clocks."""
 
     seconds: float
     """To be added to the truth's times."""
     error: float
-    """Root mean square difference of the joints' speeds then, m/s."""
+    """Root mean square difference of the joints' speeds with this offset, m/s."""
     before: float
-    """The same as the clocks stand; not a number where the motions do not meet then."""
+    """The same without any offset; not a number if the motions do not overlap then."""
     rival: float | None
-    """Another offset that fits nearly as well, as where a motion repeats itself; None where there is none."""
+    """Another offset that fits nearly as well, as in periodic motion; None if there is none."""
 
 
 def find_offset(run: JointTable, truth: JointTable) -> Offset:
-    """What must be added to the truth's times so that joints are equally fast at the same time, whatever worlds they are in.
-
-    The least mean square difference of the speeds of the joints that both have, over offsets by which half of the shorter motion meets
-    the other; between whole steps by trying; of several as good, as where a motion repeats itself, the smallest. Raises
-    `ShadowPuppetError` where no offset stands out.
-    """
+    """The offset to add to the truth's times so that joints have equal speeds at equal times, in whatever worlds they are. Minimises the
+    mean square difference of the shared joints' speeds, over offsets at which half of the shorter motion overlaps; refined between
+    steps; of equally good ones the smallest. Raises `ShadowPuppetError` if no offset stands out."""
     names = [name for name in run.names if name in truth.names]
     ours, theirs = run.select(names), truth.select(names)
     step = max(step_of(run.times), step_of(truth.times))
@@ -107,14 +99,15 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
         raise ShadowPuppetError("sync: found no joint that run and truth share in two frames or more, so the clocks cannot be compared")
     lags, errors = _by_lag(*(_speeds(table, _steps(table, step)) for table in (ours, theirs)))
     if not np.isfinite(errors).any():
-        raise ShadowPuppetError(f"sync: run and truth share fewer than {LEAST} speeds at every offset, so the clocks cannot be compared")
+        raise ShadowPuppetError(f"sync: run and truth share fewer than {MIN_SPEEDS} speeds at every offset, so the clocks cannot be "
+                                "compared")
     offsets = run.times[0] - truth.times[0] + lags * step
-    good = RIVAL * np.nanmin(errors) + ALIKE
+    good = RIVAL_FACTOR * np.nanmin(errors) + RIVAL_MARGIN
     smallest = np.nanmin(np.abs(offsets[errors <= good]))
-    best = int(np.nanargmin(np.where(np.abs(offsets) <= smallest + ELSEWHERE, errors, np.nan)))
-    elsewhere = np.where(np.abs(offsets - offsets[best]) > ELSEWHERE, errors, np.nan)
+    best = int(np.nanargmin(np.where(np.abs(offsets) <= smallest + OTHER_OFFSET, errors, np.nan)))
+    elsewhere = np.where(np.abs(offsets - offsets[best]) > OTHER_OFFSET, errors, np.nan)
     usual = np.nanmedian(elsewhere) if np.isfinite(elsewhere).any() else np.inf
-    if not errors[best] < CLEAR * usual:
+    if not errors[best] < STANDS_OUT * usual:
         raise ShadowPuppetError(f"sync: the best offset, {offsets[best]:.3f} s, leaves {errors[best]:.3f} m/s of speed error, the usual "
                                 f"one {usual:.3f}: none stands out; give --offset")
     tried = offsets[best] + step * np.linspace(-1, 1, 41)
@@ -126,8 +119,7 @@ def find_offset(run: JointTable, truth: JointTable) -> Offset:
 
 
 def speed_error(run: JointTable, truth: JointTable, offset: float) -> float:
-    """Root mean square difference of speeds, m/s, of two tables of the same joints with `offset` seconds added to the truth's times; not a
-    number where nothing meets."""
+    """Root mean square difference of speeds, m/s, with `offset` seconds added to the truth's times; not a number without overlap."""
     times = _steps(run, max(step_of(run.times), step_of(truth.times)))
     off = _speeds(run, times) - _speeds(truth, times - offset)
     off = off[np.isfinite(off)]
@@ -135,18 +127,19 @@ def speed_error(run: JointTable, truth: JointTable, offset: float) -> float:
 
 
 def _steps(table: JointTable, step: float) -> Array:
-    """Times from a table's first to its last, `step` apart."""
+    """Times from a table's first to its last in steps of `step`."""
     return table.times[0] + step * np.arange(int((table.times[-1] - table.times[0]) / step + 1e-6) + 1)
 
 
 def _speeds(table: JointTable, times: Array) -> Array:
-    """Speeds (T, J), m/s, over `SPAN` around each time."""
-    before, after = (at_times(table, times + sign * SPAN / 2).positions for sign in (-1, 1))
-    return np.linalg.norm(after - before, axis=2) / SPAN
+    """Speeds (T, J), m/s, over `SPEED_SPAN` around each time."""
+    before, after = (at_times(table, times + sign * SPEED_SPAN / 2).positions for sign in (-1, 1))
+    return np.linalg.norm(after - before, axis=2) / SPEED_SPAN
 
 
 def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
-    """Lags (L,), steps by which theirs begin later, and the root mean square difference at each: sums of squares by Fourier transforms."""
+    """Lags (L,), in steps by which `theirs` begins later, and the root mean square difference at each: correlations by Fourier
+    transforms."""
     from scipy.signal import correlate
 
     a, b, known_a, known_b = np.nan_to_num(ours), np.nan_to_num(theirs), np.isfinite(ours).astype(float), np.isfinite(theirs).astype(float)
@@ -156,13 +149,13 @@ def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
 
     count = np.round(total(known_a, known_b))
     squares = total(a**2, known_b) - 2 * total(a, b) + total(known_a, b**2)
-    enough = count >= max(LEAST, SHARED * min(known_a.sum(), known_b.sum()))
+    enough = count >= max(MIN_SPEEDS, MIN_SHARED * min(known_a.sum(), known_b.sum()))
     errors = np.sqrt(np.maximum(squares, 0) / np.maximum(count, 1))
     return np.arange(len(count)) - (len(theirs) - 1), np.where(enough, errors, np.nan)
 
 
-def _nearest(times: Array, wanted: Array) -> NDArray[np.int64]:
-    """The index of the nearest of `times` (increasing) to each wanted one; of two as near the earlier."""
+def nearest(times: NDArray[Any], wanted: NDArray[Any]) -> NDArray[np.int64]:
+    """Index of the nearest of `times` (increasing) to each wanted one; the earlier of two equally near."""
     after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     before, after = after - 1, np.minimum(after, len(times) - 1)
     return np.where(np.abs(times[before] - wanted) <= np.abs(times[after] - wanted), before, after)

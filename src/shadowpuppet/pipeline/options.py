@@ -6,12 +6,13 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
 
-from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, WHOLE, expected_metres
+from shadowpuppet.body.models import WHOLE, BodyName
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings
@@ -57,7 +58,7 @@ class Options:
     """Height of the person, metres, shoes on. Replaces what recording.toml says."""
     distance: Annotated[float, Field(ge=DISTANCES[0], le=DISTANCES[1]), _metres(DISTANCES)] | None = None
     """Distance from the camera to the middle of the body at the start, metres. Replaces what recording.toml says."""
-    body: Literal["cardbox", "boxes", "rounded", "anatomical", "cylinders"] | None = None
+    body: BodyName | None = None
     """The body's model, in place of the tracker's own: of the upper body (the first three), or of the whole person."""
     person: Path | None = None
     """Sizes of the person, as an earlier run or `fit-person` saved them (person.toml)."""

@@ -9,7 +9,8 @@ from itertools import chain, islice
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.sizes import WHOLE, CardboxSizes
+from shadowpuppet.body.models import WHOLE
+from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
@@ -19,7 +20,7 @@ from shadowpuppet.io.recording import Reference
 from shadowpuppet.pipeline.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette.boundary import disc
-from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, Guess, as_whole, find_person, fit_references
+from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
@@ -47,7 +48,7 @@ LOOKED_FOR_IN = 12
 class Found:
     """A person who was found in the pictures."""
 
-    fit: Fit
+    fit: SizeFit
     """Sizes and place."""
     source: str
     """Where the sizes come from, in words."""
@@ -92,7 +93,7 @@ def told_scale(footage: Footage) -> str:
     return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
 
 
-def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Options, rng: np.random.Generator) -> tuple[Fit, str]:
+def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Options, rng: np.random.Generator) -> tuple[SizeFit, str]:
     subject, body = footage.recording.subject, options.tracker.body
     known = {"height": subject.height, "distance": subject.distance, "body": body, "settings": options.initialization}
     if options.person is not None:
@@ -137,7 +138,7 @@ def _reference(footage: Footage, seen: Silhouettes, reference: Reference) -> Mas
     return middle
 
 
-def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: Fit) -> None:
+def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: SizeFit) -> None:
     """Raise `RecordingError` where a reference shows another posture than its name says."""
     paths = {reference.name: reference.image for reference in footage.recording.references}
     for (name, mask), pose in zip(masks.items(), fit.poses):
@@ -145,7 +146,7 @@ def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: Fit) -> No
             raise RecordingError(f"{paths[name]}: not the posture {name}, it seems: {wrong}; {HOW[name]}; take it again, or remove it")
 
 
-def wrong_posture(camera: Camera, mask: Mask, name: str, fit: Fit, pose: Array) -> str | None:
+def wrong_posture(camera: Camera, mask: Mask, name: str, fit: SizeFit, pose: Array) -> str | None:
     """What shows that a reference's mask (H, W) does not have its posture, after the fit with `pose` (D,); None where nothing does."""
     sizes = fit.guess.sizes
     assert isinstance(sizes, CardboxSizes)
@@ -161,7 +162,7 @@ def wrong_posture(camera: Camera, mask: Mask, name: str, fit: Fit, pose: Array) 
     return f"{100 * seen:.0f} % of the level forearms are in the silhouette, expected nearly all" if seen < SEEN else None
 
 
-def _forearms_seen(camera: Camera, mask: Mask, guess: Guess, pose: Array) -> float:
+def _forearms_seen(camera: Camera, mask: Mask, guess: PersonEstimate, pose: Array) -> float:
     """Share of the lines from the elbows to the wrists that lies in a mask (H, W), or `BESIDE` it, of what is in the picture; 1 where
     nothing is."""
     import cv2

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.sizes import WHOLE, BoneSizes
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body
+from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.motion.motion import JointTable

@@ -17,7 +17,7 @@ from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, renamed
 from shadowpuppet.io.motion.motion_files import TURNS, leg_length, read_motion, up_axis
 from shadowpuppet.io.motion.table import write_joints
-from shadowpuppet.motion.metrics import LIMBS
+from shadowpuppet.motion.metrics import LIMB_JOINTS
 from shadowpuppet.motion.motion import JointTable
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",
@@ -198,9 +198,9 @@ DETECTORS = {
 def test_all_limbs_of_detectors_are_known(detector):
     names = DETECTORS[detector].split()
     table = renamed(JointTable(np.zeros(1), tuple(names), np.arange(3.0 * len(names)).reshape(1, -1, 3)))
-    assert {*LIMBS, "pelvis"} <= {*table.names}
+    assert {*LIMB_JOINTS, "pelvis"} <= {*table.names}
     assert ("neck" in table.names, "head" in table.names) == (detector != "COCO", False)
-    for name in LIMBS:
+    for name in LIMB_JOINTS:
         side, joint = name.split("_")
         there = f"{side[0].upper()}{joint.capitalize()}" if detector != "COCO" else name
         np.testing.assert_array_equal(table.select([name]).positions[0, 0], np.arange(3) + 3 * names.index(there))

@@ -12,7 +12,7 @@ import pytest
 import runs
 from damage import told_or_read
 
-from shadowpuppet.body.models import ALL
+from shadowpuppet.body.models import MODELS
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.files.npz import read_npz, write_npz
 from shadowpuppet.io.motion.motion_table import LENGTHS, motion_columns, table_columns, write_columns_csv
@@ -67,7 +67,7 @@ def test_a_run_as_columns_has_everything_with_units_in_the_names_and_nulls_in_ga
     np.testing.assert_array_equal(read_parquet(tmp_path / "a.parquet").positions, motion.joints)
 
 
-@pytest.mark.parametrize("name", sorted(ALL))
+@pytest.mark.parametrize("name", sorted(MODELS))
 def test_degrees_of_freedom_that_are_places_are_known_as_such(name):
     dofs = runs.body_of(name).skeleton.dofs
     assert {dof.name for dof in dofs if dof.kind == "translation"} == {dof.name for dof in dofs} & set(LENGTHS)

@@ -16,7 +16,7 @@ from vicon import c3d
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.motion.truth import names_in, read_truth
-from shadowpuppet.motion.metrics import LIMBS
+from shadowpuppet.motion.metrics import LIMB_JOINTS
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",
          **{f"{side}_{joint}": side[0].upper() + marker for side in ("left", "right") for joint, marker in
@@ -48,7 +48,7 @@ def test_bvh_is_read_with_its_unit(tmp_path):
     (tmp_path / "truth.bvh").write_text(biovision.person(6), "utf-8")
     with pytest.warns(ShadowPuppetWarning, match="centimetres"), pytest.warns(ShadowPuppetWarning, match=r"\+Y points up"):
         table = read_truth(tmp_path / "truth.bvh")
-    assert {*LIMBS} <= {*table.names}
+    assert {*LIMB_JOINTS} <= {*table.names}
 
 
 def test_joints_that_only_the_run_knows_by_that_name_are_kept(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion.interpolation import resampled, resampled_table
+from shadowpuppet.motion.interpolation import resample, resample_table
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.clips import mirrored, without_gaps
 
@@ -54,7 +54,7 @@ def test_a_joint_without_its_other_side_is_said():
 def test_smooth_motion_stays_the_same_motion(rate, most):
     """A swing of 0.3 m at 2 Hz, seen at 50 frames/s: to the millimetre; exact where the times are those of frames."""
     times = np.arange(100) / 50
-    wanted, values = resampled(times, 0.3 * np.sin(4 * np.pi * times + 1), rate)
+    wanted, values = resample(times, 0.3 * np.sin(4 * np.pi * times + 1), rate)
     np.testing.assert_allclose(np.diff(wanted), 1 / rate)
     assert (wanted[0], len(wanted)) == (0.0, int(1.98 * rate + 1e-9) + 1)
     np.testing.assert_allclose(values, 0.3 * np.sin(4 * np.pi * wanted + 1), atol=most)
@@ -66,7 +66,7 @@ def test_any_times_give_even_ones_within_and_straight_lines_stay_straight(frames
     rng = np.random.default_rng(seed)
     times = np.cumsum(0.005 + 0.1 * rng.random(frames)) - 1
     slope, at = rng.standard_normal((2, 2, 3))
-    wanted, values = resampled(times, at + times[:, None, None] * slope, rate)
+    wanted, values = resample(times, at + times[:, None, None] * slope, rate)
     assert wanted[0] == times[0]
     assert times[-1] - 1 / rate * (1 + 1e-6) < wanted[-1] <= times[-1]
     np.testing.assert_allclose(values, at + wanted[:, None, None] * slope, atol=1e-9)
@@ -77,7 +77,7 @@ def test_nothing_is_made_up_in_gaps():
     original = table(20)
     original.positions[5:7, 2] = np.nan
     original.positions[19, 0] = np.nan
-    found = resampled_table(original, 100.0)
+    found = resample_table(original, 100.0)
     assert found.names == NAMES
     unknown = np.isnan(found.positions).all(2)
     assert np.isnan(found.positions).any(2).sum() == unknown.sum()
@@ -87,7 +87,7 @@ def test_nothing_is_made_up_in_gaps():
 
 
 def test_a_single_known_frame_stays():
-    wanted, values = resampled([0.0, 0.1, 0.2], [np.nan, 4.0, np.nan], 10.0)
+    wanted, values = resample([0.0, 0.1, 0.2], [np.nan, 4.0, np.nan], 10.0)
     np.testing.assert_allclose(wanted, [0, 0.1, 0.2])
     np.testing.assert_array_equal(values, [np.nan, 4.0, np.nan])
 
@@ -95,13 +95,13 @@ def test_a_single_known_frame_stays():
 @pytest.mark.parametrize(("times", "values"), [([], []), ([0.0, 1.0], [1.0]), ([0.0, 0.0], [1.0, 1.0]), ([0.0, np.nan], [1.0, 1.0])])
 def test_times_that_do_not_fit_are_said(times, values):
     with pytest.raises(ShadowPuppetError, match=r"times: found .* expected a finite, increasing one for each value"):
-        resampled(times, values, 5.0)
+        resample(times, values, 5.0)
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, np.nan, np.inf])
 def test_rates_that_cannot_be_are_said(rate):
     with pytest.raises(ShadowPuppetError, match=r"rate: found .* expected frames a second, more than zero"):
-        resampled([0.0, 1.0], [1.0, 1.0], rate)
+        resample([0.0, 1.0], [1.0, 1.0], rate)
 
 
 # Gaps

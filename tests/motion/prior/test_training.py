@@ -16,7 +16,7 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
-from shadowpuppet.motion.prior.training import GLOBAL, matched, modelled, train_prior
+from shadowpuppet.motion.prior.training import GLOBAL_DOFS, matched, modelled, train_prior
 
 FEW = PriorSettings(regions=6, starts=1)
 
@@ -34,7 +34,7 @@ def test_a_made_gait_is_known_afterwards(learnt):
     _, poses = walk(60, start=0.4, turn=2.0)
     skeleton = make_body("anatomical", average_sizes("anatomical", 1.75)).skeleton
     prior = learnt.prior
-    assert prior.names == tuple(name for name in skeleton.dof_names if name not in GLOBAL)
+    assert prior.names == tuple(name for name in skeleton.dof_names if name not in GLOBAL_DOFS)
     assert (len(prior.names), prior.rate, len(prior.subspaces)) == (28, 60.0, 15)
     mine = poses[:, skeleton.dof_indices(prior.names)]
     swinging = mine.std(0) > 0.02

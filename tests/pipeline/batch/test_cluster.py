@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from pathlib import Path
 
-import made
 import pytest
 
 from shadowpuppet.errors import ShadowPuppetError
@@ -16,11 +14,6 @@ from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("default")  # theirs are not ours
 QUICK = make_grid({"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}})
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory) -> Path:
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
 
 
 @pytest.fixture(scope="module")

@@ -6,17 +6,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from people import camera, random_poses
+from people import BODIES, camera, random_poses
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePrior, sizes_from_height
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.body.upper_body import BODIES
 from shadowpuppet.camera.rasterize import Picture, place, unpack
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.person import wrong_posture
-from shadowpuppet.tracking.monocular.initialization import POSTURES, Fit, find_person, fit_references, refine
+from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, find_person, fit_references, refine
 from shadowpuppet.tracking.monocular.settings import InitializationSettings
-from shadowpuppet.tracking.monocular.size_search import Bodies, Guess, Hypotheses
+from shadowpuppet.tracking.monocular.size_search import LinearBodies, PersonEstimate, SizeSearch
 from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
 
 CAMERA = camera((320, 240))
@@ -26,7 +25,7 @@ SOMEONE = AVERAGE.with_values(
     torso_bottom_depth=1.2 * AVERAGE.torso_bottom_depth, upper_arm_length=1.05 * AVERAGE.upper_arm_length,
 )  # fmt: skip
 """Taller in the arm and stouter than the average."""
-TRUE = Guess(SOMEONE, 1.78, 2.8, 0.15)
+TRUE = PersonEstimate(SOMEONE, 1.78, 2.8, 0.15)
 QUICK = InitializationSettings(rounds=15, sweeps=2)
 
 
@@ -35,11 +34,11 @@ def reach(sizes: CardboxSizes) -> float:
     return sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length
 
 
-def crown(guess: Guess) -> float:
+def crown(guess: PersonEstimate) -> float:
     return guess.elevation + guess.sizes.torso_height + guess.sizes.neck_gap + guess.sizes.head_height
 
 
-def seen(pose: np.ndarray, body: str = "rounded", guess: Guess = TRUE) -> np.ndarray:
+def seen(pose: np.ndarray, body: str = "rounded", guess: PersonEstimate = TRUE) -> np.ndarray:
     """The mask of a pose, with legs that begin a little inside the waist."""
     picture = guess.picture(CAMERA, body)
     legs = picture.legs(pose, spread=np.radians(4))
@@ -53,7 +52,7 @@ def references(body: str = "rounded") -> dict[str, np.ndarray]:
 
 
 @cache
-def fitted(body: str = "rounded", settings: InitializationSettings = InitializationSettings(), **known: float) -> Fit:  # noqa: B008
+def fitted(body: str = "rounded", settings: InitializationSettings = InitializationSettings(), **known: float) -> SizeFit:  # noqa: B008
     return fit_references(np.random.default_rng(0), CAMERA, references(body), body=body, settings=settings, **known)
 
 
@@ -104,7 +103,7 @@ def test_sizes_are_found_where_height_and_distance_are_known(body):
 
 def test_algorithm_1_improves_on_proportions():
     fit = fitted(height=1.78, distance=2.8)
-    average = Guess(sizes_from_height(1.78), 1.78, 2.8, crown(TRUE) - crown(Guess(sizes_from_height(1.78), 0, 0, 0)))
+    average = PersonEstimate(sizes_from_height(1.78), 1.78, 2.8, crown(TRUE) - crown(PersonEstimate(sizes_from_height(1.78), 0, 0, 0)))
     costs = [sum(silhouette_costs(view, Observation.without_legs(mask, view, pose), pose[None])[0]
                  for mask, pose in zip(references().values(), fit.poses))
              for view in (fit.guess.picture(CAMERA), average.picture(CAMERA))]  # fmt: skip
@@ -136,7 +135,7 @@ def test_without_either_the_average_is_taken():
 
 def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
     """From one search to the next the cost may rise: where the legs are, is looked up anew."""
-    original, searches = Hypotheses.search, []
+    original, searches = SizeSearch.search, []
 
     def search(of, rng, columns, pictures, settings, sigma, scale=True):
         observations, before = of.observe(), of.vector
@@ -144,7 +143,7 @@ def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
         searches.append((curve, *(of.costs(v[None], pictures, observations)[0] for v in (before, of.vector))))
         return curve
 
-    monkeypatch.setattr(Hypotheses, "search", search)
+    monkeypatch.setattr(SizeSearch, "search", search)
     fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=QUICK)
     assert len(searches) == QUICK.sweeps * len(SUBSETS)
     for curve, before, after in searches:
@@ -193,11 +192,11 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
     names, masks = list(POSTURES), list(references().values())
     poses = np.array([BODIES["rounded"](SOMEONE).skeleton.pose(torso_y=0.3 * i, **POSTURES[name]) for i, name in enumerate(names)])
     no_prior = InitializationSettings(prior_weight=0.0, posture_weight=0.0)
-    of = Hypotheses(CAMERA, masks, poses, TRUE, SizePrior(1.78), no_prior, "rounded")
+    of = SizeSearch(CAMERA, masks, poses, TRUE, SizePrior(1.78), no_prior, "rounded")
     here, there = of.vector[None].copy(), of.vector[None].copy()
     there[:, of.columns([], distance=True)[0]] -= farther
     moved = there.copy()
-    of.scale(moved, of.vector)
+    of.scale_with_distance(moved, of.vector)
     assert moved[0, 0] == pytest.approx(SOMEONE.head_width * (2.8 + farther) / 2.8)
     scaled, left, as_it_was = (of.costs(v, range(3), of.observe())[0] for v in (moved, there, here))
     assert left > as_it_was + 1000
@@ -208,7 +207,7 @@ def test_who_is_drawn_farther_away_is_drawn_taller_so_that_the_picture_stays(far
 def test_who_was_taken_for_small_and_near_becomes_taller_and_farther(seed):
     """The picture is the same for both; only the height that is known tells them apart."""
     share = 1.5 / 1.78
-    near = Guess(CardboxSizes.from_array(SOMEONE.to_array() * share), 1.78, 2.8 * share, 0.15 * share)
+    near = PersonEstimate(CardboxSizes.from_array(SOMEONE.to_array() * share), 1.78, 2.8 * share, 0.15 * share)
     pose = BODIES["rounded"](SOMEONE).skeleton.pose
     poses = np.array([pose(torso_y=0.3 * i * share, **angles) for i, angles in enumerate(POSTURES.values())])
     fit = refine(np.random.default_rng(seed), CAMERA, near, list(references().values()), poses, free_distance=True, settings=QUICK)
@@ -329,7 +328,7 @@ def standing(gap: slice | None = None, feet: int = 240, width: int = 24) -> np.n
 def counted(mask: np.ndarray) -> np.ndarray:
     """Rows in which the middle of the silhouette counts."""
     pose = BODIES["rounded"](SOMEONE).skeleton.pose(**POSTURES["front_t_pose"])[None]
-    of = Hypotheses(CAMERA, [mask], pose, TRUE, SizePrior(1.78), QUICK, "rounded")
+    of = SizeSearch(CAMERA, [mask], pose, TRUE, SizePrior(1.78), QUICK, "rounded")
     middle = round(float(np.flatnonzero(TRUE.picture(CAMERA).legs(pose[0], spread=0.0)[-1]).mean()))
     ignored = unpack(of.observe()[0].ignore, 320)
     return np.flatnonzero(mask[:, middle] & ~ignored[:, middle])
@@ -431,8 +430,58 @@ def test_costs_of_many_sizes_are_those_of_bodies_built_one_by_one(body, rng):
     mask = TRUE.picture(CAMERA, body).mask(poses[0])
     ignore = rng.random(mask.shape) < 0.1
     root = place(CAMERA, 2.8, 0.15)
-    found = Bodies(body).costs(CAMERA, root, Observation.of(mask, ignore), poses, many, shift)
+    found = LinearBodies(body).costs(CAMERA, root, Observation.of(mask, ignore), poses, many, shift)
     for n, sizes in enumerate(many):
         at = place(CAMERA, 2.8 - shift[n, 0], 0.15 + shift[n, 1])
         alone = Picture(BODIES[body](CardboxSizes.from_array(sizes)), CAMERA, at)
         assert abs(found[n] - silhouette_costs(alone, Observation.of(mask, ignore), poses[n : n + 1])[0]) <= 2
+
+
+# Where a search begins, and how it narrows -----------------------------------------------------------------------------
+
+BRIEF = InitializationSettings(hypotheses=2, rounds=1, sweeps=1)
+"""Hardly any search: what comes back is where it began."""
+
+
+def test_with_a_distance_alone_people_of_all_heights_are_tried():
+    child = PersonEstimate(sizes_from_height(1.2), 1.2, 2.0, -0.2)
+    mask = seen(BODIES["rounded"](child.sizes).skeleton.pose(left_shoulder_abduction=0.3, right_shoulder_abduction=0.2), guess=child)
+    found = find_person(np.random.default_rng(0), CAMERA, [mask], distance=2.0, settings=BRIEF).guess
+    assert found.distance == 2.0
+    assert found.height == pytest.approx(1.2, abs=0.1)
+
+
+def test_arms_over_the_head_are_not_taken_for_the_head():
+    pose = BODIES["rounded"](SOMEONE).skeleton.pose(left_shoulder_abduction=2.4, right_shoulder_abduction=2.4)
+    mask = seen(pose)
+    found = find_person(np.random.default_rng(0), CAMERA, [mask], height=1.78, distance=2.8, settings=BRIEF)
+    assert crown(found.guess) == pytest.approx(crown(TRUE), abs=0.08)
+    assert min(found.overlaps.values()) > 0.6
+
+
+def test_each_sweep_halves_the_noise_and_frees_the_arms_after_the_first(monkeypatch):
+    asked = []
+
+    def search(self, rng, columns, pictures, settings, sigma, scale=True):
+        asked.append((pictures[0], len(columns), sigma))
+        return [1.0]
+
+    monkeypatch.setattr(SizeSearch, "search", search)
+    settings = InitializationSettings(sigma=0.08, sweeps=3)
+    fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=settings)
+    o1, o2, o3 = (len(sizes) + 2 for sizes in SUBSETS.values())  # and up, and the place to the side
+    sizes = [[o1, o2, o3]] + 2 * [[o1 + len(SUBSETS["O3"]), o2, o3]]
+    assert asked == [(k, sizes[sweep][k], 0.08 / 2**sweep) for sweep in range(3) for k in range(3)]
+
+
+def test_a_search_s_noise_shrinks_from_round_to_round(monkeypatch):
+    drawn = []
+    poses = np.array([BODIES["rounded"](SOMEONE).skeleton.pose(**POSTURES["front_t_pose"])])
+    settings = InitializationSettings(hypotheses=2000, share=1.0, shrink=0.5, rounds=4, prior_weight=0.0)
+    search = SizeSearch(CAMERA, [references()["front_t_pose"]], poses, TRUE, SizePrior(1.78), settings, "rounded")
+    monkeypatch.setattr(search, "costs", lambda vectors, *_: (drawn.append(vectors), np.arange(len(vectors), dtype=float))[1])
+    columns = search.columns(["torso_height", "waist_height"])
+    search.search(np.random.default_rng(0), columns, [0], settings, 0.02, scale=False)
+    np.testing.assert_allclose([vectors[1:, columns].std(0).mean() for vectors in drawn], 0.02 * 0.5 ** np.arange(4), rtol=0.05)
+    others = np.setdiff1d(np.arange(drawn[0].shape[1]), columns)
+    assert all((vectors[:, others] == vectors[:1, others]).all() for vectors in drawn)

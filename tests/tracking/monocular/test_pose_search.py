@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from people import camera, picture
+from people import BODIES, camera, picture
 
 from shadowpuppet.body.segments import coarse_arms, parts_of
-from shadowpuppet.body.upper_body import BODIES, SIDES
-from shadowpuppet.tracking.monocular.pose_search import search
+from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 LIBRARY = coarse_arms()
@@ -50,7 +50,7 @@ def test_an_arm_s_parts(body):
 def test_who_stands_in_a_coarse_pose_is_found(left, right, y):
     pose = np.array([y, 0, 0, 0, *LIBRARY[left], *LIBRARY[right]])
     mask = VIEW.mask(pose)
-    found = search(VIEW, mask)
+    found = search_pose(VIEW, mask)
     assert abs(found.pose[0] - y) < 0.03
     assert overlap(VIEW, found.pose, mask) > 0.85
     assert found.cost <= 0.15 * mask.sum()
@@ -60,14 +60,14 @@ def test_level_arms_are_found_to_the_pixel():
     straight = np.radians([90, 0, 0, 5])
     step = np.linspace(-1, 1, 161) * 2.5 / 2 / 0.87  # the places that are tried
     pose = np.array([step[95], 0, 0, 0, *straight, *straight])
-    found = search(VIEW, VIEW.mask(pose))
+    found = search_pose(VIEW, VIEW.mask(pose))
     np.testing.assert_allclose(found.pose, pose, atol=1e-9)
     assert found.cost == 0
 
 
 def test_all_arms_come_back_the_best_first():
     mask = VIEW.mask(np.array([0.1, 0, 0, 0, *LIBRARY[100], *LIBRARY[200]]))
-    found = search(VIEW, mask)
+    found = search_pose(VIEW, mask)
     assert list(found.limbs) == ["left_arm", "right_arm"]
     for side, arms in zip(SIDES, found.limbs.values()):
         np.testing.assert_array_equal(arms[0], found.pose[VIEW.body.skeleton.dof_indices(
@@ -79,18 +79,18 @@ def test_legs_do_not_count():
     view = picture("rounded", camera((160, 200)), elevation=0.3)
     pose = np.array([0.2, 0, 0, 0, *LIBRARY[40], *LIBRARY[60]])
     mask = view.mask(pose)
-    bare, dressed = search(view, mask), search(view, mask | view.legs(pose, spread=np.radians(10)))
+    bare, dressed = search_pose(view, mask), search_pose(view, mask | view.legs(pose, spread=np.radians(10)))
     assert overlap(view, dressed.pose, mask) > overlap(view, bare.pose, mask) - 0.05
     assert dressed.cost < 1.3 * bare.cost + 50
 
 
 def test_same_mask_same_pose():
     mask = VIEW.mask(np.array([0.1, 0.3, 0, 0, *LIBRARY[7], *LIBRARY[300]]))
-    np.testing.assert_array_equal(search(VIEW, mask).pose, search(VIEW, mask.copy()).pose)
+    np.testing.assert_array_equal(search_pose(VIEW, mask).pose, search_pose(VIEW, mask.copy()).pose)
 
 
 def test_nobody_is_found_where_nobody_is_but_a_pose_comes_back():
     for mask in (np.zeros((120, 160), bool), np.ones((120, 160), bool)):
-        found = search(VIEW, mask)
+        found = search_pose(VIEW, mask)
         assert np.isfinite(found.pose).all()
         assert overlap(VIEW, found.pose, mask) < 0.5

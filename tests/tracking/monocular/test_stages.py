@@ -7,6 +7,7 @@ import pytest
 from people import camera, picture, random_poses
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.tracking.monocular.extended_stage import ExtendedStage, make_stage
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, evaluate
@@ -17,7 +18,7 @@ FLAT = "torso+left_arm+right_arm"
 
 
 def stage(name: str = "left_arm", preset: str = "liu2011", body: str = "cardbox", size=(160, 120), **overrides) -> FilterStage:
-    return FilterStage(picture(body, camera(size)), make_settings(preset, overrides), name)
+    return make_stage(picture(body, camera(size)), make_settings(preset, overrides), name)
 
 
 def names(of: FilterStage) -> list[str]:
@@ -35,6 +36,13 @@ def test_the_paper_s_stages_of_four_dof_and_table_i_s_noise():
     np.testing.assert_array_equal(torso.sigma, [0.02, 0.1, 0.1, 0.1])
     np.testing.assert_array_equal(left.sigma, [0.25] * 4)
     assert [s.number for s in (torso, left, right)] == [200] * 3
+
+
+@pytest.mark.parametrize("name", ["torso", "left_arm", FLAT])
+def test_the_paper_s_stages_have_none_of_our_additions(name):
+    assert type(stage(name)) is FilterStage
+    for addition in ({"explore": 1}, {"motion_weight": 1.0}, {"posture_weight": 1.0}, {"estimate": "mean"}):
+        assert type(stage(name, **addition)) is ExtendedStage
 
 
 @pytest.mark.parametrize(("name", "number", "dofs"), [
@@ -104,7 +112,8 @@ def test_poses_from_afar_are_tried_beside_in_the_first_cycle_of_a_stage_of_one_p
 @pytest.mark.parametrize("sigma", [0.1, 0.02])
 def test_the_torso_is_explored_near_where_it_is_and_upright(sigma, rng):
     """Also where angles and places have the same deviation."""
-    part = stage("torso", torso={"sigma_rotation": sigma, "sigma_translation": 0.02})
+    part = stage("torso", explore=1, torso={"sigma_rotation": sigma, "sigma_translation": 0.02})
+    assert isinstance(part, ExtendedStage)
     tried = part.explore(rng, np.array([0.9, 0.5, 0.5, 0.5]), 4000)
     np.testing.assert_allclose(tried.mean(0), [0.9, 0, 0, 0], atol=0.03)
     np.testing.assert_allclose(tried.std(0), [0.1, 0.3, 0.3, 0.3], rtol=0.1)
@@ -149,7 +158,7 @@ def test_unusual_postures_cost_their_strain(rng):
     pose, values = np.zeros(12), rng.standard_normal((10, 4))
     observation = Observation.of(plain.picture.mask(pose))
     more = pulled.weigh(observation, pose, pose)(values)[0] - plain.weigh(observation, pose, pose)(values)[0]
-    np.testing.assert_allclose(more, 7 / 4 * plain.picture.body.skeleton.strain(plain.put(pose, values)))
+    np.testing.assert_allclose(more, 7 / 4 * plain.picture.body.skeleton.posture_penalty(plain.put(pose, values)))
 
 
 @pytest.mark.parametrize(("name", "points"), [

@@ -12,7 +12,7 @@ from people import camera, picture
 
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, TrackingError
-from shadowpuppet.tracking.monocular.pose_search import search
+from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, make_settings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
@@ -77,7 +77,7 @@ def test_a_wave_is_followed(preset, body):
 def test_the_start_settles_on_what_the_search_found_roughly(preset):
     mask = wave(1)[1][0]
     of = tracker(preset)
-    found = search(of.picture, mask)
+    found = search_pose(of.picture, mask)
     rough = of.observe(mask, found.pose).cost_and_overlap(of.picture.draw(found.pose))[0]
     assert of.start(np.random.default_rng(0), mask).cost < 0.6 * rough
 

@@ -9,18 +9,17 @@ import pytest
 from people import camera
 
 from shadowpuppet.body.anthropometry import sizes_from_height
-from shadowpuppet.body.models import average_sizes, make_body, whole_from_upper
-from shadowpuppet.body.segments import steady
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body, whole_from_upper
+from shadowpuppet.body.segments import keep_limb_directions
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.person_rig import prepare_puppet
-from shadowpuppet.tracking.monocular.initialization import Fit, as_whole, find_person
+from shadowpuppet.tracking.monocular.initialization import SizeFit, as_whole, find_person
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
-from shadowpuppet.tracking.monocular.size_search import Guess
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
-from shadowpuppet.tracking.monocular.whole_body import whole_person
+from shadowpuppet.tracking.monocular.whole_body import whole_from_estimate
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 CAMERA = camera((200, 240), focal=1.0)
@@ -33,12 +32,12 @@ def picture(name: str, far: float = FAR, up: float = -0.1, **widths: float) -> P
     return Picture(make_body(name, average_sizes(name, HEIGHT).with_values(**widths)), CAMERA, place(CAMERA, far, up))
 
 
-def upper_of(view: Picture, far: float = FAR) -> Guess:
+def upper_of(view: Picture, far: float = FAR) -> PersonEstimate:
     """What an upper body of the same person would be found like: its neck at the same place, if it is found so far away."""
     sizes = sizes_from_height(HEIGHT)
     neck = view.points(view.body.skeleton.pose()[None], names=["neck"])[0, 0]
     height = -neck[1] / neck[2] * far
-    return Guess(sizes, HEIGHT, far, height - sizes.torso_height)
+    return PersonEstimate(sizes, HEIGHT, far, height - sizes.torso_height)
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -58,9 +57,9 @@ def test_the_soles_tell_the_distance(name, told):
     view = picture(name)
     mask = view.mask(view.body.skeleton.pose(**ARMS[name]))
     assert not mask[-2:].any()
-    found = whole_person(CAMERA, [mask], upper_of(view, told * FAR), name)
+    found = whole_from_estimate(CAMERA, [mask], upper_of(view, told * FAR), name)
     assert found.distance == pytest.approx(FAR, rel=0.08)  # the toes of who is near are seen under the ankles
-    given = whole_person(CAMERA, [mask], upper_of(view, told * FAR), name, distance=told * FAR)
+    given = whole_from_estimate(CAMERA, [mask], upper_of(view, told * FAR), name, distance=told * FAR)
     assert given.distance == told * FAR
 
 
@@ -70,7 +69,7 @@ def test_whose_feet_are_cut_off_stays_where_the_upper_body_was(name):
     mask = view.mask(view.body.skeleton.pose(**ARMS[name]))
     cut = np.concatenate([np.zeros((80, 200), bool), mask[:-80]])
     assert cut[-1].any()
-    assert whole_person(CAMERA, [cut], upper_of(view, 3.0), name).distance == 3.0
+    assert whole_from_estimate(CAMERA, [cut], upper_of(view, 3.0), name).distance == 3.0
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -79,17 +78,17 @@ def test_widths_follow_the_clothes_and_given_sizes_are_kept(name):
             if size in average_sizes(name, HEIGHT).names()}  # fmt: skip
     view = picture(name, **wide)
     mask = view.mask(view.body.skeleton.pose(**ARMS[name]))
-    found = whole_person(CAMERA, [mask], upper_of(view), name)
+    found = whole_from_estimate(CAMERA, [mask], upper_of(view), name)
     assert found.sizes.thigh_width > 1.1 * average_sizes(name, HEIGHT).thigh_width
     given = average_sizes(name, HEIGHT)
-    assert whole_person(CAMERA, [mask], upper_of(view), name, given).sizes is given
+    assert whole_from_estimate(CAMERA, [mask], upper_of(view), name, given).sizes is given
 
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_a_fit_of_the_upper_body_is_carried_over(name):
     view = picture(name)
     mask = view.mask(view.body.skeleton.pose(**ARMS[name]))
-    fit = as_whole(CAMERA, [mask], Fit(upper_of(view), {"O1": ()}, {"0": 0.9}, np.zeros((1, 12))), name)
+    fit = as_whole(CAMERA, [mask], SizeFit(upper_of(view), {"O1": ()}, {"0": 0.9}, np.zeros((1, 12))), name)
     assert (fit.curves, fit.overlaps) == ({"O1": ()}, {"0": 0.9})
     drawn = fit.guess.picture(CAMERA, name).draw(fit.poses[0])
     assert Observation.of(mask).cost_and_overlap(drawn)[1] > 0.75
@@ -125,9 +124,9 @@ def test_legs_stand_while_the_torso_turns(name, rng):
     poses = np.repeat(before[None], 5, axis=0)
     poses[:, 3:6] += 0.3 * rng.standard_normal((5, 3))
     legs = [skeleton.joint_index(f"{side}_{joint}") for side in ("left", "right") for joint in ("hip", "knee")]
-    stood = skeleton.forward(steady(skeleton, before, poses, ["left_leg", "right_leg"]))[:, legs, :, :3]
+    stood = skeleton.forward(keep_limb_directions(skeleton, before, poses, ["left_leg", "right_leg"]))[:, legs, :, :3]
     np.testing.assert_allclose(stood, np.repeat(skeleton.forward(before[None])[:, legs, :, :3], 5, axis=0), atol=1e-9)
-    np.testing.assert_array_equal(steady(skeleton, before, poses, []), poses)
+    np.testing.assert_array_equal(keep_limb_directions(skeleton, before, poses, []), poses)
 
 
 def swung(name: str) -> dict[str, float]:

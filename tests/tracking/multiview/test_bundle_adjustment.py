@@ -10,7 +10,7 @@ import pytest
 from scans import make_body as random_tree
 from scans import scan, some_pose
 
-from shadowpuppet.body.anthropometry import shares_of
+from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import ShadowPuppetError

@@ -6,12 +6,12 @@ import actor
 import numpy as np
 import pytest
 
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE
 from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import Evidence, Stage
 from shadowpuppet.tracking.multiview.pose_search import HEADINGS, placed, search
 from shadowpuppet.tracking.multiview.posture_prior import usual_postures
-from shadowpuppet.tracking.multiview.proposals import GLOBAL
+from shadowpuppet.tracking.multiview.proposals import GLOBAL_DOFS
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 
 
@@ -21,7 +21,7 @@ def test_postures_are_placed_where_the_points_are_in_all_directions(name):
     base = usual_postures(of.skeleton)[:3]
     found = placed(of, base, middle)
     assert found.shape == (3 * HEADINGS, len(of.skeleton.dofs))
-    root = of.skeleton.dof_indices(GLOBAL)
+    root = of.skeleton.dof_indices(GLOBAL_DOFS)
     turns = found[:, root[3]].reshape(3, HEADINGS)
     np.testing.assert_allclose(np.diff(turns), 2 * np.pi / HEADINGS)
     rest = np.setdiff1d(np.arange(found.shape[1]), root)

@@ -8,9 +8,9 @@ import actor
 import numpy as np
 import pytest
 
-from shadowpuppet.body.sizes import WHOLE
+from shadowpuppet.body.models import WHOLE
 from shadowpuppet.tracking.multiview.posture_prior import ARMS, BOUND, LEAST, LEGS, SEEN, WIDER, Usual, usual_arms, usual_postures
-from shadowpuppet.tracking.multiview.proposals import GLOBAL
+from shadowpuppet.tracking.multiview.proposals import GLOBAL_DOFS
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -20,7 +20,7 @@ def test_usual_postures_are_possible_and_differ(name):
     assert found.shape == (len(ARMS) ** 2 * len(LEGS), len(skeleton.dofs))
     np.testing.assert_array_equal(found, skeleton.clamp(found))
     assert len(np.unique(found.round(6), axis=0)) == len(found)
-    assert not found[:, skeleton.dof_indices(GLOBAL)].any()
+    assert not found[:, skeleton.dof_indices(GLOBAL_DOFS)].any()
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -57,8 +57,8 @@ def test_an_arm_s_postures_are_those_of_the_whole(name):
 def test_what_the_surface_shows_is_never_unusual(name, rng):
     """Arms and legs; nor are place and heading."""
     skeleton = actor.body(name).skeleton
-    usual, pose = Usual.of(skeleton), np.clip(skeleton.usual[0], *skeleton.limits)
-    moved = pose + rng.normal(0, 1, len(pose)) * np.array([dof.joint.startswith(SEEN) or dof.name in GLOBAL for dof in skeleton.dofs])
+    usual, pose = Usual.of(skeleton), np.clip(skeleton.rest_and_spread[0], *skeleton.limits)
+    moved = pose + rng.normal(0, 1, len(pose)) * np.array([dof.joint.startswith(SEEN) or dof.name in GLOBAL_DOFS for dof in skeleton.dofs])
     np.testing.assert_allclose(usual.strain(np.stack([pose, moved])), 0, atol=1e-12)
     for d, dof in enumerate(skeleton.dofs):
         if np.isfinite(usual.below[d]):

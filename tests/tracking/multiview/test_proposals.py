@@ -12,7 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.local_pca import Subspaces
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
-from shadowpuppet.tracking.multiview.proposals import EXPLORED, GLOBAL, MOVED, REACH, Proposals
+from shadowpuppet.tracking.multiview.proposals import EXPLORED, GLOBAL_DOFS, MOVED, REACH, Proposals
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 SKELETON = actor.body().skeleton
@@ -20,7 +20,7 @@ PLAIN = MultiviewSettings(method="particle_filter", velocity=0.0, defensive=0.25
 HYBRID = replace(PLAIN, method="hybrid", explore=0.0)
 D = len(SKELETON.dofs)
 POSE = actor.stance(SKELETON)
-ROOT = SKELETON.dof_indices(GLOBAL)
+ROOT = SKELETON.dof_indices(GLOBAL_DOFS)
 
 
 def prior_of(names, *, at=0.2, wide: float = 1e-3) -> MotionPrior:

@@ -9,9 +9,8 @@ import actor
 import numpy as np
 import pytest
 
-from shadowpuppet.body.anthropometry import shares_of
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.sizes import WHOLE, AnatomicalSizes
+from shadowpuppet.body.models import WHOLE, average_sizes, make_body, shares_of
+from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.bones import BONES
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import BLACK, MIDDLE, SIDES, SUBPIXEL, WHITE, in_colour, write_text
+from shadowpuppet.camera.drawing import BLACK, MIDDLE_COLOUR, SIDE_COLOURS, SUBPIXEL, WHITE, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.metrics import LOST
+from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import BLANK, JointTable
 from shadowpuppet.motion.synchronization import at_times, match, step_of
 from shadowpuppet.pipeline.footage import footage_of, opened
@@ -185,7 +185,7 @@ def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = Fal
         if len(ends) < 2 or not np.isfinite(ends).all():
             continue
         start, end = (tuple(np.clip(np.round(point * (1 << SUBPIXEL)), -(1 << 20), 1 << 20).astype(int).tolist()) for point in ends)
-        colour = SIDES.get(b.split("_")[0], MIDDLE) if own else WHITE
+        colour = SIDE_COLOURS.get(b.split("_")[0], MIDDLE_COLOUR) if own else WHITE
         for ink, extra in ((BLACK, 2), (colour, 0)):
             cv2.line(image, start, end, ink, max(1, round((4 if own else 1.6) * unit)) + extra, cv2.LINE_AA, SUBPIXEL)
 
@@ -245,7 +245,7 @@ def _off(of: Evaluation, n: int) -> tuple[tuple[str, float], ...]:
         return ()
     distance = np.where(of.errors.known[n], of.errors.distance[n], -1)
     order = [int(j) for j in np.argsort(-distance)[:3] if distance[j] >= 0]
-    return tuple((of.errors.names[j], LOST * 1000 if of.errors.lost[n, j] else float(1000 * distance[j])) for j in order)
+    return tuple((of.errors.names[j], LOST_ERROR * 1000 if of.errors.lost[n, j] else float(1000 * distance[j])) for j in order)
 
 
 def _tables(of: Evaluation, frame: int) -> list[tuple[JointTable, bool]]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.evaluation.report.html import definitions, plain, rows, table
 from shadowpuppet.evaluation.summary_text import WAYS, bones_words, clock_words, losses_words, said_root, world_words
-from shadowpuppet.motion.metrics import FAR, LOST
+from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 
 
 def cards(of: Evaluation) -> str:
@@ -27,7 +27,8 @@ def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
         yield "Posture alone", f"{aligned['rigid']:.1f}", "mm", "each frame moved and turned onto the truth"
         if "depth_mm" in errors:
             yield "Depth", f"{errors['depth_mm']:.1f}", "mm", f"along the camera's axis; {errors['plane_mm']:.1f} across it"
-        yield "Far off", f"{100 * errors['far']:.1f}", "%", f"of joints are over {1000 * FAR:.0f} mm off; worst {errors['max_mm']:.0f} mm"
+        yield "Far off", f"{100 * errors['far']:.1f}", "%", (
+                f"of joints are over {1000 * FAR_ERROR:.0f} mm off; worst {errors['max_mm']:.0f} mm")
         if moves:
             yield "Acceleration", f"{moves['run_m_s2']:.1f}", "m/s²", f"the truth's {moves['truth_m_s2']:.1f}: more is jitter"
     if measured["overlap"]["count"]:
@@ -59,7 +60,7 @@ def _notes(of: Evaluation, no_pictures: str) -> Iterator[tuple[bool, str]]:
                          "is moved and turned as a whole: are they in two worlds, or is the distance wrong? (--align)")
         if errors["lost"]:
             yield True, (f"{errors['lost']} of {errors['frames']} frames of the truth have no pose of the run; each joint counts "
-                         f"{1000 * LOST:.0f} mm there.")
+                         f"{1000 * LOST_ERROR:.0f} mm there.")
         if clock["offset_s"]:
             yield False, "Clock: " + clock_words(clock) + "."
         if clock.get("rival_s") is not None:
@@ -75,7 +76,7 @@ def joint_table(of: Evaluation) -> str:
     names = {"p50_mm": "median", "p90_mm": "90 %", "p95_mm": "95 %"}
     made = rows(((name.replace("_", " "), *(f"{row[key]:.1f}" for key in keys), f"{100 * row['far']:.1f} %")
                  for name, row in [*errors["joints"].items(), ("all", errors)]), sums=1)
-    return table(["mm", *(names.get(key, key.removesuffix("_mm")) for key in keys), f"over {1000 * FAR:.0f}"], made)
+    return table(["mm", *(names.get(key, key.removesuffix("_mm")) for key in keys), f"over {1000 * FAR_ERROR:.0f}"], made)
 
 
 def ways(of: Evaluation) -> str:
@@ -127,7 +128,7 @@ def meanings(of: Evaluation) -> str:
         root = plain(said_root(of.measured["aligned_mm"]))
         said = [
             ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
-                            f"has no pose, each joint counts {1000 * LOST:.0f} mm, so that leaving out bad frames never helps. "
+                            f"has no pose, each joint counts {1000 * LOST_ERROR:.0f} mm, so that leaving out bad frames never helps. "
                             "<span class=formula>rmse = √(mean of d²)</span>."),
             ("HumanEva", "The mean distance over 15 joints (pelvis, neck, head; shoulders, elbows, wrists, hips, knees, ankles) in each "
                          "frame, then over the frames (Sigal, Balan and Black 2010)."),

@@ -15,7 +15,7 @@ from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.animation import Y_UP, Animation
-from shadowpuppet.motion.interpolation import steady
+from shadowpuppet.motion.interpolation import uniform_sampling
 
 PLACES = "Xposition Yposition Zposition"
 LEAST_END = (0.0, 0.0, 0.0)
@@ -49,7 +49,7 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
 def in_step(path: Path, animation: Animation) -> tuple[float, Animation]:
     """Frames/s, and the animation at that rate with every frame known. Warns of what was made up."""
     try:
-        grid = steady(animation.times)
+        grid = uniform_sampling(animation.times)
         made = animation.at(grid.times if grid.frames is None else _own_times(animation, grid.times, grid.frames))
     except ShadowPuppetError as error:
         raise ShadowPuppetError(f"{path}: {error}") from None

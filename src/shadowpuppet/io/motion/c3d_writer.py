@@ -15,7 +15,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
-from shadowpuppet.motion.interpolation import resampled, steady
+from shadowpuppet.motion.interpolation import resample, uniform_sampling
 from shadowpuppet.motion.motion import JointTable
 
 MM = 1000.0
@@ -64,14 +64,14 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
 def _in_step(path: Path, times: Array, values: Array) -> tuple[float, Array]:
     """Frames/s, and values (K, C) of values (T, C) there."""
     try:
-        grid = steady(times)
+        grid = uniform_sampling(times)
     except ShadowPuppetError as error:
         raise ShadowPuppetError(f"{path}: {error}") from None
     if grid.frames is not None:
         return grid.rate, np.where((grid.frames >= 0)[:, None], values[np.maximum(grid.frames, 0)], np.nan)
     warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were found anew at {grid.rate:g} frames/s",
          ShadowPuppetWarning, stacklevel=3)  # fmt: skip
-    return grid.rate, resampled(times, values, grid.rate)[1]
+    return grid.rate, resample(times, values, grid.rate)[1]
 
 
 def _points(places: Array, deviations: Array) -> Array:

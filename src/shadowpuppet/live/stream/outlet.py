@@ -10,7 +10,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, whole_sizes_from_height
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, SOLE
+from shadowpuppet.body.models import whole_sizes_from_bones
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.geometry import Array
@@ -67,7 +68,7 @@ class Subject:
     @cached_property
     def pelvis_height(self) -> float:
         """Metres from the floor to the pelvis of who stands upright: by proportions."""
-        sizes = whole_sizes_from_height(AnatomicalSizes, self.height or AVERAGE_HEIGHT)
+        sizes = whole_sizes_from_bones(AnatomicalSizes, {}, (self.height or AVERAGE_HEIGHT) - SOLE)
         return sizes.hip_drop + sizes.thigh_length + sizes.shank_length + sizes.ankle_height
 
     def told(self, frame: MotionFrame, age: float = np.nan) -> Told:

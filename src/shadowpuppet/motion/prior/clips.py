@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.interpolation import _runs
+from shadowpuppet.motion.interpolation import true_runs
 from shadowpuppet.motion.motion import JointTable
 
 SIDES = {"left_": "right_", "right_": "left_"}
@@ -29,7 +29,7 @@ def mirrored(table: JointTable) -> JointTable:
 def without_gaps(values: ArrayLike, shortest: int = 2) -> list[Array]:
     """The parts of a clip (T, D) in which every number is known, those of `shortest` frames or more."""
     values = np.asarray(values, float)
-    return [values[start:end] for start, end in _runs(np.isfinite(values).reshape(len(values), -1).all(1)) if end - start >= shortest]
+    return [values[start:end] for start, end in true_runs(np.isfinite(values).reshape(len(values), -1).all(1)) if end - start >= shortest]
 
 
 def _other_side(name: str) -> str:

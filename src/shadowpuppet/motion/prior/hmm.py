@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import joined, kernel
+from shadowpuppet.jit import inline_kernel, kernel
 
 NEGLIGIBLE = -40.0
 """A term of a sum that is less than e^NEGLIGIBLE of its greatest changes no digit of it."""
@@ -45,7 +45,7 @@ def posterior(log_densities: ArrayLike, initial: ArrayLike, transitions: ArrayLi
     return Posterior(states / states.sum(1, keepdims=True), pairs, float(total))
 
 
-@joined
+@inline_kernel
 def _log_sum(terms):  # pragma: no cover
     """log(sum(exp(terms)))."""
     top, total = -np.inf, 0.0

@@ -12,10 +12,10 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.whole_body import GLOBAL
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.interpolation import resampled, resampled_table
+from shadowpuppet.motion.interpolation import resample, resample_table
 from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.clips import mirrored, without_gaps
@@ -89,7 +89,7 @@ def train_prior(rng: np.random.Generator, tables: Mapping[str, JointTable], sett
 
 def modelled(skeleton: Skeleton, dofs: str = "articulation") -> tuple[str, ...]:
     """DOF that a prior of a whole body models: `articulation` is all but place and heading, `all` is all, as in the paper."""
-    return tuple(name for name in skeleton.dof_names if dofs == "all" or name not in GLOBAL)
+    return tuple(name for name in skeleton.dof_names if dofs == "all" or name not in GLOBAL_DOFS)
 
 
 def matched(prior: MotionPrior, skeleton: Skeleton, rate: float) -> MotionPrior:
@@ -115,7 +115,7 @@ def reconstruction_errors(prior: MotionPrior, clips: Sequence[Clip]) -> tuple[fl
         body = clip.fitted.body
         columns = body.skeleton.dof_indices(prior.names)
         for part in clip.parts:
-            again, held = part.copy(), body.skeleton.dof_indices(GLOBAL)
+            again, held = part.copy(), body.skeleton.dof_indices(GLOBAL_DOFS)
             again[:, columns] = prior.reconstruct(prior.encode(part[:, columns]))
             squares.append(((again - part)[:, columns] ** 2).ravel())
             again[:, held] = part[:, held]
@@ -136,11 +136,11 @@ def _clip(name: str, table: JointTable, body: str, rate: float) -> Clip:
     known = np.flatnonzero(np.isfinite(table.positions).all(2).any(0))
     table = table.select([table.names[n] for n in known])
     slower = len(table.times) < 2 or np.median(np.diff(table.times)) >= 1 / rate
-    table = table if slower else resampled_table(table, rate)
+    table = table if slower else resample_table(table, rate)
     fitted = fit_poses(table, body, source=name)
     _check_fit(name, fitted)
     complete = np.asarray(np.isfinite(table.positions).all((1, 2)))
-    poses = resampled(fitted.times, np.where(complete[:, None], fitted.poses, np.nan), rate)[1]
+    poses = resample(fitted.times, np.where(complete[:, None], fitted.poses, np.nan), rate)[1]
     return Clip(name, fitted, without_gaps(poses))
 
 

@@ -1,4 +1,4 @@
-"""A person's sizes and place: by published body proportions, and from silhouettes in known postures (Liu 2011, Algorithm 1)."""
+"""A person's sizes and place from silhouettes: in known postures (Liu 2011, Algorithm 1), or in any with the help of body proportions."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from itertools import product
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, SOLE, SizePrior, sizes_from_height, stature_of
-from shadowpuppet.body.models import Make, make_body
-from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, WHOLE, BoneSizes, CardboxSizes, Sizes, expected_metres, is_within
+from shadowpuppet.body.models import WHOLE, Make, make_body
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, SUBSETS, BoneSizes, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.camera.rasterize import place
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.monocular.pose_search import beside, search
+from shadowpuppet.tracking.monocular.pose_search import align_sideways, search_pose
 from shadowpuppet.tracking.monocular.settings import InitializationSettings
-from shadowpuppet.tracking.monocular.size_search import Guess, Hypotheses
-from shadowpuppet.tracking.monocular.whole_body import whole_person
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate, SizeSearch
+from shadowpuppet.tracking.monocular.whole_body import whole_from_estimate
 
 POSTURES: Mapping[str, Mapping[str, float]] = {
     "front_t_pose": {"left_shoulder_abduction": np.pi / 2, "right_shoulder_abduction": np.pi / 2},
@@ -28,46 +28,46 @@ POSTURES: Mapping[str, Mapping[str, float]] = {
 }
 """The known postures d_ref of the reference pictures, for O1, O2 and O3 in this order."""
 POSTURE_OF = dict(zip(SUBSETS, POSTURES, strict=True))
-"""The posture that each subset of sizes is fitted in."""
-THICK = 1 / 60
-"""Pixels that a row or column of a person has at least, as a share of the picture's height: specks and lines have less."""
-NEAREST, FARTHEST = 0.3, 2.0
-"""A distance that is told, over that at which the upper body (nearest), or the whole person or their level arms (farthest), look as
-large as in a reference: outside these it is wrong. Wide, for arms may hang, and a part of the person may be outside the picture."""
+"""The posture in which each subset of sizes is fitted."""
+THINNEST_ROW = 1 / 60
+"""Least pixels of a row or column of a person, as a share of the picture's height: specks and lines have less."""
+MIN_DISTANCE_RATIO, MAX_DISTANCE_RATIO = 0.3, 2.0
+"""Range of a plausible given distance, relative to that at which the upper body (nearest), or the whole person or level arms (farthest),
+have the size in the reference. Wide: arms may hang, and a part of the person may be outside the picture."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """A guess after it was fitted to pictures."""
+class SizeFit:
+    """A person fitted to pictures."""
 
-    guess: Guess
+    guess: PersonEstimate
     curves: Mapping[str, tuple[tuple[float, ...], ...]]
-    """For each subset of sizes, and of these for each search after another, the least cost (pixels) after every round."""
+    """For each subset of sizes and each of its searches, the least cost (pixels) after every round."""
     overlaps: Mapping[str, float]
-    """For each picture, intersection over union of the drawn body and the silhouette, legs left out."""
+    """For each picture, intersection over union of the drawn body and the silhouette, without legs."""
     poses: Array
-    """Poses (K, D) of the pictures."""
+    """Poses (K, D) in the pictures."""
 
 
 def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping[str, Mask], *, height: float | None = None,
-                   distance: float | None = None, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> Fit:
+                   distance: float | None = None, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> SizeFit:
     """Algorithm 1: sizes from masks (H, W) of a person in the known postures `POSTURES`.
 
-    Height (m, shoes on) or distance (m) fixes the scale; the average height is taken without either. The person may stand anywhere
-    to the side and the torso's place is found with the sizes. Raises `TrackingError` where a posture is unknown, a mask is not of the
-    camera's size, empty or nearly all of the picture, or height or distance cannot be.
+    Height (m, shoes on) or distance (m) fixes the scale; without either the average height is assumed. The person may stand anywhere
+    sideways: the torso's place is found with the sizes. Raises `TrackingError` for an unknown posture, a mask that has not the camera's
+    size, is empty or nearly all of the picture, or an impossible height or distance.
     """
     settings = settings or InitializationSettings()
     _check_scale(height, distance)
-    seen = _checked(camera, references)
-    names, masks = list(seen), list(seen.values())
-    guess = _first_guess(camera, names[0], masks[0], height, distance)
-    skeleton = make_body("cardbox", guess.sizes).skeleton
+    checked = _checked(camera, references)
+    names, masks = list(checked), list(checked.values())
+    initial = _initial_estimate(camera, names[0], masks[0], height, distance)
+    skeleton = make_body("cardbox", initial.sizes).skeleton
     poses = np.array([skeleton.pose(**POSTURES[name]) for name in names])
-    picture = guess.picture(camera, body)
-    poses = np.array([beside(picture, mask, pose) for mask, pose in zip(masks, poses, strict=True)])
+    picture = initial.picture(camera, body)
+    poses = np.array([align_sideways(picture, mask, pose) for mask, pose in zip(masks, poses, strict=True)])
     side = skeleton.dof_indices(["torso_y"])
-    hypotheses = Hypotheses(camera, masks, poses, guess, SizePrior(guess.height), settings, body)
+    search = SizeSearch(camera, masks, poses, initial, SizePrior(initial.height), settings, body)
     curves: dict[str, list[tuple[float, ...]]] = {}
     for sweep in range(settings.sweeps):
         for subset, sizes in SUBSETS.items():
@@ -78,22 +78,21 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
                 continue
             k = names.index(view)
             free = [*sizes, *(SUBSETS["O3"] if subset == "O1" and sweep else ())]
-            columns = np.concatenate([hypotheses.columns(free, distance=distance is None and subset != "O2"),
-                                      hypotheses.pose_columns(k, side)])
-            curve = hypotheses.search(rng, columns, [k], settings, settings.sigma / 2**sweep)
+            columns = np.concatenate([search.columns(free, distance=distance is None and subset != "O2"),
+                                      search.pose_columns(k, side)])
+            curve = search.search(rng, columns, [k], settings, settings.sigma / 2**sweep)
             curves.setdefault(subset, []).append(tuple(curve))
-    return _fit(hypotheses, names, curves)
+    return _fit(search, names, curves)
 
 
 def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], *, height: float | None = None,
                 distance: float | None = None, sizes: Sizes | None = None, body: str | Make = "rounded",
-                settings: InitializationSettings | None = None) -> Fit:
+                settings: InitializationSettings | None = None) -> SizeFit:
     """Place and sizes without references, from masks (H, W) of the first seconds in any posture.
 
-    The sizes are the average person's of the height (m, shoes on), or those given; places are tried with coarse poses in the first
-    masks; then sizes, place and poses are fitted together, but for sizes that were given. `body`: a name, or a function that makes a
-    body of `CardboxSizes`. Raises `TrackingError` where there is nobody in the masks, one is not of the camera's size, or height or
-    distance cannot be.
+    Initial sizes are the average person's for the height (m, shoes on), or those given; places are tried with coarse poses in the first
+    masks; then place, poses and, unless given, sizes are fitted together. `body`: a name, or a function of `CardboxSizes`. Raises
+    `TrackingError` if no mask shows a person or one has not the camera's size, or for an impossible height or distance.
     """
     settings = settings or InitializationSettings()
     if isinstance(body, str) and body in WHOLE:
@@ -101,20 +100,22 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     assert sizes is None or isinstance(sizes, CardboxSizes)
     _check_scale(height, distance)
     checked = [check_mask(mask, camera.size, f"mask {k} of the first seconds") for k, mask in enumerate(masks)]
-    seen = [mask for mask in checked if may_be_person(mask)]
-    if not seen:
+    usable = [mask for mask in checked if may_be_person(mask)]
+    if not usable:
         raise TrackingError("nobody is found: the silhouettes of the first seconds are empty, or nearly all of the picture")
-    guesses = [guess for k in sorted({0, len(seen) // 2}) for guess in _places(camera, seen[k], height, distance, sizes)]
-    watched = [seen[k] for k in sorted({0, len(seen) // 2, len(seen) - 1})]
-    costs = [sum(search(guess.picture(camera, body), mask).cost for mask in watched) for guess in guesses]
-    guess = guesses[int(np.argmin(costs))]
-    poses = np.array([search(guess.picture(camera, body), mask).pose for mask in seen])
-    return refine(rng, camera, guess, seen, poses, free_sizes=sizes is None, free_distance=distance is None, body=body, settings=settings)
+    first, middle, last = 0, len(usable) // 2, len(usable) - 1
+    candidates = [each for k in sorted({first, middle}) for each in _candidates(camera, usable[k], height, distance, sizes)]
+    compared = [usable[k] for k in sorted({first, middle, last})]
+    costs = [sum(search_pose(each.picture(camera, body), mask).cost for mask in compared) for each in candidates]
+    initial = candidates[int(np.argmin(costs))]
+    poses = np.array([search_pose(initial.picture(camera, body), mask).pose for mask in usable])
+    return refine(rng, camera, initial, usable, poses, free_sizes=sizes is None, free_distance=distance is None, body=body,
+                  settings=settings)
 
 
 def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None,
-                sizes: Sizes | None, body: str, settings: InitializationSettings) -> Fit:
-    """A whole body: the upper one is found first, for the legs may not be in the picture."""
+                sizes: Sizes | None, body: str, settings: InitializationSettings) -> SizeFit:
+    """A whole body: the upper one is fitted first, since the legs may be outside the picture."""
     assert sizes is None or isinstance(sizes, BoneSizes)
     if height is None and sizes is not None:
         height = stature_of(dict(zip(sizes.names(), sizes.to_array().tolist()))) + SOLE
@@ -122,50 +123,47 @@ def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     return as_whole(camera, list(filter(may_be_person, masks)), fit, body, sizes, distance)
 
 
-def as_whole(camera: Camera, masks: Sequence[Mask], fit: Fit, body: str, sizes: BoneSizes | None = None,
-             distance: float | None = None) -> Fit:
-    """The fit of an upper body as that of a whole one, with poses anew; sizes and distance (m), too, where they are not given.
-
-    Overlaps stay the upper body's: they tell how well the person was measured.
-    """
-    guess = whole_person(camera, masks, fit.guess, body, sizes, distance)
+def as_whole(camera: Camera, masks: Sequence[Mask], fit: SizeFit, body: str, sizes: BoneSizes | None = None,
+             distance: float | None = None) -> SizeFit:
+    """The fit of an upper body turned into that of a whole one, with new poses, and new sizes and distance (m) unless given. Overlaps
+    stay the upper body's: they show how well the person was measured."""
+    guess = whole_from_estimate(camera, masks, fit.guess, body, sizes, distance)
     picture = guess.picture(camera, body)
-    return replace(fit, guess=guess, poses=np.array([search(picture, mask).pose for mask in masks]))
+    return replace(fit, guess=guess, poses=np.array([search_pose(picture, mask).pose for mask in masks]))
 
 
-def refine(rng: np.random.Generator, camera: Camera, guess: Guess, masks: Sequence[Mask], poses: Array, *, free_sizes: bool = True,
-           free_distance: bool = False, body: str | Make = "rounded", settings: InitializationSettings | None = None) -> Fit:
-    """Sizes, place and poses fitted to masks (H, W), in turn, with poses (K, D) to begin with.
-
-    What straight arms do not tell apart (shoulder, upper arm, forearm), bent ones do.
-    """
+def refine(rng: np.random.Generator, camera: Camera, initial: PersonEstimate, masks: Sequence[Mask], poses: Array, *,
+           free_sizes: bool = True, free_distance: bool = False, body: str | Make = "rounded",
+           settings: InitializationSettings | None = None) -> SizeFit:
+    """Sizes, place and poses fitted to masks (H, W) in turn, from initial poses (K, D). Bent arms separate sizes that straight arms do
+    not (shoulder, upper arm, forearm)."""
     settings = settings or InitializationSettings()
-    hypotheses = Hypotheses(camera, masks, np.array(poses, float), guess, SizePrior(guess.height), settings, body)
-    every, dofs = range(len(masks)), np.arange(poses.shape[1])
-    columns = hypotheses.columns(CardboxSizes.names() if free_sizes else (), distance=free_distance)
+    search = SizeSearch(camera, masks, np.array(poses, float), initial, SizePrior(initial.height), settings, body)
+    pictures, dofs = range(len(masks)), np.arange(poses.shape[1])
+    columns = search.columns(CardboxSizes.names() if free_sizes else (), distance=free_distance)
     curves: list[tuple[float, ...]] = []
     for sweep in range(settings.sweeps):
-        for k in every:
-            hypotheses.search(rng, hypotheses.pose_columns(k, dofs), [k], settings, 0.2 / 2**sweep)
-        curves.append(tuple(hypotheses.search(rng, columns, every, settings, settings.sigma / 2**sweep, scale=free_sizes)))
-    return _fit(hypotheses, [str(k) for k in every], {"all": curves})
+        for k in pictures:
+            search.search(rng, search.pose_columns(k, dofs), [k], settings, 0.2 / 2**sweep)
+        curves.append(tuple(search.search(rng, columns, pictures, settings, settings.sigma / 2**sweep, scale=free_sizes)))
+    return _fit(search, [str(k) for k in pictures], {"all": curves})
 
 
-def _fit(hypotheses: Hypotheses, names: Sequence[str], curves: Mapping[str, list[tuple[float, ...]]]) -> Fit:
-    """Hypotheses as they stand."""
-    overlaps = dict(zip(names, hypotheses.overlaps(), strict=True))
-    return Fit(hypotheses.current(), {subset: tuple(each) for subset, each in curves.items()}, overlaps, hypotheses.poses().copy())
+def _fit(search: SizeSearch, names: Sequence[str], curves: Mapping[str, list[tuple[float, ...]]]) -> SizeFit:
+    """The current state of a search."""
+    overlaps = dict(zip(names, search.overlaps(), strict=True))
+    return SizeFit(search.estimate(), {subset: tuple(each) for subset, each in curves.items()}, overlaps, search.poses().copy())
 
 
 def _check_scale(height: float | None, distance: float | None) -> None:
-    """Raise `TrackingError` where a height or a distance cannot be."""
+    """Raise `TrackingError` for an impossible height or distance."""
     for name, value, limits in (("height", height, HEIGHTS), ("distance", distance, DISTANCES)):
         if value is not None and not is_within(value, limits):
             raise TrackingError(f"{name}: found {shown(value)}, {expected_metres(value, limits)}")
 
 
 def _checked(camera: Camera, references: Mapping[str, Mask]) -> dict[str, Mask]:
-    """The masks, in the order of `POSTURES`. Raises `TrackingError` where one cannot be used."""
+    """The masks in the order of `POSTURES`. Raises `TrackingError` for one that cannot be used."""
     if not references or set(references) - set(POSTURES):
         raise TrackingError(f"references: found {choices(references)}; the known postures are: {choices(POSTURES)}")
     masks = {name: check_mask(references[name], camera.size, f"references: {name}") for name in POSTURES if name in references}
@@ -178,8 +176,9 @@ def _checked(camera: Camera, references: Mapping[str, Mask]) -> dict[str, Mask]:
     return masks
 
 
-def _places(camera: Camera, mask: Mask, height: float | None, distance: float | None, sizes: CardboxSizes | None) -> list[Guess]:
-    """People of plausible sizes at plausible places, with the crown at the mask's upper edge or, for raised arms, under it."""
+def _candidates(camera: Camera, mask: Mask, height: float | None, distance: float | None,
+                sizes: CardboxSizes | None) -> list[PersonEstimate]:
+    """People of plausible sizes at plausible places, the crown at the mask's upper edge or, for raised arms, below it."""
     top = np.flatnonzero(mask.any(1))[0]
     centre = np.flatnonzero(mask.any(0)).mean()
     known = height is not None or sizes is not None or distance is None
@@ -191,12 +190,12 @@ def _places(camera: Camera, mask: Mask, height: float | None, distance: float | 
         of = sizes or sizes_from_height(tall)
         crown = of.torso_height + of.neck_gap + of.head_height
         for raised in (0.0, 0.1, 0.25, 0.4):
-            out.append(Guess(of, tall, far, float(ray / ray[2] * far @ up) - crown - raised * tall))
+            out.append(PersonEstimate(of, tall, far, float(ray / ray[2] * far @ up) - crown - raised * tall))
     return out
 
 
 def _span(sizes: CardboxSizes) -> float:
-    """From one hand's end to the other's, arms level, metres."""
+    """From one hand's end to the other's with level arms, metres."""
     return 2 * (sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length)
 
 
@@ -206,24 +205,23 @@ def _upper(sizes: CardboxSizes) -> float:
 
 
 def _check_distance(distance: float, tall: float, focal: float, name: str, mask: Mask) -> None:
-    """Raise `TrackingError` where nobody so `tall` (m) who is so far away (m) looks as large as the mask of the posture `name`."""
-    thick = max(round(THICK * len(mask)), 2)
+    """Raise `TrackingError` if a person of stature `tall` (m) at a distance (m) cannot have the size of the mask of the posture `name`."""
+    thick = max(round(THINNEST_ROW * len(mask)), 2)
     along = (np.flatnonzero(counts >= min(thick, counts.max())) for counts in (mask.sum(0), mask.sum(1)))
     wide, high = (max(int(found[-1] - found[0]), 1) for found in along)
     sizes = sizes_from_height(tall)
     least = focal * _upper(sizes) / high
     most = focal * tall / high if name == "side_arms_hanging" else focal * _span(sizes) / wide
-    for end, wrong in ((f"least {least:.1f}", distance < NEAREST * least), (f"most {most:.1f}", distance > FARTHEST * most)):
+    too_near, too_far = distance < MIN_DISTANCE_RATIO * least, distance > MAX_DISTANCE_RATIO * most
+    for end, wrong in ((f"least {least:.1f}", too_near), (f"most {most:.1f}", too_far)):
         if wrong:
             raise TrackingError(f"distance: found {distance:g} metres, expected at {end}, by how large a person of {tall:.2f} m is in "
                                 f"{name}")
 
 
-def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, distance: float | None) -> Guess:
-    """Sizes from the height, and the place where a body of these sizes has its crown where the mask of the posture `name` has.
-
-    Raises `TrackingError` where nobody who is so far away looks as large as in the mask.
-    """
+def _initial_estimate(camera: Camera, name: str, mask: Mask, height: float | None, distance: float | None) -> PersonEstimate:
+    """Sizes from the height, and the place that puts the crown of such a body at that of the mask of the posture `name`. Raises
+    `TrackingError` for a distance that contradicts the size in the mask."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     focal, tall, aside = camera.matrix[0, 0], height or AVERAGE_HEIGHT, name == "side_arms_hanging"
     if distance is not None:
@@ -238,4 +236,4 @@ def _first_guess(camera: Camera, name: str, mask: Mask, height: float | None, di
     up = place(camera, 0.0, 0.0)[:3, 2]
     crown = down / abs(down[2]) * far
     elevation = float(crown @ up) - (sizes.torso_height + sizes.neck_gap + sizes.head_height)
-    return Guess(sizes, tall, far, elevation)
+    return PersonEstimate(sizes, tall, far, elevation)

@@ -1,4 +1,4 @@
-"""A pose from one silhouette and no earlier pose: coarse poses are tried, part after part."""
+"""A pose from one silhouette without an earlier one: coarse postures are tried, one body part after the other."""
 
 from __future__ import annotations
 
@@ -12,14 +12,16 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost, silhouette_costs
 
-GOOD = 40
-"""So many of the coarse postures of a limb that were tried, the best, are worth beginning a filter's particles around."""
-SIDEWAYS = ("torso_y", "root_y")
+BEST_LIMBS = 40
+"""Number of a limb's best coarse postures that a filter's first particles start from."""
+SIDEWAYS_DOFS = ("torso_y", "root_y")
 """The DOF that moves a body sideways."""
+PLACES = 161
+"""Positions across the picture's width that are tried, an odd number."""
 
 
-class FirstPose(NamedTuple):
-    """What the search found."""
+class CoarsePose(NamedTuple):
+    """Result of the search."""
 
     pose: Array
     """The best pose, of shape (D,)."""
@@ -29,18 +31,16 @@ class FirstPose(NamedTuple):
     """For each arm and leg all postures tried, (K, d), the best first."""
 
 
-def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
-    """The upright pose, facing the camera, and the coarse limbs of least cost (eq. 2) in a mask (H, W); of an upper body legs do not count.
-
-    The torso is moved sideways with no arms drawn, then each arm is tried with the other not drawn, and once more with it; then the
-    legs, of a body that has any, which stand straight till then.
-    """
+def search_pose(picture: Picture, mask: NDArray[np.bool_]) -> CoarsePose:
+    """The upright pose, facing the camera, and the coarse limbs of least cost (eq. 2) in a mask (H, W); legs do not count for an upper
+    body. The torso is moved sideways without arms, then each arm is tried without the other, and the first once more with both; then the
+    legs of a whole body, which are straight until then."""
     skeleton = picture.body.skeleton
     arms, legs = ([limb for limb in limbs_of(skeleton) if limb.endswith(kind)] for kind in ("arm", "leg"))
     hidden = {arm: parts_of(picture.body, arm) for arm in arms}
     sideways, poses = _sideways(picture, np.zeros(len(skeleton.dofs)))
-    torso = PartialCost(picture, sideways, hidden=sum(hidden.values(), []))
-    pose = poses[np.argmin(torso.costs(Observation.without_legs(mask, picture, poses[80]), poses[80])(poses))]
+    torso, centred = PartialCost(picture, sideways, hidden=sum(hidden.values(), [])), poses[PLACES // 2]
+    pose = poses[np.argmin(torso.costs(Observation.without_legs(mask, picture, centred), centred)(poses))]
     observation = Observation.without_legs(mask, picture, pose)
     tried: dict[str, Array] = {}
     least = np.inf
@@ -52,27 +52,25 @@ def search(picture: Picture, mask: NDArray[np.bool_]) -> FirstPose:
         costs = drawn.costs(observation, pose)(poses)
         ranked = np.argsort(costs, kind="stable")
         tried[limb], pose, least = library[ranked], poses[ranked[0]], float(costs[ranked[0]])
-    return FirstPose(pose, least, tried)
+    return CoarsePose(pose, least, tried)
 
 
-def beside(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
-    """A pose (D,) moved sideways to where its silhouette has the least cost in a mask (H, W), whatever else is in the mask.
-
-    What is seen of the legs counts wherever the body is: it is the same for all places.
-    """
+def align_sideways(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
+    """A pose (D,) moved sideways to the least cost in a mask (H, W), whatever else the mask shows. The legs' pixels count at every
+    place: they cost the same everywhere."""
     poses = _sideways(picture, pose)[1]
     return poses[np.argmin(silhouette_costs(picture, Observation.of(mask, np.zeros_like(mask)), poses))]
 
 
 def _sideways(picture: Picture, pose: Array) -> tuple[NDArray[np.int64], Array]:
-    """The DOF that moves the body sideways, and a pose (D,) at places (161, D) all over the picture's width."""
+    """The DOF that moves the body sideways, and the pose (D,) at positions (P, D) across the picture's width."""
     skeleton = picture.body.skeleton
-    sideways = skeleton.dof_indices([name for name in SIDEWAYS if name in skeleton.dof_names])
-    poses = np.repeat(pose[None], 161, axis=0)
+    sideways = skeleton.dof_indices([name for name in SIDEWAYS_DOFS if name in skeleton.dof_names])
+    poses = np.repeat(pose[None], PLACES, axis=0)
     poses[:, sideways[0]] = np.linspace(-1, 1, len(poses)) * _half_width(picture)
     return sideways, poses
 
 
 def _half_width(picture: Picture) -> float:
-    """Half of what the camera sees at the body's distance, metres."""
+    """Half the width visible at the body's distance, metres."""
     return abs(float(picture.T_camera_base[2, 3])) * picture.camera.size[0] / 2 / picture.camera.matrix[0, 0]

@@ -7,23 +7,24 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from shadowpuppet.body.models import BodyName
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
 
 
 def pixel_scale(size: tuple[int, int]) -> float:
-    """What settings in pixels, which are for 320 x 240, are multiplied by for pictures of another width and height."""
+    """Factor for settings in pixels, which hold for 320 x 240, at another width and height."""
     return size[0] * size[1] / (320 * 240)
 
 
 @checked
 class PartSettings:
-    """How one stage of the filter draws and weighs (a column of Liu 2011, Table I)."""
+    """Sampling and weighting of one stage (a column of Liu 2011, Table I)."""
 
     particles: Annotated[int, Field(ge=2, le=1_000_000)] = 200
     """Particles, N."""
     survival: Share = 0.2
-    """Share e of particles that live on in deterministic resampling."""
+    """Share e of particles that survive deterministic resampling."""
     sigma_rotation: Positive = 0.1
     """Noise of angles, sigma_beta (rad)."""
     sigma_translation: Positive = 0.02
@@ -36,8 +37,8 @@ class PartSettings:
 class MonocularSettings:
     """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
-    body: Literal["cardbox", "boxes", "rounded", "anatomical", "cylinders"] = "rounded"
-    """The body's model: of the upper body (the first three), or of the whole person, legs and all."""
+    body: BodyName = "rounded"
+    """The body's model: of the upper body (cardbox, boxes, rounded) or of the whole person."""
     resampling: Literal["deterministic", "stratified", "systematic", "multinomial", "residual"] = "deterministic"
     """DRS (Algorithm 4), SRS (Algorithm 3), or another scheme in SRS's place."""
     torso: PartSettings = PartSettings(particles=500)
@@ -45,34 +46,34 @@ class MonocularSettings:
     arm: PartSettings = PartSettings(particles=500, survival=0.4, sigma_rotation=0.25, sigma_cost=4000.0)
     """Each arm's stage."""
     stages: Annotated[tuple[str, ...], Field(min_length=1)] = ("torso", "left_arm", "right_arm")
-    """The filter's stages, in order; parts joined by + are moved at once ("torso+left_arm+right_arm" is a flat filter). Legs of a whole
-    body that no stage names follow."""
+    """The filter's stages, in order; parts joined by + are estimated together ("torso+left_arm+right_arm" is a flat filter). Legs of a
+    whole body that no stage names follow."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
-    """Estimation cycles a frame. More of them fit the silhouette closer, but not the person: many particles in one cycle do better."""
+    """Estimation cycles a frame. More fit the silhouette closer, but not the person: many particles in one cycle do better."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
-    """The noise of each cycle is that of the last times this."""
+    """The noise is multiplied by this from cycle to cycle."""
     explore: Annotated[int, Field(ge=0, le=100_000)] = 500
-    """Poses from all over a part's range that are tried beside the particles, in each frame's first cycle."""
+    """Candidates from a part's whole range, added to the particles in each frame's first cycle."""
     rank_by: Literal["last", "new"] = "last"
-    """Costs that rank and weigh before resampling: as known from the last picture, or measured again in the new one (eq. 8 as it is
-    printed), which doubles the evaluations."""
+    """Costs that rank and weigh before resampling: those of the last picture, or measured again in the new one (eq. 8 as printed), which
+    doubles the evaluations."""
     torso_arms: Literal["last", "hidden"] = "hidden"
-    """How the torso's stage draws the arms: as last estimated, carried along, or not at all."""
+    """How the torso's stage draws the arms: as last estimated, moving with the torso, or not at all."""
     estimate: Literal["best", "mean"] = "mean"
     """A cycle's estimate: the particle of least cost, or the weighted mean of all."""
     motion_weight: NonNegative = 200.0
-    """Pull of shoulders, elbows and hands to where they were (pixels per m^2, at 320 x 240). Holds what the picture does not show,
+    """Pull of shoulders, elbows and hands to their last positions (pixels per m^2, at 320 x 240). Holds what the picture does not show,
     above all an arm's depth."""
     motion_reach: Positive = 0.3
-    """From about this distance on (m) the pull grows no more: what plainly moved farther is found there."""
+    """Distance (m) from which the pull no longer grows, so that a clear movement is followed."""
     posture_weight: NonNegative = 20.0
-    """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.strain`)."""
+    """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.posture_penalty`)."""
     limits: bool = True
-    """Whether joint limits are kept."""
+    """Keep joint limits."""
     recover: bool = True
-    """Search afresh for who was lost, or comes back. The papers' filters go on from where they are."""
+    """Search again for a person who was lost, or comes back. The papers' filters go on from where they are."""
     ignore_legs: bool = True
-    """Leave out of the cost what is seen below the waist, where the model has no legs; of no use for a whole body."""
+    """Leave out of the cost the silhouette below the waist, where the model has no legs; without effect for a whole body."""
 
 
 PRESETS: dict[str, dict] = {
@@ -91,14 +92,12 @@ PRESETS: dict[str, dict] = {
         "posture_weight": 0.0,
     },
 }
-"""Named settings: "default", the best we know, and "liu2011", Table I's filter; what a preset leaves out is the default's."""
+"""Named settings: "default", the best known, and "liu2011", the filter of Table I; values that a preset leaves out are the default's."""
 
 
 def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None, source: str = "settings") -> MonocularSettings:
-    """A preset with some values replaced; tables (`torso`, `arm`) may be given in part.
-
-    Raises `SettingsError` for an unknown preset, an unknown name or an impossible value, with what is possible.
-    """
+    """A preset with some values replaced; tables (`torso`, `arm`) may be given in part. Raises `SettingsError` for an unknown preset or
+    name, or an impossible value, with the possible ones."""
     if preset not in PRESETS:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(PRESETS)}")
     return validate(MonocularSettings, _merge(_plain(MonocularSettings()), PRESETS[preset], overrides or {}), source)
@@ -106,25 +105,25 @@ def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None =
 
 @checked
 class InitializationSettings:
-    """How a person's sizes are found (Liu 2011, Algorithm 1). The paper draws with sigma = 0.05 throughout and knows no prior."""
+    """Search of a person's sizes (Liu 2011, Algorithm 1). The paper draws with sigma = 0.05 throughout and has no prior."""
 
     hypotheses: Annotated[int, Field(ge=2, le=100_000)] = 200
     """Hypotheses a round, M."""
     sigma: Positive = 0.05
     """Noise of the sizes, sigma_alpha (m)."""
     share: Annotated[float, Field(gt=0, le=1)] = 0.4
-    """Chance of each size to be drawn anew in a hypothesis; in the paper all are, always."""
+    """Probability of each size to be drawn anew in a hypothesis; 1 in the paper."""
     shrink: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """The noise of each round is that of the last times this."""
+    """The noise is multiplied by this from round to round."""
     prior_weight: NonNegative = 15.0
     """Pull of the sizes to published proportions (pixels per squared deviation, at 320 x 240)."""
     posture_weight: NonNegative = 10.0
-    """Pull to usual postures (pixels per squared deviation, at 320 x 240), where the postures are not known."""
+    """Pull to usual postures (pixels per squared deviation, at 320 x 240), if the postures are unknown."""
     tolerance: Share = 0.005
     """A subset is done when its cost has not improved by this share within `patience` rounds."""
     patience: Annotated[int, Field(ge=1)] = 15
     """See `tolerance`."""
     rounds: Annotated[int, Field(ge=1)] = 40
-    """Rounds at most, for each subset."""
+    """Most rounds for each subset."""
     sweeps: Annotated[int, Field(ge=1)] = 3
-    """How often the three subsets are gone through."""
+    """Number of passes through the three subsets."""

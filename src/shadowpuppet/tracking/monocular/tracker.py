@@ -1,4 +1,4 @@
-"""The trackers: what is searched, in which order, by which parts of `particle_filter`."""
+"""The one-camera tracker of Liu 2011: Algorithm 2 over the stages of a hierarchical particle filter."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from shadowpuppet.camera.mask import Mask, check_mask
 from shadowpuppet.camera.rasterize import Picture, count
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular import pose_search
+from shadowpuppet.tracking.monocular.extended_stage import make_stage
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
@@ -22,12 +23,12 @@ from shadowpuppet.tracking.status import ABSENT, SETTLE_CYCLES, status_of
 
 
 class State(NamedTuple):
-    """What a tracker knows after a frame; all that the next one needs."""
+    """The tracker's state after a frame: all that the next frame needs."""
 
     pose: Array
     """The estimate, of shape (D,)."""
     particles: tuple[Particles, ...]
-    """One set a stage; its poses are the values of the stage's DOF."""
+    """One set a stage, in the order of `stages`; its poses hold the stage's DOF only."""
     cost: float
     """Eq. 2 of the estimate, pixels."""
     overlap: float
@@ -38,10 +39,8 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MonocularTracker:
-    """Liu 2011: the posture of a body in one camera's silhouettes, by a hierarchical particle filter (Algorithm 2).
-
-    Causal: a frame's pose uses no later frame. The same generator state and masks give the same poses.
-    """
+    """Liu 2011: tracks a body in one camera's silhouettes by a hierarchical particle filter (Algorithm 2). Causal: no pose uses a later
+    frame. The same generator state and masks give the same poses."""
 
     picture: Picture
     settings: MonocularSettings = field(default_factory=MonocularSettings)
@@ -65,30 +64,30 @@ class MonocularTracker:
         return after
 
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
-        """Algorithm 2's loop body on a mask (H, W), `cycles` times: stage by stage resample, diffuse, weigh (Algorithms 3, 4)."""
-        pose, particles = state.pose, list(state.particles)
-        observation = self.observe(mask, pose, also)
+        """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
+        last, particles = state.pose, list(state.particles)
+        estimate, observation = last, self.observe(mask, last, also)
         for cycle in range(self.settings.cycles):
-            around = pose  # what a stage does not move, as it was before: the arms do not see each other's news
+            others = estimate  # the DOF outside a stage: the torso's new estimate counts at once, one limb's does not for the others
             for i, stage in enumerate(self.stages):
-                weigh = stage.weigh(observation, around, state.pose)
-                known = evaluate(particles[i].poses, weigh) if self.settings.rank_by == "new" else particles[i]
-                particles[i] = step(rng, known, resample=stage.resample, propose=stage.propose(cycle), weigh=weigh, number=stage.number)
-                pose = stage.put(pose, stage.estimate(particles[i]))
-                around = pose if stage.moves_torso else around
-        return self.judge(pose, particles, observation)
+                weigh = stage.weigh(observation, others, last)
+                ranked = evaluate(particles[i].poses, weigh) if self.settings.rank_by == "new" else particles[i]  # eq. 8 as printed
+                particles[i] = step(rng, ranked, resample=stage.resample, propose=stage.propose(cycle), weigh=weigh, number=stage.number)
+                estimate = stage.put(estimate, stage.estimate(particles[i]))
+                others = estimate if stage.moves_torso else others
+        return self.judge(estimate, particles, observation)
 
     def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` where nobody is
         there. `also`, and what is raised: as `step`."""
         mask = check_mask(mask, self.picture.camera.size)
-        found = pose_search.search(self.picture, mask)
+        found = pose_search.search_pose(self.picture, mask)
         observation, particles = self.observe(mask, found.pose, also), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
             for limb, tried in found.limbs.items():
                 if limb in stage.parts:
-                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = tried[np.arange(stage.number) % pose_search.GOOD]
+                    poses[:, dofs_of(self.picture.body.skeleton, limb)] = tried[np.arange(stage.number) % pose_search.BEST_LIMBS]
             values = stage.clamp(diffuse(rng, poses[:, stage.dofs], stage.sigma))
             particles.append(evaluate(values, stage.weigh(observation, found.pose, found.pose)))
         state = self.judge(found.pose, particles, observation)
@@ -99,26 +98,26 @@ class MonocularTracker:
         return state
 
     def observe(self, mask: Mask, pose: Array, also: Cost | None = None) -> Observation:
-        """A mask (H, W), less the legs as they stand under `pose` (D,)."""
+        """The observation of a mask (H, W); with `ignore_legs` less the region where the legs of `pose` (D,) may be."""
         return Observation.without_legs(mask, self.picture, pose, also) if self.settings.ignore_legs else Observation.of(mask, also=also)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
-        """The state of a pose (D,), with its cost, overlap and status."""
+        """The state of an estimate (D,), with its cost, overlap and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
         return State(pose, tuple(particles), cost, overlap, status_of(overlap))
 
     def is_absent(self, mask: Mask, pose: Array) -> bool:
-        """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
+        """Whether a mask (H, W) is too small to show a person in `pose` (D,)."""
         return int(np.count_nonzero(mask)) < max(ABSENT * count(self.picture.draw(pose)), 1)
 
     @staticmethod
     def absent(state: State) -> State:
-        """The state while nobody is there: the pose waits."""
+        """The state while no person is visible: the pose is held."""
         return state._replace(cost=np.nan, overlap=0.0, status="absent")
 
     @cached_property
     def stages(self) -> tuple[FilterStage, ...]:
-        """The filter's stages, in order; legs that no stage names, of a body that has some, follow."""
+        """The filter's stages, in order; a whole body's legs that no stage names follow."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
-        return tuple(FilterStage(self.picture, self.settings, name, self.scheme) for name in (*named, *legs))
+        return tuple(make_stage(self.picture, self.settings, name, self.scheme) for name in (*named, *legs))

@@ -1,4 +1,4 @@
-"""A whole person before one camera, from what their upper body told: where they stand, and how stout they are in their clothes."""
+"""A whole person before one camera from the fit of an upper body: the distance from the soles, and widths that include clothes."""
 
 from __future__ import annotations
 
@@ -13,67 +13,65 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse, transform
-from shadowpuppet.tracking.monocular.pose_search import search
-from shadowpuppet.tracking.monocular.size_search import Guess
+from shadowpuppet.tracking.monocular.pose_search import search_pose
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.silhouette_cost import Observation
 
-FEET = 2
-"""A person whose silhouette reaches the picture's last rows is cut off there."""
-FARTHER = np.arange(0.8, 1.5, 0.01)
-"""Distances that are tried, over that at which the upper body alone was found."""
-STOUTER = np.arange(0.75, 1.61, 0.05)
+CUT_OFF_ROWS = 2
+"""A silhouette that reaches this many last rows of the picture is cut off there."""
+DISTANCE_FACTORS = np.arange(0.8, 1.5, 0.01)
+"""Distances that are tried, relative to that of the upper body."""
+WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
-WIDTHS = (
+WIDTH_GROUPS = (
     ("pelvis_width", "waist_width", "chest_width", "trunk_width"),
     ("thigh_width", "knee_width", "calf_width", "ankle_width", "shank_width"),
     ("upper_arm_width", "elbow_width", "forearm_width", "wrist_width"),
 )
-"""Widths that clothes make larger together."""
+"""Widths that clothes enlarge together."""
 
 
-def whole_person(camera: Camera, masks: Sequence[Mask], upper: Guess, body: str, sizes: BoneSizes | None = None,
-                 distance: float | None = None) -> Guess:
-    """A whole body in place of an upper one, its neck where that has it, in masks (H, W) of someone who faces the camera.
-
-    Where the soles are seen, they tell the distance (m), if it is not given: trunk and arms alone told it worse, and clothes can make
-    them wide. Sizes that are given are kept.
-    """
+def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEstimate, body: str, sizes: BoneSizes | None = None,
+                        distance: float | None = None) -> PersonEstimate:
+    """A whole body in place of an upper one, necks at the same place, from masks (H, W) of a person facing the camera. The distance (m),
+    if not given, comes from visible soles: trunk and arms alone determine it worse, as clothes can make them wide. Given sizes are kept."""
     found = upper.sizes
     assert isinstance(found, CardboxSizes)
     whole: BoneSizes = sizes or whole_from_upper(body, found, upper.height)
     made = make_body(body, whole)
     neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
-    guess = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck)
-    soles = [np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-FEET:].any()]
+    estimate = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck)
+    soles = [np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()]
     if distance is None and soles:
-        farther = [_moved(guess, factor, neck) for factor in FARTHER]
-        guess = farther[int(np.argmin([abs(_soles(each.picture(camera, body), whole) - np.median(soles)) for each in farther]))]
-    return guess if sizes is not None else _dressed(camera, masks, guess, whole, body)
+        candidates = [_at_distance(estimate, factor, neck) for factor in DISTANCE_FACTORS]
+        rows = np.array([_soles_row(each.picture(camera, body), whole) for each in candidates])
+        estimate = candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
+    return estimate if sizes is not None else _with_clothes(camera, masks, estimate, whole, body)
 
 
-def _moved(guess: Guess, factor: float, neck: float) -> Guess:
-    """Someone of the same sizes so much farther away, whose neck, so high over the pelvis (m), looks as high."""
-    return replace(guess, distance=factor * guess.distance, elevation=factor * (guess.elevation + neck) - neck)
+def _at_distance(estimate: PersonEstimate, factor: float, neck: float) -> PersonEstimate:
+    """The person at `factor` times the distance, the neck, `neck` metres above the pelvis, at the same place in the picture."""
+    return replace(estimate, distance=factor * estimate.distance, elevation=factor * (estimate.elevation + neck) - neck)
 
 
-def _soles(picture: Picture, sizes: BoneSizes) -> float:
-    """The picture's row of the soles of who stands upright."""
+def _soles_row(picture: Picture, sizes: BoneSizes) -> float:
+    """The picture's row of the soles of the person standing upright."""
     camera, standing = picture.camera, picture.body.skeleton.pose()[None]
     soles = picture.points(standing, ["left_ankle", "right_ankle"])[0] - sizes.ankle_height * picture.T_camera_base[:3, 2]
     return float(camera.project(transform(inverse(camera.T_camera_world), soles))[:, 1].mean())
 
 
-def _dressed(camera: Camera, masks: Sequence[Mask], guess: Guess, sizes: BoneSizes, body: str) -> Guess:
-    """The guess with widths that cover the masks best, in poses that are found once."""
-    some = [masks[0], masks[-1]]
-    poses = [search(guess.picture(camera, body), mask).pose for mask in some]
-    for names in WIDTHS:
+def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str) -> PersonEstimate:
+    """The estimate with the widths that cover the masks best, in poses that are searched once."""
+    first_last = [masks[0], masks[-1]]
+    poses = [search_pose(estimate.picture(camera, body), mask).pose for mask in first_last]
+    for names in WIDTH_GROUPS:
         widths = {name: getattr(sizes, name) for name in names if name in sizes.names()}
-        tried = [sizes.with_values(**{name: factor * width for name, width in widths.items()}) for factor in STOUTER]
-        sizes = tried[int(np.argmin([_cost(camera, some, poses, replace(guess, sizes=each), body) for each in tried]))]
-    return replace(guess, sizes=sizes)
+        tried = [sizes.with_values(**{name: factor * width for name, width in widths.items()}) for factor in WIDTH_FACTORS]
+        sizes = tried[int(np.argmin([_silhouette_cost(camera, first_last, poses, replace(estimate, sizes=each), body) for each in tried]))]
+    return replace(estimate, sizes=sizes)
 
 
-def _cost(camera: Camera, masks: Sequence[Mask], poses: Sequence[Array], guess: Guess, body: str) -> float:
-    picture = guess.picture(camera, body)
+def _silhouette_cost(camera: Camera, masks: Sequence[Mask], poses: Sequence[Array], estimate: PersonEstimate, body: str) -> float:
+    picture = estimate.picture(camera, body)
     return sum(Observation.of(mask).cost_and_overlap(picture.draw(pose))[0] for mask, pose in zip(masks, poses, strict=True))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.whole_body import GLOBAL
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.observation import Evidence
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures
@@ -77,7 +77,7 @@ def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) ->
 def placed(body: Body, postures: Array, middle: Array) -> Array:
     """Postures (L, D) in all directions, each with its limbs' middle at `middle` (3,), world: of shape (L HEADINGS, D)."""
     poses = np.repeat(postures, HEADINGS, axis=0)
-    place, heading = body.skeleton.dof_indices(GLOBAL[:3]), body.skeleton.dof_indices(GLOBAL[3:])[0]
+    place, heading = body.skeleton.dof_indices(GLOBAL_DOFS[:3]), body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
     poses[:, place] = 0.0
     poses[:, heading] = np.tile(np.arange(HEADINGS) * 2 * np.pi / HEADINGS - np.pi, len(postures))
     limbs = body.limbs

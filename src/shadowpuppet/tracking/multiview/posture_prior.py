@@ -35,7 +35,7 @@ class Usual:
     @classmethod
     def of(cls, skeleton: Skeleton, library: Array | None = None) -> Usual:
         """As the skeleton has it; angles but the heading as the poses of a `library` (L, D), such as training motion, have it."""
-        rest, below, above = (np.array(each) for each in skeleton.usual)
+        rest, below, above = (np.array(each) for each in skeleton.rest_and_spread)
         if library is not None and len(library) > 1:
             known = np.isfinite(below)
             spread = np.maximum(WIDER * library.std(0), LEAST)

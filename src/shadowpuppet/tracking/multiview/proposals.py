@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.body.whole_body import GLOBAL
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
@@ -32,7 +32,7 @@ class Proposals:
                  else settings.sigma_rotation for dof in skeleton.dofs]  # fmt: skip
         self.sigma = np.array(sigma)
         self.owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs])
-        self.root = skeleton.dof_indices(GLOBAL)
+        self.root = skeleton.dof_indices(GLOBAL_DOFS)
         self.arms = [(skeleton.dof_indices(arm), np.stack(list(arm.values()), 1)) for arm in (usual_arms(skeleton, side)
                      for side in ("left", "right"))]  # fmt: skip
         self.modelled = np.zeros(0, np.int64)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from shadowpuppet.body.models import WholeBodyName
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
 
@@ -83,7 +84,7 @@ class ForceSettings:
 class MultiviewSettings:
     """The tracker of several cameras (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
 
-    body: Literal["anatomical", "cylinders"] = "anatomical"
+    body: WholeBodyName = "anatomical"
     """The body's model."""
     method: Literal["hybrid", "image_force", "particle_filter"] = "hybrid"
     """Particles that are refined, one that is refined from the last pose, or particles alone (Table II)."""

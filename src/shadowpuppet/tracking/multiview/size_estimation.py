@@ -12,7 +12,8 @@ from typing import Generic
 
 import numpy as np
 
-from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, shares_of, stature_of
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, stature_of
+from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import HEIGHTS, BoneSizes
 from shadowpuppet.camera.camera import Camera

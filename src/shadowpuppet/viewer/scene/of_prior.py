@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import ALL, average_sizes, make_body
+from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
@@ -48,12 +48,12 @@ def show_prior(path: Path, seed: int = 0) -> Show:
 
 def body_of(path: Path, prior: MotionPrior) -> Body:
     """The average person of the body whose degrees of freedom a prior names. Raises `FormatError` where there is none."""
-    for name in reversed(ALL):
+    for name in reversed(MODELS):
         body = make_body(name, average_sizes(name, AVERAGE_HEIGHT))
         if prior.names and set(prior.names) <= set(body.skeleton.dof_names):
             return body
     told = f"{prior.names[0]}, ..." if prior.names else "none"
-    raise FormatError(f"{path}: names: found {told}, expected degrees of freedom of one of {', '.join(ALL)}")
+    raise FormatError(f"{path}: names: found {told}, expected degrees of freedom of one of {', '.join(MODELS)}")
 
 
 def drawn_motion(rng: np.random.Generator, prior: MotionPrior, frames: int) -> Array:

@@ -11,8 +11,7 @@ from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.geometry import Array
-from shadowpuppet.motion.body_animation import fitted
+from shadowpuppet.geometry import Array, align
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
@@ -109,9 +108,9 @@ class Rerun:
 
     def _root(self) -> Array:
         """Where the body's frame stands in the world (4, 4)."""
-        known = np.isfinite(self.motion.poses).all(1) & np.isfinite(self.motion.joints).all((1, 2))
+        known = self.motion.known
         if not known.any():
             raise ShadowPuppetError("found no frame with a pose, expected one at least")
         columns = [self.motion.joint_names.index(name) for name in self.names]
         ours = self.body.points(self.motion.poses[known], names=self.names)
-        return fitted(ours.reshape(-1, 3), self.motion.joints[known][:, columns].reshape(-1, 3))
+        return align(ours.reshape(-1, 3), self.motion.joints[known][:, columns].reshape(-1, 3)).matrix

@@ -14,9 +14,8 @@ from scans import make_body as random_tree
 from scans import scan, some_pose
 
 from shadowpuppet.body.jacobian import place_one
-from shadowpuppet.body.models import average_sizes
+from shadowpuppet.body.models import WHOLE, average_sizes
 from shadowpuppet.body.models import make_body as make_named
-from shadowpuppet.body.sizes import WHOLE
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.bench import naive_multi as naive

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import part, summing
+from shadowpuppet.jit import device, reduction_kernel
 
 Single = NDArray[np.float32]
 LANES = 16
@@ -81,7 +81,7 @@ def constants(limbs: Limbs) -> Single:
     return out
 
 
-@part
+@device
 def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cover
     """Fill in frames, origins and middles of parts (S, NUMBERS) under transforms T (J, 3, 4), metres from `origin` (3,)."""
     for s in range(joints.size):
@@ -98,7 +98,7 @@ def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cove
                                + middle * numbers[6 + r])
 
 
-@summing
+@reduction_kernel
 def measure(q, rows, out):  # pragma: no cover
     """Of a group of points (7 LANES,) to one part q (NUMBERS,): out (8 LANES,) gets the signed distance, the cosine between the normals,
     the closest point (3) and its outward normal (3), all but the first two in the part's frame."""
@@ -110,7 +110,7 @@ def measure(q, rows, out):  # pragma: no cover
         out[5 * LANES + i], out[6 * LANES + i], out[7 * LANES + i] = ux, uy, uz
 
 
-@summing
+@reduction_kernel
 def _compete(q, number, rows, epsilon, near):  # pragma: no cover
     """Where part q is nearer to points of a group than `near` (2 LANES,) has it, put down its distance and its number."""
     one = np.float32(1)
@@ -123,7 +123,7 @@ def _compete(q, number, rows, epsilon, near):  # pragma: no cover
         near[i] = d if closer else near[i]
 
 
-@summing
+@reduction_kernel
 def nearest(parts, rows, sphere, epsilon, near):  # pragma: no cover
     """The distance d (1 - epsilon cos) of each point of a group to its nearest part, and the part's number: near (2 LANES,).
 
@@ -143,7 +143,7 @@ def nearest(parts, rows, sphere, epsilon, near):  # pragma: no cover
             worst = _greatest(near)
 
 
-@summing
+@reduction_kernel
 def _greatest(near):  # pragma: no cover
     """The greatest of near (LANES,)."""
     worst = near[0]
@@ -152,20 +152,20 @@ def _greatest(near):  # pragma: no cover
     return worst
 
 
-@part
+@device
 def foot(q, out, i):  # pragma: no cover
     """The closest point that `measure` found for point number i, metres from the cloud's origin."""
     u, v, w = out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i]
     return (q[0] * u + q[3] * v + q[6] * w + q[9], q[1] * u + q[4] * v + q[7] * w + q[10], q[2] * u + q[5] * v + q[8] * w + q[11])
 
 
-@part
+@device
 def _load(rows, i):  # pragma: no cover
     """Point and normal number i of a group."""
     return rows[i], rows[LANES + i], rows[2 * LANES + i], rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
 
 
-@part
+@device
 def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
     """Signed distance of a point to part q, cosine of the normals, closest point (3) and outward normal (3) in the part's frame."""
     one, nil, half = np.float32(1), np.float32(0), np.float32(1e-4)

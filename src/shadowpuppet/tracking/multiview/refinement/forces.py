@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from shadowpuppet.body.jacobian import STEP, TRANSLATION, place_one
-from shadowpuppet.jit import kernel, part
+from shadowpuppet.body.jacobian import MAX_STEP, TRANSLATION, place_one
+from shadowpuppet.jit import device, kernel
 from shadowpuppet.tracking.multiview.refinement.normal_equations import gather_down, sweep
 
 
-@part
+@device
 def _move_by_forces(pose, chain, T, screws, origin, sums, force, gains, step):  # pragma: no cover
     """Move a pose by the moments about its joints and the force on its root: each divided by the inertia of the points that it acts
     on, so that the step does not depend on how many there are."""
@@ -29,7 +29,7 @@ def _move_by_forces(pose, chain, T, screws, origin, sums, force, gains, step):  
         inertia = (xx + yy + zz) * length - along
         step[d] = gains[1] * (m0 * s[0] + m1 * s[1] + m2 * s[2]) / (inertia + 1e-4 * mass)
     for d in range(pose.size):
-        pose[d] = min(max(pose[d] + min(max(step[d], -STEP), STEP), chain.low[d]), chain.high[d])
+        pose[d] = min(max(pose[d] + min(max(step[d], -MAX_STEP), MAX_STEP), chain.low[d]), chain.high[d])
 
 
 @kernel

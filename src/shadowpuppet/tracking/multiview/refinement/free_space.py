@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.projection import NEAR, bend_within, make_lens
+from shadowpuppet.camera.projection import NEAR_PLANE, bend_within, make_lens
 from shadowpuppet.geometry import Array
-from shadowpuppet.jit import kernel, part
+from shadowpuppet.jit import device, kernel
 
 APART = 0.07
 """Spheres on a limb's axis are about this far apart, metres."""
@@ -95,11 +95,11 @@ def _distances(mask: Mask) -> tuple[NDArray[np.float32], int, int]:
     x, y, width, height = cv2.boundingRect(seen)
     left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
     seen = seen[top : y + height + MARGIN, left : x + width + MARGIN]
-    outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - seen, seen))
+    outside, inside = (cv2.distanceTransform(device, cv2.DIST_L2, 3) for device in (1 - seen, seen))
     return np.asarray(outside - inside, np.float32), left, top
 
 
-@part
+@device
 def _look_up(fields, window, x, y):  # pragma: no cover
     """Distance to the outline at a pixel (x, y), by bilinear interpolation, and its derivatives along x and y."""
     width, height = window[3], window[4]
@@ -116,7 +116,7 @@ def _look_up(fields, window, x, y):  # pragma: no cover
     return distance, along, down
 
 
-@part
+@device
 def _placed(T, place):  # pragma: no cover
     """A point of a joint's frame, in the world."""
     return (T[0, 0] * place[0] + T[0, 1] * place[1] + T[0, 2] * place[2] + T[0, 3],
@@ -124,7 +124,7 @@ def _placed(T, place):  # pragma: no cover
             T[2, 0] * place[0] + T[2, 1] * place[1] + T[2, 2] * place[2] + T[2, 3])  # fmt: skip
 
 
-@part
+@device
 def _ask(T, spheres, space, c, said):  # pragma: no cover
     """What camera c says of the spheres, into said (K, 4): how far (m) a sphere reaches out of the silhouette, and how that grows along the
     camera's axes. Nothing, less than any radius, of spheres that are not in its picture."""
@@ -135,7 +135,7 @@ def _ask(T, spheres, space, c, said):  # pragma: no cover
         own[0] = -np.inf
         p0, p1, p2 = _placed(joint, place)
         z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
-        if z < NEAR:
+        if z < NEAR_PLANE:
             continue
         u = (V[0, 0] * p0 + V[0, 1] * p1 + V[0, 2] * p2 + V[0, 3]) / z
         v = (V[1, 0] * p0 + V[1, 1] * p1 + V[1, 2] * p2 + V[1, 3]) / z
@@ -183,7 +183,7 @@ def push_inside(T, spheres, space, said, weight, origin, sums, adding):  # pragm
     return total
 
 
-@part
+@device
 def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
     """Add to a joint's sums that a point x has to go a distance along n, as `part_sums` does for surface points."""
     row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.jit import kernel, part, summing
+from shadowpuppet.jit import device, kernel, reduction_kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, foot, measure, nearest, place_parts
 
 SUMS = 29
@@ -49,7 +49,7 @@ def sweep(mode, T, limbs, rows, spheres, origin, numbers, which, room):  # pragm
     return total
 
 
-@summing
+@reduction_kernel
 def _bounded(rows, near, tau):  # pragma: no cover
     total = np.float32(0)
     for i in range(LANES):
@@ -58,7 +58,7 @@ def _bounded(rows, near, tau):  # pragma: no cover
     return total
 
 
-@summing
+@reduction_kernel
 def _add_equations(q, number, rows, near, tau, out, lanes):  # pragma: no cover
     """Add what the points of the part `number` say about its motion to `lanes` (SUMS LANES,): the moment and direction along which each
     measures, multiplied with one another (21, by rows of the upper triangle) and with the distance to the tangent plane (6)."""
@@ -102,7 +102,7 @@ def _add_equations(q, number, rows, near, tau, out, lanes):  # pragma: no cover
         lanes[26 * LANES + i] += wz * r
 
 
-@summing
+@reduction_kernel
 def _add_forces(q, number, rows, near, tau, mode, out, lanes):  # pragma: no cover
     """Add the forces on the part `number` (eq. 32) to `lanes` (SUMS LANES,): their moments about the cloud's origin (3), themselves (3),
     and of the points on the model that they act on the number, the sum (3) and the products (6), weighed as the points."""
@@ -135,7 +135,7 @@ def _add_forces(q, number, rows, near, tau, mode, out, lanes):  # pragma: no cov
         lanes[15 * LANES + i] += w * z * z
 
 
-@part
+@device
 def _gather(joints, lanes, sums):  # pragma: no cover
     """Sums (J, SUMS) by joint of the parts' lanes."""
     sums[:] = 0
@@ -147,7 +147,7 @@ def _gather(joints, lanes, sums):  # pragma: no cover
             sums[joints[s], k] += total
 
 
-@part
+@device
 def gather_down(chain, sums):  # pragma: no cover
     """Add to every joint's sums those of what hangs on it."""
     for j in range(chain.parents.size - 1, 0, -1):

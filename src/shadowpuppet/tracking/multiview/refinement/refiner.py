@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.jacobian import STEP, TRANSLATION, make_chain, place_one
+from shadowpuppet.body.jacobian import MAX_STEP, TRANSLATION, make_chain, place_one
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
@@ -209,7 +209,7 @@ def _gauss_newton(poses, centre, pull, chain, limbs, rows, groups, origin, point
                     A[d, d], step[d] = 1, 0
             _solve(A, step)
             for d in range(D):
-                move = min(max(step[d], -STEP), STEP)
+                move = min(max(step[d], -MAX_STEP), MAX_STEP)
                 pose[d] = min(max(best[d] + move, chain.low[d]), chain.high[d])
         for d in range(D):
             pose[d] = best[d]

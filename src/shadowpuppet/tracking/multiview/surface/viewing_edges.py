@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.projection import NEAR, bend_within
+from shadowpuppet.camera.projection import NEAR_PLANE, bend_within
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import compiled, kernel
 from shadowpuppet.tracking.multiview.surface.contours import ARM
@@ -137,7 +137,7 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ra
             k, needed = 0, max(1, (1 + CONFIRMED) * level)
             while k < n:
                 lo, hi, k = _whole(pieces, at, n, k)
-                found = lo > NEAR and hi < FAR and hi - lo > SHORTEST
+                found = lo > NEAR_PLANE and hi < FAR and hi - lo > SHORTEST
                 if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1
@@ -150,7 +150,7 @@ def _leave(relative, i, apart, u, v, polygons, level, scratch):  # pragma: no co
     """Pieces of a ray (u, v, 1) of view i that at most `level` others deny: pieces[at, :n]; returns at and n."""
     bounds, denied, pieces = polygons[-1], scratch[2], scratch[3]
     at, n = 0, 1
-    pieces[0, 0, 0], pieces[0, 0, 1], pieces[0, 0, 2] = NEAR, FAR, 0
+    pieces[0, 0, 0], pieces[0, 0, 1], pieces[0, 0, 2] = NEAR_PLANE, FAR, 0
     for j in range(bounds.size - 1):
         if n > 0 and apart[i, j]:
             lo, hi = pieces[at, 0, 0], pieces[at, n - 1, 1]
@@ -184,10 +184,10 @@ def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
     nx, ny, c = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     norm = np.sqrt(nx * nx + ny * ny)
     if bz > 0:
-        lo = max(lo, (NEAR - az) / bz)
+        lo = max(lo, (NEAR_PLANE - az) / bz)
     elif bz < 0:
-        hi = min(hi, (NEAR - az) / bz)
-    if lo >= hi or norm < 1e-12 or (bz == 0 and az < NEAR):  # behind the view, or straight through its centre
+        hi = min(hi, (NEAR_PLANE - az) / bz)
+    if lo >= hi or norm < 1e-12 or (bz == 0 and az < NEAR_PLANE):  # behind the view, or straight through its centre
         return 0
     nx, ny, c = nx / norm, ny / norm, c / norm
     au, bu = nx * ay - ny * ax, nx * by - ny * bx
@@ -282,7 +282,7 @@ def _witnessed(T, i, apart, u, v, z, lenses, needed):  # pragma: no cover
     """Whether `needed` other views have a place in their pictures: that at depth z on a ray of view i."""
     for j in range(lenses.shape[0]):
         w = (T[i, j, 2, 0] * u + T[i, j, 2, 1] * v + T[i, j, 2, 2]) * z + T[i, j, 2, 3]
-        if apart[i, j] and w >= NEAR:
+        if apart[i, j] and w >= NEAR_PLANE:
             x = ((T[i, j, 0, 0] * u + T[i, j, 0, 1] * v + T[i, j, 0, 2]) * z + T[i, j, 0, 3]) / w
             y = ((T[i, j, 1, 0] * u + T[i, j, 1, 1] * v + T[i, j, 1, 2]) * z + T[i, j, 1, 3]) / w
             if x * x + y * y < lenses[j, 7] ** 2:

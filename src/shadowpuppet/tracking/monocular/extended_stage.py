@@ -1,0 +1,71 @@
+"""What our default adds to a stage of Liu 2011: costs beside eq. 2, candidates beside the particles, the mean as estimate.
+
+All of it is off in the preset `liu2011`, whose stages are plain `FilterStage`s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shadowpuppet.body.segments import PULLED_POINTS, coarse_limbs
+from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.stages import FilterStage
+from shadowpuppet.tracking.particle_filter import Particles, Propose
+from shadowpuppet.tracking.resampling import Scheme, normalise
+from shadowpuppet.tracking.silhouette_cost import Cost, Observation
+
+TORSO_SPREAD, LIMB_SPREAD = 0.3, 0.2
+"""Standard deviations (rad) of explored candidates: the torso's angles about upright, a limb's about a coarse posture."""
+MEAN_TEMPERATURE = 50.0
+"""For the mean estimate: a particle whose cost is this much higher (pixels at 320 x 240) weighs 1/e."""
+
+
+def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None) -> FilterStage:
+    """The paper's stage, or the extended one where the settings ask for any extension. Arguments and errors: as `FilterStage`."""
+    extended = settings.explore or settings.motion_weight or settings.posture_weight or settings.estimate != "best"
+    return (ExtendedStage if extended else FilterStage)(picture, settings, name, scheme)
+
+
+class ExtendedStage(FilterStage):
+    """A stage with exploration, a pull to usual postures, a pull to the last frame, and a mean estimate, as the settings ask."""
+
+    def propose(self, cycle: int) -> Propose:
+        """The paper's noise; in the first cycle of a stage of one part also `explore` candidates."""
+        noise, number = super().propose(cycle), self.settings.explore
+        if cycle or len(self.parts) > 1 or not number:
+            return noise
+        return lambda rng, values: np.concatenate([noise(rng, values), self.clamp(self.explore(rng, values[0], number))])
+
+    def explore(self, rng: np.random.Generator, best: Array, number: int) -> Array:
+        """Values (number, d) from the part's whole range, which the noise of one frame cannot reach from `best` (d,)."""
+        if self.moves_torso:
+            spread = np.where(self.rotates, TORSO_SPREAD, 5 * self.settings.torso.sigma_translation)
+            return np.where(self.rotates, 0.0, best) + rng.standard_normal((number, len(best))) * spread
+        limbs = coarse_limbs(self.picture.body.skeleton, self.parts[0])
+        return limbs[rng.integers(len(limbs), size=number)] + LIMB_SPREAD * rng.standard_normal((number, len(best)))
+
+    def extra_costs(self, observation: Observation, last: Array) -> list[Cost]:
+        """The pulls to usual postures and to the last frame's estimate (D,), and the caller's own cost."""
+        posture, motion = self.settings.posture_weight * self.scale, self.settings.motion_weight * self.scale
+        costs: list[Cost] = [lambda poses: posture * self.picture.body.skeleton.posture_penalty(poses)] if posture else []
+        costs += [self._motion_cost(motion, last)] if motion else []
+        return costs + super().extra_costs(observation, last)
+
+    def _motion_cost(self, weight: float, last: Array) -> Cost:
+        """A pull of the stage's shoulders, elbows, hands, knees and ankles to where they were in `last` (D,); bounded far away."""
+        names = [name for part in self.parts for name in PULLED_POINTS[part]]
+        before, reach = self.picture.points(last[None], names), self.settings.motion_reach
+
+        def cost(poses: Array) -> Array:
+            squared = ((self.picture.points(poses, names) - before) ** 2).sum(2)
+            return weight * (squared / (1 + squared / reach**2)).sum(1)
+
+        return cost
+
+    def estimate(self, particles: Particles) -> Array:
+        """Values (d,): the mean weighed by cost, or the particle of least cost."""
+        if self.settings.estimate == "best":
+            return super().estimate(particles)
+        return normalise(-particles.costs / (MEAN_TEMPERATURE * self.scale)) @ particles.poses
