@@ -9,7 +9,10 @@ from pydantic import Field
 from shadowpuppet.settings import checked
 from shadowpuppet.silhouette.classifiers import METHODS
 
-Method = str if TYPE_CHECKING else Literal[("auto", *METHODS)]
+if TYPE_CHECKING:
+    Method = str
+else:
+    Method = Literal[("auto", *METHODS)]
 
 
 @checked
