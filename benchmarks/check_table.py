@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 import smallest
 
-from shadowpuppet.calibration.epipolar_tangency import Outlines
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.pipeline.check_calibration import RigCheck, Seen, gather, judge
+from shadowpuppet.pipeline.check_calibration import CalibrationCheck, SilhouetteSets, gather_silhouettes, judge_calibration
 from shadowpuppet.pipeline.footage_rig import Rig, open_rig
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
@@ -58,7 +57,7 @@ def faults() -> Iterator[Fault]:
     yield Fault("third mirrored", mirrored=2)
 
 
-def with_fault(rig: Rig, seen: Seen, fault: Fault) -> tuple[Rig, Seen]:
+def with_fault(rig: Rig, sets: SilhouetteSets, fault: Fault) -> tuple[Rig, SilhouetteSets]:
     """The rig as it would be calibrated, and what its cameras would have seen."""
     cameras, order = list(rig.cameras), list(range(len(rig.cameras)))
     if fault.turn is not None or fault.moved is not None:
@@ -71,19 +70,15 @@ def with_fault(rig: Rig, seen: Seen, fault: Fault) -> tuple[Rig, Seen]:
         a, b = fault.swapped
         order[a], order[b] = b, a
     late = [*fault.late, *[0] * (len(cameras) - len(fault.late))]
-    packed, outlines = [], []
-    for f in range(MARGIN, len(seen.packed) - MARGIN):
-        row = [seen.packed[f - late[k]][k] for k in order]
-        masks = [None if bits is None else np.unpackbits(bits, count=c.size[0] * c.size[1]).reshape(c.size[::-1]).astype(bool)
-                 for bits, c in zip(row, cameras)]
-        masks = [mask[:, ::-1].copy() if n == fault.mirrored and mask is not None else mask for n, mask in enumerate(masks)]
-        packed.append([None if mask is None else np.packbits(mask) for mask in masks])
-        outlines.append([Outlines().of(camera, mask) for camera, mask in zip(cameras, masks)])
+    rows = []
+    for f in range(MARGIN, len(sets.rows) - MARGIN):
+        row = [sets.rows[f - late[k]][k] for k in order]
+        rows.append([one.mirrored() if n == fault.mirrored and one is not None else one for n, one in enumerate(row)])
     footage = tuple(replace(each, camera=camera) for each, camera in zip(rig.footage, cameras))
-    return Rig(rig.recording, footage), Seen(packed, outlines, seen.every)
+    return Rig(rig.recording, footage), SilhouetteSets(rows, sets.every)
 
 
-def row(fault: Fault, found: RigCheck) -> Sequence[str]:
+def row(fault: Fault, found: CalibrationCheck) -> Sequence[str]:
     apart = {name: value for name, value in zip(found.agreement.names, found.agreement.apart) if value is not None}
     worst = max(apart, key=lambda name: apart[name])
     pixels = f"{worst} {apart[worst]:.1f}, others up to {max(v for n, v in apart.items() if n != worst):.1f}"
@@ -107,10 +102,10 @@ def main() -> None:
     given = smallest.parse(parser, _smallest)
     options = Options(masks=given.masks)
     rig = open_rig(given.recording, options)
-    seen = gather(rig, options, Listener())
+    seen = gather_silhouettes(rig, options, Listener())
     print("| what is wrong | pixels | turned right, down, clockwise, ° | late, frames | said |\n|---|---|---|---|---|")
     for fault in islice(faults(), given.faults):
-        print("| " + " | ".join(row(fault, judge(*with_fault(rig, seen, fault)))) + " |", flush=True)
+        print("| " + " | ".join(row(fault, judge_calibration(*with_fault(rig, seen, fault)))) + " |", flush=True)
 
 
 if __name__ == "__main__":

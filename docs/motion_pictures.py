@@ -8,10 +8,10 @@ import numpy as np
 
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, Viewpoint
 from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import Figure
-from shadowpuppet.synthetic.person.parts import dressed
+from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.renderer import Renderer
 from shadowpuppet.video import write_image
 
 TARGET = Path(__file__).parent / "assets" / "motions.png"
@@ -33,7 +33,7 @@ def row(n: int, kind, gesture: Gesture, begin: float, step: float) -> np.ndarray
     body, clothes = Mannequin.draw(rng, kind), Clothes.draw(np.random.default_rng(n + 11))
     _, figure = perform(Spec(body=body, motion=(gesture,), rate=100.0), rng)
     view = Viewpoint(size=SIZE, fov_deg=18.5, distance=4.6, height=0.93, azimuth_deg=90, pitch_deg=1)
-    renderer = Renderer(view.camera(), dressed(body, clothes), clothes, LAMPS)
+    renderer = PersonRenderer(view.camera(), dressed(body, clothes), clothes, LAMPS)
     tiles = []
     for index in np.rint((begin + step * np.arange(COUNT)) * 100).astype(int):
         one, there = Figure(*(part[index : index + 1] for part in figure)), figure.joints[index, 0] * [1, 1, 0]

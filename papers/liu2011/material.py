@@ -26,8 +26,8 @@ from shadowpuppet.pipeline.look import Prepared, check, prepare
 from shadowpuppet.pipeline.options import Options, make_options, plain_options
 from shadowpuppet.pipeline.synthesize import make_recording
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
-from shadowpuppet.synthetic.movement.gestures import LEAD
-from shadowpuppet.synthetic.shorthand import gestures_from
+from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS
+from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.spec_file import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.monocular.initialization import PersonEstimate
@@ -141,7 +141,7 @@ def made_recording(request: Request, name: str) -> Path:
 
 def spec_of(name: str, short: bool) -> Spec:
     """What a made recording is made of: 320 x 240 pixels at 15 Hz, as the paper's."""
-    spec = Spec(name=name, body=Mannequin(stature=1.78), motion=gestures_from(MADE[name][short]), scene=Scene(clothing=7, room=2), seed=6)
+    spec = Spec(name=name, body=Mannequin(stature=1.78), motion=parse_gestures(MADE[name][short]), scene=Scene(clothing=7, room=2), seed=6)
     if not short:
         return spec
     return replace(spec, cameras=(Viewpoint(size=(160, 120)),), rate=8, scene=replace(spec.scene, empty_seconds=1))
@@ -176,6 +176,6 @@ def _parts(folder: Path, times: Array) -> tuple[Part, ...]:
     except SettingsError:
         ends = np.linspace(times[0], times[-1], 4).tolist()
         return tuple(Part(f"{nth} third", *span) for nth, span in zip(("first", "second", "last"), pairwise(ends)))
-    ends = (LEAD + np.cumsum([0, *(gesture.seconds for gesture in gestures)])).tolist()
+    ends = (LEAD_SECONDS + np.cumsum([0, *(gesture.seconds for gesture in gestures)])).tolist()
     names = [gesture.motion.replace("_", " ") for gesture in gestures]
     return tuple(Part(name, start, end) for name, start, end in zip(names, [times[0], *ends[1:]], [*ends[1:-1], times[-1]]))

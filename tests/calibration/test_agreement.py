@@ -55,6 +55,14 @@ def test_a_camera_that_was_moved_is_named_with_its_pixels(cameras, masks):
     assert doubt.endswith("--camera cam1,cam2,cam4")
 
 
+def test_of_three_cameras_a_wrong_one_blames_no_other(cameras, masks):
+    """Each good camera has one good and one bad partner: it counts by the good one."""
+    wrong = [cameras[0], cameras[1], moved(cameras[2], 6)]
+    found = agreement(wrong, [row[:3] for row in masks], STEP)
+    assert found.wrong == ("cam3",)
+    assert max(found.apart[:2]) < 1.0
+
+
 @pytest.mark.parametrize(("a", "b"), [(0, 1), (1, 3)])
 def test_films_of_two_cameras_swapped_are_found(cameras, masks, a, b):
     order = list(range(len(cameras)))

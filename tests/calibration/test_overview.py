@@ -11,7 +11,7 @@ import made_rig
 import numpy as np
 import pytest
 
-from shadowpuppet.calibration.overview import SIDE, cells, look_at_calibration, meeting_point
+from shadowpuppet.calibration.overview import MAP_COLUMNS, look_at_calibration, map_cells, meeting_point
 from shadowpuppet.cli.app import run
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import read_calibration, stood_up, write_calibration
@@ -54,10 +54,10 @@ def test_a_roll_is_told_clockwise(tmp_path, rig):
 
 def test_the_map_counts_who_sees_a_person_whole(path, rig):
     look, _ = look_at_calibration(path)
-    seen, places = np.array(look.seen), cells(look.corners)
-    assert seen.shape == (SIDE // 2, SIDE)
+    seen, places = np.array(look.seen), map_cells(look.corners)
+    assert seen.shape == (MAP_COLUMNS // 2, MAP_COLUMNS)
     assert places[0, 0, 1] > places[-1, 0, 1]  # y up
-    for row, column in np.ndindex(SIDE // 2, SIDE):
+    for row, column in np.ndindex(MAP_COLUMNS // 2, MAP_COLUMNS):
         x, y = places[row, column]
         pixels = [camera.project([[x, y, z] for z in (0, 0.9, 1.8)]) for camera in rig]
         assert seen[row, column] == sum(((p >= 0) & (p <= [639, 479])).all() for p in pixels)

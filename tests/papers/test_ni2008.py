@@ -16,7 +16,7 @@ from papers.common.experiment import Request
 from papers.ni2008 import figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
 from papers.ni2008.__main__ import EXPERIMENTS, main
 from shadowpuppet.synthetic import Ring, Scene, Spec, humaneva, synthesize
-from shadowpuppet.synthetic.shorthand import gestures_from
+from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
 SEED = 3
@@ -103,7 +103,7 @@ def test_a_run_is_kept_under_all_that_it_depends_on(case, asked, monkeypatch):
 
 
 def test_a_given_recording_is_read_from_its_films(tmp_path, capsys):
-    spec = Spec(name="boxer", motion=gestures_from("box 3"), begin=1.2, frames=5, training_frames=40, rate=30, seed=4, tells="height",
+    spec = Spec(name="boxer", motion=parse_gestures("box 3"), begin=1.2, frames=5, training_frames=40, rate=30, seed=4, tells="height",
                 ring=Ring(count=4, radius=3.6, fov_deg=42, size=(160, 120)), scene=Scene(empty_seconds=0.3))
     folder, into = synthesize(spec, tmp_path / "boxer"), tmp_path / "out"
     assert main(["table_1", "figure_5", "--recording", str(folder), "--workers", "1", "-o", str(into)]) == 0

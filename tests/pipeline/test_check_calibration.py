@@ -10,15 +10,15 @@ import made_rig
 import numpy as np
 import pytest
 
-from shadowpuppet.calibration.epipolar_tangency import Outlines
-from shadowpuppet.calibration.rotation_error import turning
-from shadowpuppet.calibration.time_offset import lateness
+from shadowpuppet.calibration.rotation_error import estimate_rotation_error
+from shadowpuppet.calibration.silhouettes import silhouettes_of
+from shadowpuppet.calibration.time_offset import time_offsets
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli.app import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.pipeline.check_calibration import check_rig
+from shadowpuppet.pipeline.check_calibration import check_calibration
 from shadowpuppet.pipeline.footage_rig import open_rig
 from shadowpuppet.pipeline.options import Options
 
@@ -36,8 +36,8 @@ def shifted(masks, late, frames=50):
     return [[masks[10 + f - steps][k] for k, steps in enumerate(late)] for f in range(frames)]
 
 
-def outlines(cameras, rows):
-    return [[Outlines().of(camera, mask) for camera, mask in zip(cameras, row)] for row in rows]
+def silhouettes(rows):
+    return [silhouettes_of(row) for row in rows]
 
 
 def moved(camera: Camera, right=0.0, down=0.0, clockwise=0.0) -> Camera:
@@ -48,7 +48,7 @@ def moved(camera: Camera, right=0.0, down=0.0, clockwise=0.0) -> Camera:
 
 @pytest.mark.parametrize("late", [(0, 0, 0, 0), (0, 4, 0, 0), (0, 0, -3, 0), (0, 2, 0, -5)])
 def test_frames_by_which_films_are_late(cameras, masks, late):
-    found = lateness(cameras, outlines(cameras, shifted(masks, late)))
+    found = time_offsets(cameras, silhouettes(shifted(masks, late)))
     np.testing.assert_allclose(found.frames, late, atol=0.15)
     assert max(found.spread) < 0.15
     assert found.pairs[0][1] == pytest.approx(late[1] - late[0], abs=0.15)
@@ -58,31 +58,31 @@ def test_frames_by_which_films_are_late(cameras, masks, late):
 def test_half_frames_are_told(cameras):
     masks = made_rig.masks(cameras, 120)
     rows = [[masks[20 + 2 * f - (3 if k == 1 else 0)][k] for k in range(4)] for f in range(45)]  # every second: 1.5 sets
-    np.testing.assert_allclose(lateness(cameras, outlines(cameras, rows)).frames, (0, 1.5, 0, 0), atol=0.25)
+    np.testing.assert_allclose(time_offsets(cameras, silhouettes(rows)).frames, (0, 1.5, 0, 0), atol=0.25)
 
 
 def test_two_cameras_are_told_apart_only(cameras, masks):
-    found = lateness(cameras[:2], outlines(cameras[:2], [row[:2] for row in shifted(masks, (0, 4, 0, 0))]))
+    found = time_offsets(cameras[:2], silhouettes([row[:2] for row in shifted(masks, (0, 4, 0, 0))]))
     assert found.frames[0] == 0
     assert found.frames[1] == pytest.approx(4, abs=0.15)
 
 
 def test_a_camera_that_was_moved_a_little_is_not_late(cameras, masks):
     wrong = [cameras[0], moved(cameras[1], right=2), *cameras[2:]]
-    np.testing.assert_allclose(lateness(wrong, outlines(wrong, shifted(masks, (0, 3, 0, 0)))).frames, (0, 3, 0, 0), atol=0.6)
+    np.testing.assert_allclose(time_offsets(wrong, silhouettes(shifted(masks, (0, 3, 0, 0)))).frames, (0, 3, 0, 0), atol=0.6)
 
 
 def test_somebody_who_stands_still_tells_nothing(cameras, masks):
-    still = outlines(cameras, [masks[0]] * 50)
-    assert lateness(cameras, still).frames == (None,) * 4
-    assert lateness(cameras, still[:10]).frames == (None,) * 4
-    assert lateness(cameras, [[None] * 4] * 50).frames == (None,) * 4
+    still = silhouettes([masks[0]] * 50)
+    assert time_offsets(cameras, still).frames == (None,) * 4
+    assert time_offsets(cameras, still[:10]).frames == (None,) * 4
+    assert time_offsets(cameras, [[None] * 4] * 50).frames == (None,) * 4
 
 
 @pytest.mark.parametrize("turn", [{"right": 3.0}, {"down": -2.0}, {"clockwise": 4.0}, {"right": -6.0, "down": 3.0}])
 def test_how_a_camera_was_turned(cameras, masks, turn):
     wrong = [*cameras[:2], moved(cameras[2], **turn), cameras[3]]
-    found = turning(wrong, masks[::6], 2)
+    found = estimate_rotation_error(wrong, silhouettes(masks[::6]), 2)
     assert found is not None
     told = {"right": found.right, "down": found.down, "clockwise": found.clockwise}
     assert told == pytest.approx({"right": 0, "down": 0, "clockwise": 0} | turn, abs=0.4)
@@ -92,8 +92,8 @@ def test_how_a_camera_was_turned(cameras, masks, turn):
 
 
 def test_a_turn_takes_three_cameras(cameras, masks):
-    assert turning(cameras[:2], [row[:2] for row in masks[::6]], 1) is None
-    assert turning(cameras, [[None] * 4], 1) is None
+    assert estimate_rotation_error(cameras[:2], silhouettes([row[:2] for row in masks[::6]]), 1) is None
+    assert estimate_rotation_error(cameras, [[None] * 4], 1) is None
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def recording(tmp_path_factory, cameras, masks):
 
 
 def checked(folder, options=MASKS):
-    return check_rig(open_rig(folder, options), options)
+    return check_calibration(open_rig(folder, options), options)
 
 
 @pytest.mark.parametrize("options", [MASKS, Options()], ids=["exact", "from film"])

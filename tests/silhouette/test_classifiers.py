@@ -14,9 +14,9 @@ from silhouette_scenes import CLEANED, SIZE, dressed, empty_shots, figure, grey,
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background
 from shadowpuppet.silhouette._kernels import classify, contrast, far_from_samples
-from shadowpuppet.silhouette.background import Spread, film_noise, learn_statistics, smoothed, to_planes
-from shadowpuppet.silhouette.boundary import SHARP, THIN, Outline, at_half_contrast, outline_width
-from shadowpuppet.silhouette.classifiers import PlainRule
+from shadowpuppet.silhouette.background import FrameSampler, film_noise, learn_statistics, smoothed, to_planes
+from shadowpuppet.silhouette.boundary import LIMB_WIDTH_SHARE, SHARP_WIDTH, EdgeProfile, at_half_contrast, outline_width
+from shadowpuppet.silhouette.classifiers import AveragingClassifier
 
 # ---------------------------------------------------------------- eq. 1
 
@@ -36,7 +36,7 @@ def test_bounds_are_the_formula_where_it_holds_with_equality(mean, sigma, factor
 
 
 def check_bounds(mean, sigma, factor):
-    rule = PlainRule.of(mean, sigma, factor)
+    rule = AveragingClassifier.of(mean, sigma, factor)
     for value in range(256):
         expected = np.abs(mean - value) >= factor * sigma
         np.testing.assert_array_equal(rule(np.full(mean.shape, value, np.uint8)) > 0, expected, err_msg=str(value))
@@ -134,7 +134,7 @@ def test_a_still_pixel_has_no_deviation_at_all():
 
 @given(st.integers(1, 40), st.integers(0, 400))
 def test_spread_keeps_few_and_evenly(count, number):
-    kept = Spread(count)
+    kept = FrameSampler(count)
     for n in range(number):
         kept.add(np.array([[n % 256, n // 256]], np.uint8))
     places = [int(image[0, 0]) + 256 * int(image[0, 1]) for image in kept.kept]
@@ -146,7 +146,7 @@ def test_spread_keeps_few_and_evenly(count, number):
 
 
 def test_spread_copies(rng):
-    image, kept = np.zeros((2, 2), np.uint8), Spread(3)
+    image, kept = np.zeros((2, 2), np.uint8), FrameSampler(3)
     kept.add(image)
     image[:] = 9
     assert kept.kept[0].max() == 0
@@ -205,8 +205,8 @@ def blurred_disc(radius: float, blur: float, strength: float) -> tuple[np.ndarra
 def test_the_outline_lies_at_half_contrast_however_far_the_first_mask_reaches(blur, strength, grown):
     exact, seen = blurred_disc(25, blur, strength)
     first = cv2.dilate(exact.astype(np.uint8), np.ones((2 * grown + 1, 2 * grown + 1), np.uint8))
-    width = max(SHARP, round(2 * blur)) + grown
-    found = at_half_contrast(first, seen, Outline(width, 6)) > 0
+    width = max(SHARP_WIDTH, round(2 * blur)) + grown
+    found = at_half_contrast(first, seen, EdgeProfile(width, 6)) > 0
     offset = (np.count_nonzero(found & ~exact) - np.count_nonzero(exact & ~found)) / (2 * np.pi * 25)
     assert abs(offset) < 0.15
 
@@ -214,7 +214,7 @@ def test_the_outline_lies_at_half_contrast_however_far_the_first_mask_reaches(bl
 @pytest.fixture
 def thick(monkeypatch):
     """Whoever is blurred has no thin limbs."""
-    monkeypatch.setattr("shadowpuppet.silhouette.boundary.THIN", 1.0)
+    monkeypatch.setattr("shadowpuppet.silhouette.boundary.LIMB_WIDTH_SHARE", 1.0)
 
 
 def test_blurred_films_have_wide_outlines(thick):
@@ -222,9 +222,9 @@ def test_blurred_films_have_wide_outlines(thick):
     for blur in (0, 1.5, 3):
         _, seen = blurred_disc(25, blur, 150)
         widths.append(outline_width([((seen > 8).astype(np.uint8), seen)] * 2))
-    assert widths[0] == SHARP
+    assert widths[0] == SHARP_WIDTH
     assert widths[0] < widths[1] < widths[2]
-    assert outline_width([]) == SHARP
+    assert outline_width([]) == SHARP_WIDTH
 
 
 def test_stripes_of_clothes_are_not_taken_for_blur_wider_than_half_an_arm(rng):
@@ -234,17 +234,17 @@ def test_stripes_of_clothes_are_not_taken_for_blur_wider_than_half_an_arm(rng):
     depth = distance_transform_edt(mask)
     contrast = np.float32(mask * (20 + 12 * np.minimum(depth, 8)))
     width = outline_width([(mask, contrast)])
-    assert SHARP <= width <= np.ceil(THIN * np.sqrt(mask.sum()))
-    arm = at_half_contrast(mask, contrast, Outline(width, 6))[22:26, 10:28]
+    assert SHARP_WIDTH <= width <= np.ceil(LIMB_WIDTH_SHARE * np.sqrt(mask.sum()))
+    arm = at_half_contrast(mask, contrast, EdgeProfile(width, 6))[22:26, 10:28]
     assert arm.all()
-    assert not at_half_contrast(mask, contrast, Outline(6, 6))[22:26, 10:28].all()  # what it would be without
+    assert not at_half_contrast(mask, contrast, EdgeProfile(6, 6))[22:26, 10:28].all()  # what it would be without
 
 
 def test_a_blurred_film_is_known_by_a_person_whom_the_border_cuts(thick):
     _, seen = blurred_disc(35, 2.5, 150)
     half = np.ascontiguousarray(seen[:50])
     whole = outline_width([((seen > 8).astype(np.uint8), seen)])
-    assert outline_width([((half > 8).astype(np.uint8), half)]) == whole > SHARP
+    assert outline_width([((half > 8).astype(np.uint8), half)]) == whole > SHARP_WIDTH
 
 
 def test_fingertips_stay_and_bled_gaps_open():
@@ -252,7 +252,7 @@ def test_fingertips_stay_and_bled_gaps_open():
     mask[10:50, 10:40] = mask[30, 40:50] = 1
     contrast = 100 * mask.astype(np.float32)
     contrast[12:48, 24:27] = 10  # a gap, with the colour that the codec bled into it
-    found = at_half_contrast(mask, contrast, Outline(SHARP, 6)) > 0
+    found = at_half_contrast(mask, contrast, EdgeProfile(SHARP_WIDTH, 6)) > 0
     assert found[30, 40:50].all()
     assert not found[14:46, 24:27].any()
     assert found[12:48, 12:22].all()
@@ -263,7 +263,7 @@ def test_where_the_border_cuts_a_person_nothing_is_taken_off():
     mask[10:, 10:30] = 1
     contrast = 100 * mask.astype(np.float32)
     contrast[-1, 10:30] = 40
-    assert at_half_contrast(mask, contrast, Outline(SHARP, 6))[-1, 12:28].all()
+    assert at_half_contrast(mask, contrast, EdgeProfile(SHARP_WIDTH, 6))[-1, 12:28].all()
 
 
 def test_the_border_of_the_picture_is_no_outline(rng):

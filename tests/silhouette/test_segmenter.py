@@ -14,10 +14,10 @@ from silhouette_scenes import CLEANED, METHODS, SIZE, dressed, empty_shots, figu
 from shadowpuppet.errors import SettingsError, SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background, ready_mask
 from shadowpuppet.silhouette.background import to_planes
-from shadowpuppet.silhouette.boundary import SHARP, Outline
+from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile
 from shadowpuppet.silhouette.channels import wardrobe_share
-from shadowpuppet.silhouette.classifiers import KeyRule
-from shadowpuppet.silhouette.cleanup import clean, person, without_holes
+from shadowpuppet.silhouette.classifiers import ChannelClassifier
+from shadowpuppet.silhouette.cleanup import clean, fill_small_holes, main_part
 
 # ---------------------------------------------------------------- silhouettes
 
@@ -92,10 +92,10 @@ def test_specks_go_and_a_hand_that_nearly_touches_stays():
     mask[20:26, 41:50] = 1  # a hand
     mask[50:53, 50:53] = 1  # a speck
     mask[1:9, 52:60] = 1  # something as large as a hand, far away
-    kept = person(mask, mask > 0)
+    kept = main_part(mask, mask > 0)
     assert kept[10:40, 10:50].sum() == mask[10:40, 10:50].sum()
     assert kept.sum() == kept[10:40, 10:50].sum()
-    assert not person(mask, np.zeros(mask.shape, bool)).any()
+    assert not main_part(mask, np.zeros(mask.shape, bool)).any()
 
 
 def test_small_holes_are_filled_and_gaps_and_notches_are_not():
@@ -104,7 +104,7 @@ def test_small_holes_are_filled_and_gaps_and_notches_are_not():
     mask[20:22, 20:22] = 0
     mask[40:50, 30:40] = 0
     mask[78:80, 50:52] = 0
-    filled = without_holes(mask)
+    filled = fill_small_holes(mask)
     assert filled[20:22, 20:22].all()
     assert not filled[40:50, 30:40].any()
     assert not filled[78:80, 50:52].any()
@@ -118,7 +118,7 @@ def test_what_hangs_on_by_a_thread_goes_and_pinholes_are_filled():
     contrast[label == 2] = 60
     contrast[label == 1] = 4
     label[30:33, 30:33] = contrast[30:33, 30:33] = 0
-    found = clean(label, lambda window: np.ascontiguousarray(contrast[window]), Outline(SHARP, 6))
+    found = clean(label, lambda window: np.ascontiguousarray(contrast[window]), EdgeProfile(SHARP_WIDTH, 6))
     assert overlap(found > 0, np.pad(np.ones((60, 60), bool), ((10, 10), (10, 50)))) > 0.99
     assert found[30:33, 30:33].all()
     assert not found[:, 75:].any()
@@ -136,7 +136,7 @@ def test_a_trembling_camera_makes_no_silhouette_of_edges(rng):
     wall = np.where(np.arange(SIZE[1])[:, None] // 20 % 2, (200, 190, 180), (60, 70, 80)) + np.zeros((*SIZE, 3))
     segmenter = learn_background(empty_shots(rng, wall))
     shifted = cv2.warpAffine(wall, np.array([[1, 0, 0.12], [0, 1, 0]]), SIZE[::-1], borderMode=cv2.BORDER_REPLICATE)
-    assert not (segmenter.rule(shot(rng, shifted)) == 2).any()
+    assert not (segmenter.classifier(shot(rng, shifted)) == 2).any()
 
 
 def test_one_neighbour_is_not_enough(rng):
@@ -147,6 +147,14 @@ def test_one_neighbour_is_not_enough(rng):
     image[50:80, 50:80] = 20
     segmenter = learn_background(images, SilhouetteSettings(method="knn", shadow=False))
     assert segmenter(image)[52:78, 52:78].all()
+
+
+def test_neighbours_of_a_single_background_picture(rng):
+    """A single sample can be near only once: two must not be asked for, or all is foreground."""
+    wall, mask = scene(rng), figure()
+    segmenter = learn_background([shot(rng, wall)], SilhouetteSettings(method="knn", shadow=False))
+    assert not segmenter(shot(rng, wall)).any()
+    assert overlap(segmenter(shot(rng, dressed(wall, mask))), mask) > 0.9
 
 
 # ---------------------------------------------------------------- the key
@@ -196,10 +204,10 @@ def test_colour_that_is_mere_noise_is_left_alone(rng):
 
 
 def test_the_wardrobe_is_of_true_colours(rng):
-    skin = learn_background(empty_shots(rng, scene(rng, (155, 180, 225)))).rule
-    other = learn_background(empty_shots(rng, scene(rng, (225, 180, 155)))).rule
-    assert isinstance(skin, KeyRule)
-    assert isinstance(other, KeyRule)
+    skin = learn_background(empty_shots(rng, scene(rng, (155, 180, 225)))).classifier
+    other = learn_background(empty_shots(rng, scene(rng, (225, 180, 155)))).classifier
+    assert isinstance(skin, ChannelClassifier)
+    assert isinstance(other, ChannelClassifier)
     assert wardrobe_share(skin) < wardrobe_share(other) - 0.03
 
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from silhouette_scenes import SIZE, empty_shots, overlap, scene, shot
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
-from shadowpuppet.silhouette.classifiers import KeyRule
-from shadowpuppet.silhouette.shadows import ASKED, INWARD, OUTWARD, SHADED, _sums, resolve
+from shadowpuppet.silhouette.classifiers import ChannelClassifier
+from shadowpuppet.silhouette.shadows import INWARD_STEP, MAX_SHADE, MAYBE_SHADOW, OUTWARD_STEP, _part_sums, resolve_shadows
 
 SKIN_WALL = (90, 110, 150)
 """A wall of the hue of skin; blue green red."""
@@ -83,16 +83,16 @@ def random_labels(rng: np.random.Generator, shape: tuple[int, int]) -> tuple[np.
 def test_only_what_was_asked_of_is_decided(seed):
     label, planes, mean, inverse_sigma = random_labels(np.random.default_rng(seed), (40, 52))
     before = label.copy()
-    found = resolve(label, planes, mean, inverse_sigma)
+    found = resolve_shadows(label, planes, mean, inverse_sigma)
     np.testing.assert_array_equal(label, before)
-    np.testing.assert_array_equal(found[before != SHADED], before[before != SHADED])
-    assert set(np.unique(found[before == SHADED])) <= {0, 1}
+    np.testing.assert_array_equal(found[before != MAYBE_SHADOW], before[before != MAYBE_SHADOW])
+    assert set(np.unique(found[before == MAYBE_SHADOW])) <= {0, 1}
 
 
 def test_nothing_asked_is_nothing_changed(rng):
     label, *rest = random_labels(rng, (40, 52))
-    label[label == SHADED] = 0
-    np.testing.assert_array_equal(resolve(label, *rest), label)
+    label[label == MAYBE_SHADOW] = 0
+    np.testing.assert_array_equal(resolve_shadows(label, *rest), label)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["brightness", "colour", "both"]), st.sampled_from([0.5, 1.0]))
@@ -103,11 +103,11 @@ def test_what_is_told_at_once_is_what_every_pixel_tells(seed, key, darkest):
     _, _, mean, inverse_sigma = random_labels(rng, (24, 20))
     planes = np.clip(mean + rng.normal(0, 4, mean.shape), 0, 255).astype(np.uint8)
     planes[0, 0] = mean[0, 0] = 100
-    rule = KeyRule(key, mean, inverse_sigma, float(rng.uniform(0.5, 4)), darkest)
-    plain = KeyRule(key, mean, inverse_sigma, rule.factor, darkest)
+    rule = ChannelClassifier(key, mean, inverse_sigma, float(rng.uniform(0.5, 4)), darkest)
+    plain = ChannelClassifier(key, mean, inverse_sigma, rule.factor, darkest)
     plain.__dict__["surely_background"] = np.full_like(planes, 255), np.zeros_like(planes)
     assert (cv2.inRange(planes, *rule.surely_background) > 0).any()
-    np.testing.assert_array_equal(rule.labels(planes, ASKED), plain.labels(planes, ASKED))
+    np.testing.assert_array_equal(rule.labels(planes, MAX_SHADE), plain.labels(planes, MAX_SHADE))
 
 
 # The kernel and its naive twin
@@ -130,7 +130,7 @@ def naive_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
                 same += 1
                 continue
             out[k, 7] += 1
-            far, near = np.array([y, x]) + OUTWARD * d, np.array([y, x]) - INWARD * d
+            far, near = np.array([y, x]) + OUTWARD_STEP * d, np.array([y, x]) - INWARD_STEP * d
             if label[tuple(at)]:
                 out[k, 8] += 1
             elif min(*far, *near) >= 0 and (np.maximum(far, near) < label.shape).all():
@@ -154,8 +154,8 @@ def test_sums_over_parts_are_those_of_the_naive_twin(seed):
     rng = np.random.default_rng(seed)
     label, planes, mean, inverse_sigma = random_labels(rng, (24, 20))
     top, left = (int(n) for n in rng.integers(0, 6, 2))
-    window = np.ascontiguousarray((label == SHADED).astype(np.uint8)[top : top + 16, left : left + 13])
+    window = np.ascontiguousarray((label == MAYBE_SHADOW).astype(np.uint8)[top : top + 16, left : left + 13])
     number, parts = cv2.connectedComponents(window, connectivity=4)
-    label[label == SHADED] = 0
-    found = _sums(parts, number, label, top, left, planes, mean, inverse_sigma)
+    label[label == MAYBE_SHADOW] = 0
+    found = _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma)
     np.testing.assert_allclose(found, naive_sums(parts, number, label, top, left, planes, mean, inverse_sigma), rtol=1e-4, atol=1e-4)

@@ -15,18 +15,18 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.synthetic import Bystander, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.synthetic.compositing import FAR, Layer, composite, composite_people, visible
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
-from shadowpuppet.synthetic.layers import FAR, Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
-from shadowpuppet.synthetic.person.surface import Surface, ball
+from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
+from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.renderer import Renderer
-from shadowpuppet.synthetic.room import brightness
-from shadowpuppet.synthetic.studio import Studio, body_of
-from shadowpuppet.synthetic.viewpoint import JITTER, MIDDLE, STRAY
+from shadowpuppet.synthetic.room import lamp_brightness
+from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
+from shadowpuppet.synthetic.viewpoint import BODY_CENTRE, RING_JITTER, RING_SCALE_JITTER
 from shadowpuppet.video import open_frames
 
 VIEW = Viewpoint(size=(64, 48))
@@ -36,7 +36,7 @@ LIGHTS = np.array([[0, -0.6, 0.8, 0.5], [0.6, -0.8, 0, 0.2], [0, 0, 0, 0.5]])
 
 def shot(spec: Spec, figure: Figure, index: int = 0, others: tuple[Figure, ...] = (), view: Viewpoint | None = None):
     """One picture of the film with everything in it."""
-    studio = Studio(spec, (view or spec.views()[0]).camera(), np.random.default_rng(0), others)
+    studio = SceneRenderer(spec, (view or spec.views()[0]).camera(), np.random.default_rng(0), others)
     one = figure._replace(joints=figure.joints[index : index + 1], rotation=figure.rotation[index : index + 1],
                           origin=figure.origin[index : index + 1], curl=figure.curl[index : index + 1])
     return next(studio.film(one))
@@ -52,9 +52,9 @@ def with_scene(spec: Spec = SMALL, **changes) -> Spec:
     return replace(spec, scene=replace(spec.scene, **changes))
 
 
-def nobody(camera: Camera) -> Renderer:
+def nobody(camera: Camera) -> PersonRenderer:
     """A renderer with hardly anything to draw, for its rays."""
-    return Renderer(camera, Surface.of([ball("pelvis", np.zeros(3), np.zeros(3), (0.1,) * 3, blend=0.01)]), Clothes(), LIGHTS)
+    return PersonRenderer(camera, Surface.of([ellipsoid("pelvis", np.zeros(3), np.zeros(3), (0.1,) * 3, blend=0.01)]), Clothes(), LIGHTS)
 
 
 def grown(mask: np.ndarray, pixels: int = 1) -> np.ndarray:
@@ -70,7 +70,7 @@ def test_old_specs_give_what_they_gave(tmp_path):
                 rate=2, turn_deg=5, scene=Scene(clothing=3, room=4, shadow=0.3))  # fmt: skip
     for_motion, for_noise = np.random.default_rng(11).spawn(2)
     _, figure = perform(spec, for_motion)
-    film = list(Studio(spec, spec.cameras[0].camera(), for_noise.spawn(1)[0]).film(figure))
+    film = list(SceneRenderer(spec, spec.cameras[0].camera(), for_noise.spawn(1)[0]).film(figure))
     np.testing.assert_allclose(figure.joints[[4, 9], JOINTS.index("left_hand")], HANDS, atol=2e-6)
     area = [int((picture.mask > 0).sum()) for picture in film]
     np.testing.assert_allclose(area, AREAS, atol=2)  # the arithmetic of processors may differ by a grazing ray
@@ -103,7 +103,7 @@ def test_a_perfect_ring_is_evenly_spread_and_looks_at_the_middle(count, radius, 
     np.testing.assert_allclose(centres[:, 2], height)
     along = np.arctan2(centres[:, 1], centres[:, 0])
     np.testing.assert_allclose(np.mod(np.diff(along), 2 * np.pi), 2 * np.pi / count, atol=1e-9)
-    middle = np.array([0, 0, MIDDLE * stature])
+    middle = np.array([0, 0, BODY_CENTRE * stature])
     if abs(np.degrees(np.arctan2(height - middle[2], radius))) < 60:
         for camera in cameras:
             np.testing.assert_allclose(camera.project(middle), (np.array(camera.size) - 1) / 2, atol=1e-6)
@@ -116,11 +116,11 @@ def test_a_rings_cameras_stray_as_far_as_told_and_no_farther(jitter, seed):
     views, perfect = ring.views(1.75), replace(ring, jitter=0).views(1.75)
     for view, wanted in zip(views, perfect):
         off = (view.azimuth_deg - wanted.azimuth_deg + 180) % 360 - 180
-        assert abs(off) <= jitter * JITTER["azimuth_deg"] + 1e-9
-        assert abs(view.height - wanted.height) <= jitter * JITTER["height"] + 1e-9
-        assert abs(view.distance / wanted.distance - 1) <= jitter * STRAY + 1e-9
-        assert 0 < abs(view.roll_deg) <= jitter * JITTER["roll_deg"]
-        pixel = view.camera().project([0, 0, MIDDLE * 1.75])
+        assert abs(off) <= jitter * RING_JITTER["azimuth_deg"] + 1e-9
+        assert abs(view.height - wanted.height) <= jitter * RING_JITTER["height"] + 1e-9
+        assert abs(view.distance / wanted.distance - 1) <= jitter * RING_SCALE_JITTER + 1e-9
+        assert 0 < abs(view.roll_deg) <= jitter * RING_JITTER["roll_deg"]
+        pixel = view.camera().project([0, 0, BODY_CENTRE * 1.75])
         assert np.linalg.norm(pixel - 0.5 * np.array(view.size)) < 0.2 * view.size[0]
     assert views == ring.views(1.75)
     assert views != replace(ring, seed=seed + 1).views(1.75)
@@ -160,14 +160,14 @@ def test_a_fisheyes_picture_is_as_wide_as_told_and_its_rays_lead_back(fov, k):
 def test_a_ball_and_all_joints_are_where_the_camera_projects_them(view):
     radius, centre = 0.25, np.array([0.25, 0.1, 1.4])
     camera, origin = view.camera(), standing().origin[0, SEGMENTS.index("pelvis")]
-    one = Surface.of([ball("pelvis", origin, centre, (radius,) * 3, blend=0.01)])
-    seen = Renderer(camera, one, Clothes(), LIGHTS).draw(standing(), 0)
+    one = Surface.of([ellipsoid("pelvis", origin, centre, (radius,) * 3, blend=0.01)])
+    seen = PersonRenderer(camera, one, Clothes(), LIGHTS).draw(standing(), 0)
     pixels = np.stack(np.meshgrid(*map(np.arange, view.size)), -1)
     rays = camera.rays(pixels) @ camera.T_camera_world[:3, :3]
     along = ((centre - camera.centre) * rays).sum(-1) / np.linalg.norm(rays, axis=-1)
     miss = np.sqrt(((centre - camera.centre) ** 2).sum() - along**2) - radius
     sure = np.abs(miss) > 0.003
-    np.testing.assert_array_equal(seen.mask[sure] == 255, (miss[sure] < 0) & (along[sure] > 0))
+    np.testing.assert_array_equal(seen.mask[sure], (miss[sure] < 0) & (along[sure] > 0))
 
     picture = shot(SMALL, standing(), view=view)
     joints = np.rint(camera.project(standing().joints[0])).astype(int)
@@ -234,13 +234,14 @@ def test_an_obstacle_takes_exactly_its_pixels_from_the_mask(kind):
     spec = replace(SMALL, cameras=(replace(VIEW, distance=3.0, height=1.2),))
     obstacle = Obstacle(kind=kind, ahead=0.8, left=0.15, turn_deg=20)
     plain, hidden = shot(spec, standing()), shot(with_scene(spec, obstacles=(obstacle,)), standing())
-    thing = Furniture([obstacle]).met(spec.cameras[0].camera().centre, nobody(spec.cameras[0].camera()).rays)[0] < FAR
+    thing = Furniture([obstacle]).intersect(spec.cameras[0].camera().centre, nobody(spec.cameras[0].camera()).rays)[0] < FAR
     lost = (plain.mask > 0) & (hidden.mask == 0)
     np.testing.assert_array_equal(hidden.mask > 0, (plain.mask > 0) & ~thing)
     assert hidden.hidden == lost.sum() > 5
     assert plain.hidden == 0
     # What shows through is the thing itself, and what it does not touch is as it was.
-    bare = Studio(with_scene(spec, obstacles=(obstacle,), shadow=0), spec.cameras[0].camera(), np.random.default_rng(0)).empty().astype(int)
+    unshaded = with_scene(spec, obstacles=(obstacle,), shadow=0)
+    bare = SceneRenderer(unshaded, spec.cameras[0].camera(), np.random.default_rng(0)).empty().astype(int)
     inner = ~grown(~lost)
     dark = shot(with_scene(spec, obstacles=(obstacle,), shadow=0), standing()).image.astype(int)
     assert np.abs(dark - bare)[inner].max(initial=0) <= 4  # the lens blurs a little
@@ -259,12 +260,19 @@ def test_the_empty_scene_shows_the_thing_and_its_shadow():
     view = replace(VIEW, distance=3.5)
     things = (Obstacle(kind="table", ahead=0.5),)
     spec = replace(SMALL, cameras=(view,))
-    empty = [Studio(with_scene(spec, obstacles=o, shadow=shadow), view.camera(), np.random.default_rng(0)).empty()
+    empty = [SceneRenderer(with_scene(spec, obstacles=o, shadow=shadow), view.camera(), np.random.default_rng(0)).empty()
              for o, shadow in (((), 0.6), (things, 0.0), (things, 0.6))]  # fmt: skip
     bare, alone, shaded = (image.astype(int) for image in empty)
     assert (np.abs(alone - bare).max(-1) > 15).mean() > 0.03
     assert (shaded <= alone + 1).all()
-    assert (shaded < 0.8 * alone).any()
+    room = SceneRenderer(with_scene(spec, obstacles=things), view.camera(), np.random.default_rng(0)).room
+    points = room._points(np.stack(np.meshgrid(*map(np.arange, view.size)), -1))[0]
+    lit = Furniture(things).layer(view.camera().centre, nobody(view.camera()).rays, nobody(view.camera()).fine_rays(), LIGHTS)
+    shadow = Furniture(things).shades(points, room.lights[0, :3]) & ~lit.mask
+    dark = (shaded < 0.8 * alone).all(-1)
+    assert shadow.sum() > 40
+    assert dark[shadow].mean() > 0.9
+    assert not (dark & ~grown(shadow, 2)).any()
 
 
 # Other people
@@ -272,7 +280,7 @@ def test_the_empty_scene_shows_the_thing_and_its_shadow():
 
 def test_somebody_behind_takes_nothing_and_is_in_the_mask_of_all():
     someone = Bystander(kind="man", ahead=-0.9, left=0.6)
-    other = standing(body_of(someone), someone.left, someone.ahead, **gestures.HANGING_ARMS)
+    other = standing(bystander_body(someone), someone.left, someone.ahead, **gestures.HANGING_ARMS)
     spec = with_scene(bystanders=(someone,), shadow=0)
     alone, both = shot(with_scene(shadow=0), standing()), shot(spec, standing(), others=(other,))
     np.testing.assert_array_equal(both.mask, alone.mask)
@@ -291,7 +299,7 @@ def test_somebody_behind_takes_nothing_and_is_in_the_mask_of_all():
 
 def test_somebody_in_front_hides_the_person():
     someone = Bystander(kind="woman", ahead=0.8, left=0.3)
-    other = standing(body_of(someone), someone.left, someone.ahead)
+    other = standing(bystander_body(someone), someone.left, someone.ahead)
     alone, both = shot(SMALL, standing()), shot(with_scene(bystanders=(someone,)), standing(), others=(other,))
     assert not ((both.mask > 0) & (alone.mask == 0)).any()
     lost = (alone.mask > 0) & (both.mask == 0)
@@ -314,7 +322,7 @@ def test_a_bystander_keeps_to_their_place_and_casts_a_shadow(tmp_path):
     masks, people = ([f.image for f in open_frames(folder / kind / "cam.mkv", grey=True)] for kind in ("masks", "people"))
     assert len(masks) == len(people) == 8
     assert all((b >= a).all() and (b > a).any() for a, b in zip(masks, people))
-    room = Studio(spec, VIEW.camera(), np.random.default_rng(0), figures).room
+    room = SceneRenderer(spec, VIEW.camera(), np.random.default_rng(0), figures).room
     person = standing()
     assert (room.shaded(person, 0, standing(left=0.9)) <= room.shaded(person, 0) + 1e-12).all()
 
@@ -324,21 +332,22 @@ def test_a_bystander_keeps_to_their_place_and_casts_a_shadow(tmp_path):
 
 def test_brightness_wobbles_and_drifts():
     calm, lively = Scene(), Scene(flicker=0.1, flicker_hz=2.0, drift=-0.3)
-    assert all(brightness(calm, t, 10) == 1 for t in (-3, 0, 4.2))
-    assert brightness(lively, 0, 10) == 1
-    assert brightness(lively, 0.125, 10) == pytest.approx(1.1, abs=1e-3)
-    assert brightness(lively, -0.125, 10) == pytest.approx(0.9, abs=1e-3)  # the empty scene's lamps are the same
-    assert brightness(lively, 10, 10) == pytest.approx(0.7)
-    assert brightness(replace(lively, flicker=0.0), 5, 10) == pytest.approx(0.85)
+    assert all(lamp_brightness(calm, t, 10) == 1 for t in (-3, 0, 4.2))
+    assert lamp_brightness(lively, 0, 10) == 1
+    assert lamp_brightness(lively, 0.125, 10) == pytest.approx(1.1, abs=1e-3)
+    assert lamp_brightness(lively, -0.125, 10) == pytest.approx(0.9, abs=1e-3)  # the empty scene's lamps are the same
+    assert lamp_brightness(lively, 10, 10) == pytest.approx(0.7)
+    assert lamp_brightness(replace(lively, flicker=0.0), 5, 10) == pytest.approx(0.85)
 
 
 def test_the_films_show_what_the_light_does():
     spec = with_scene(replace(SMALL, rate=4), flicker=0.2, flicker_hz=1.0, drift=0.3, background="plain", shadow=0)
     _, figure = perform(spec, np.random.default_rng(0))
-    studio, still = (Studio(one, VIEW.camera(), np.random.default_rng(0)) for one in (spec, with_scene(spec, flicker=0.0, drift=0.0)))
+    studio, still = (SceneRenderer(one, VIEW.camera(), np.random.default_rng(0))
+                     for one in (spec, with_scene(spec, flicker=0.0, drift=0.0)))
     lit, calm = list(studio.film(figure)), list(still.film(figure))
     seconds = np.arange(len(lit)) / 4
-    wanted = np.array([brightness(spec.scene, t, seconds[-1]) for t in seconds])
+    wanted = np.array([lamp_brightness(spec.scene, t, seconds[-1]) for t in seconds])
     corner = np.array([a.image[:8, :8].mean() / b.image[:8, :8].mean() for a, b in zip(lit, calm)])
     np.testing.assert_allclose(corner, wanted, atol=0.01)
     assert np.ptp(wanted) > 0.3
@@ -351,15 +360,15 @@ def test_pictures_are_the_same_whatever_the_number_of_threads_with_everything_in
     someone = Bystander(kind="child", ahead=0.5, left=-0.5)
     spec = with_scene(replace(SMALL, rate=3), obstacles=(Obstacle(kind="chair"),), bystanders=(someone,), flicker=0.1, noise=5)
     _, figure = perform(spec, np.random.default_rng(0))
-    other = pose(body_of(someone), np.repeat(gestures.posture(), len(figure.joints), 0))
-    films = [list(Studio(spec, VIEW.camera(), np.random.default_rng(1), [other]).film(figure, workers)) for workers in (1, 3)]
+    other = pose(bystander_body(someone), np.repeat(gestures.posture(), len(figure.joints), 0))
+    films = [list(SceneRenderer(spec, VIEW.camera(), np.random.default_rng(1), [other]).film(figure, workers)) for workers in (1, 3)]
     for a, b in zip(*films):
         assert all(np.array_equal(x, y) for x, y in zip(a, b))
 
 
 def test_backgrounds_differ_as_told():
     def roughness(kind):
-        studio = Studio(with_scene(background=kind, room=5), replace(VIEW, size=(160, 120)).camera(), np.random.default_rng(0))
+        studio = SceneRenderer(with_scene(background=kind, room=5), replace(VIEW, size=(160, 120)).camera(), np.random.default_rng(0))
         grey = studio.room.picture.mean(-1)
         return float(np.abs(np.diff(grey, axis=1)).mean())
 
@@ -371,13 +380,13 @@ def test_backgrounds_differ_as_told():
 @pytest.mark.parametrize("kind", ["room", "plain", "cluttered", "textured"])
 def test_two_cameras_at_one_place_see_the_same_room(kind):
     wide, narrow = replace(VIEW, fov_deg=60, size=(120, 90)), replace(VIEW, fov_deg=60, size=(60, 45))
-    rooms = [Studio(with_scene(background=kind), view.camera(), np.random.default_rng(0)).room for view in (wide, narrow)]
+    rooms = [SceneRenderer(with_scene(background=kind), view.camera(), np.random.default_rng(0)).room for view in (wide, narrow)]
     halved = rooms[0].picture.reshape(45, 2, 60, 2, 3).mean((1, 3))
     assert np.abs(halved - rooms[1].picture).mean() < 0.03
 
 
 def test_camouflage_dyes_the_clothes():
-    studios = [Studio(with_scene(camouflage=share), VIEW.camera(), np.random.default_rng(0)) for share in (0.0, 0.5, 1.0)]
+    studios = [SceneRenderer(with_scene(camouflage=share), VIEW.camera(), np.random.default_rng(0)) for share in (0.0, 0.5, 1.0)]
     off = [np.linalg.norm(s.renderer.colours[1] - s.room.wall_colour) for s in studios]
     assert off[1] == pytest.approx(off[0] / 2)
     assert off[2] == pytest.approx(0, abs=1e-12)
@@ -411,10 +420,10 @@ def test_layers_go_over_one_another_by_depth_whatever_their_order(values):
     for light, alpha, _ in sorted(values, key=lambda value: -value[2]):
         wanted = light * alpha + (1 - alpha) * wanted
     for order in itertools.islice(itertools.permutations(layers), 6):
-        np.testing.assert_allclose(composed(room, order), wanted)
+        np.testing.assert_allclose(composite(room, order), wanted)
     nearest = min(range(len(values)), key=lambda n: values[n][2])
     for n, one in enumerate(layers):
-        assert in_front(one, layers[:n] + layers[n + 1 :]).all() == (n == nearest)
+        assert visible(one, layers[:n] + layers[n + 1 :]).all() == (n == nearest)
 
 
 @given(seed=st.integers(0, 999), people=st.integers(1, 2), things=st.integers(0, 2))
@@ -430,7 +439,7 @@ def test_people_are_sorted_in_where_they_are_as_everywhere(seed, people, things)
         depth = np.where(alpha > 0.5, rng.uniform(1, 3, alpha.shape), FAR)
         layers.append(Layer(rng.uniform(size=(9, 11, 3)) * alpha[..., None], alpha, depth))
     room = rng.uniform(size=(9, 11, 3))
-    np.testing.assert_allclose(pictured(room, layers[:people], layers[people:]), composed(room, layers), atol=1e-12)
+    np.testing.assert_allclose(composite_people(room, layers[:people], layers[people:]), composite(room, layers), atol=1e-12)
 
 
 def test_a_half_covered_pixel_counts_at_its_neighbours_depth():

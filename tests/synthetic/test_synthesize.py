@@ -35,10 +35,10 @@ from shadowpuppet.synthetic import (
     spec_text,
     synthesize,
 )
-from shadowpuppet.synthetic.movement.gestures import MOTIONS
+from shadowpuppet.synthetic.movement.gestures import GESTURES
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.shorthand import Shorthand, expanded, gestures_from
-from shadowpuppet.synthetic.spec_file import HEAD, seed_of
+from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes, parse_gestures
+from shadowpuppet.synthetic.spec_file import SPEC_HEADER, seed_of
 from shadowpuppet.video import open_frames
 
 TINY = ["--size", "64x48", "--rate", "4", "--seconds", "2"]
@@ -72,7 +72,7 @@ views = st.builds(Viewpoint, size=st.tuples(sides, sides), fov_deg=st.floats(20,
                   distance=st.floats(2.5, 9), azimuth_deg=st.floats(-180, 180), pitch_deg=st.floats(-40, 40),
                   roll_deg=st.floats(-180, 180), yaw_deg=st.floats(-40, 40),
                   distortion=st.sampled_from([(), (-0.02, 0.01, 0.0, 0.0)]))  # fmt: skip
-gestures = st.builds(Gesture, motion=st.sampled_from(sorted(MOTIONS)), seconds=st.floats(2, 99))
+gestures = st.builds(Gesture, motion=st.sampled_from(sorted(GESTURES)), seconds=st.floats(2, 99))
 specs = st.builds(
     Spec,
     name=st.from_regex(r"[A-Za-z0-9_-]{1,9}", fullmatch=True),
@@ -187,7 +187,7 @@ def test_gestures_without_seconds_share_what_is_left(lengths, spare):
     text = ", ".join("reach" + (f" {length}" if length else "") for length in lengths)
     open_ = lengths.count(None)
     total = sum(filter(None, lengths)) + 2 * open_ + spare
-    found = gestures_from(text, total if open_ else None)
+    found = parse_gestures(text, total if open_ else None)
     assert sum(g.seconds for g in found) == pytest.approx(total if open_ else sum(filter(None, lengths)))
     assert [g.seconds for g, length in zip(found, lengths) if length] == [length for length in lengths if length]
     assert len({g.seconds for g, length in zip(found, lengths) if not length}) <= 1
@@ -203,13 +203,13 @@ def test_gestures_without_seconds_share_what_is_left(lengths, spare):
 ])  # fmt: skip
 def test_gestures_that_cannot_be_meant_are_told(text, seconds, told):
     with pytest.raises(SettingsError, match=told):
-        gestures_from(text, seconds)
+        parse_gestures(text, seconds)
 
 
 def test_words_go_over_a_spec_and_leave_the_rest():
     spec = replace(SMALL, seed=5, rate=30)
-    assert expanded(Shorthand(), spec) == spec
-    changed = expanded(Shorthand(noise=9.0, fov=40, height=1.6, occluder="chair", second_person="aside", crf=30), spec)
+    assert apply_changes(SpecChanges(), spec) == spec
+    changed = apply_changes(SpecChanges(noise=9.0, fov=40, height=1.6, occluder="chair", second_person="aside", crf=30), spec)
     assert changed.scene.noise == 9
     assert changed.scene.crf == 30
     assert changed.cameras[0] == replace(spec.cameras[0], fov_deg=40)
@@ -218,24 +218,25 @@ def test_words_go_over_a_spec_and_leave_the_rest():
     assert (changed.rate, changed.seed) == (30, 5)
     assert [thing.kind for thing in changed.scene.obstacles] == ["chair"]
     assert len(changed.scene.bystanders) == 1
-    child = expanded(Shorthand(body="child"), spec).body
+    child = apply_changes(SpecChanges(body="child"), spec).body
     assert child.stature < 1.6
-    assert child == expanded(Shorthand(body="child"), spec).body != expanded(Shorthand(body="child"), replace(spec, seed=6)).body
-    stretched = expanded(Shorthand(seconds=12), Spec(motion=gestures_from("reach 2, twist 4")))
+    assert child == apply_changes(SpecChanges(body="child"), spec).body
+    assert child != apply_changes(SpecChanges(body="child"), replace(spec, seed=6)).body
+    stretched = apply_changes(SpecChanges(seconds=12), Spec(motion=parse_gestures("reach 2, twist 4")))
     assert [g.seconds for g in stretched.motion] == [4, 8]
 
 
 def test_one_camera_becomes_a_ring_and_back():
     lens = replace(SMALL, cameras=(replace(SMALL.cameras[0], fov_deg=80.0, distortion=(-0.1, 0.02, 0.0, 0.0)),))
-    ring = expanded(Shorthand(cameras=5, ring_radius=4.5), lens)
+    ring = apply_changes(SpecChanges(cameras=5, ring_radius=4.5), lens)
     assert ring.ring == Ring(count=5, radius=4.5, size=(64, 48), fov_deg=80, distortion=(-0.1, 0.02, 0.0, 0.0))
-    higher = expanded(Shorthand(cameras=3, camera_height=2.2, size="80x60"), ring)
+    higher = apply_changes(SpecChanges(cameras=3, camera_height=2.2, size="80x60"), ring)
     assert higher.ring == replace(ring.ring, count=3, height=2.2, size=(80, 60))
-    assert expanded(Shorthand(cameras=1, distance=3.0), ring).cameras == (Viewpoint(distance=3.0),)
+    assert apply_changes(SpecChanges(cameras=1, distance=3.0), ring).cameras == (Viewpoint(distance=3.0),)
     two = replace(SMALL, cameras=(Viewpoint(name="a"), Viewpoint(name="b")))
-    assert [view.fov_deg for view in expanded(Shorthand(fov=50), two).cameras] == [50, 50]
+    assert [view.fov_deg for view in apply_changes(SpecChanges(fov=50), two).cameras] == [50, 50]
     with pytest.raises(SettingsError, match="cameras: found 4, but the spec places its 2 cameras itself"):
-        expanded(Shorthand(cameras=4), two)
+        apply_changes(SpecChanges(cameras=4), two)
 
 
 # The command
@@ -291,9 +292,9 @@ def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
 
 
 def test_training_motion_is_another_or_none_where_the_spec_says_so(tmp_path):
-    spec = replace(SMALL, cameras=(Viewpoint(),), ring=Ring(count=2, size=(48, 32)), rate=4, motion=gestures_from("squat 2"))
+    spec = replace(SMALL, cameras=(Viewpoint(),), ring=Ring(count=2, size=(48, 32)), rate=4, motion=parse_gestures("squat 2"))
     made = {}
-    for name, training in (("same", None), ("other", gestures_from("overhead 2.5")), ("none", ())):
+    for name, training in (("same", None), ("other", parse_gestures("overhead 2.5")), ("none", ())):
         wanted = replace(spec, training=training)
         assert spec_from(tomllib.loads(spec_text(wanted))) == wanted
         made[name] = make_recording(wanted, tmp_path / name)
@@ -315,7 +316,7 @@ def test_the_spec_shown_is_the_spec_made(shell, tmp_path):
     assert shell("mine.toml", "--show-spec")[1] == text
     assert shell("mine.toml", "-o", "one", "--quiet")[0] == 0
     assert read_spec(tmp_path / "one" / "spec.toml") == read_spec(tmp_path / "mine.toml")
-    assert (tmp_path / "one" / "spec.toml").read_text() == HEAD + text
+    assert (tmp_path / "one" / "spec.toml").read_text() == SPEC_HEADER + text
     assert (tmp_path / "one" / "people" / "cam1.mkv").exists()
 
 
@@ -443,7 +444,7 @@ def test_a_file_that_cannot_be_used_removes_nothing(shell, tmp_path):
 
 
 def test_a_film_may_show_a_part_of_the_motion():
-    whole = Spec(motion=gestures_from("walk 6"), rate=20)
+    whole = Spec(motion=parse_gestures("walk 6"), rate=20)
     times, figure = perform(whole, np.random.default_rng(1))
     some, part = perform(replace(whole, begin=3, frames=11), np.random.default_rng(1))
     np.testing.assert_allclose(some, times[:11])
@@ -454,7 +455,7 @@ def test_a_film_may_show_a_part_of_the_motion():
 
 
 def test_a_film_longer_than_its_motion_is_told(tmp_path):
-    spec = Spec(motion=gestures_from("walk 4"), rate=10, begin=2, frames=40)
+    spec = Spec(motion=parse_gestures("walk 4"), rate=10, begin=2, frames=40)
     with pytest.raises(SettingsError, match=r"frames: found 40 pictures at 10 a second after 2 s, expected at most 37"):
         perform(spec, np.random.default_rng(1))
     with pytest.raises(SettingsError, match=r"found 1 pictures .* after 60 s, expected at most 0"):
@@ -463,7 +464,7 @@ def test_a_film_longer_than_its_motion_is_told(tmp_path):
 
 def test_training_and_bystanders_of_a_part(tmp_path):
     scene = Scene(empty_seconds=0.3, bystanders=(Bystander(),))
-    spec = Spec(motion=gestures_from("walk 4"), rate=10, begin=1.0, frames=3, training_frames=7, ring=Ring(count=2, size=(64, 48)),
+    spec = Spec(motion=parse_gestures("walk 4"), rate=10, begin=1.0, frames=3, training_frames=7, ring=Ring(count=2, size=(64, 48)),
                 scene=scene)
     folder = synthesize(spec, tmp_path / "made")
     assert len(read_joints(folder / "truth.csv").times) == 3

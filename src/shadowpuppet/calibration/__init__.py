@@ -1,1 +1,1 @@
-"""Whether calibrated cameras agree: tangency, agreement, time offset, rotation; a calibration in words."""
+"""Do calibrated cameras agree? Epipolar tangency, agreement, time offsets and rotation errors; overview of a calibration."""

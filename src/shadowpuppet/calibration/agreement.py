@@ -1,33 +1,34 @@
-"""Which of several cameras disagrees with the others, by their silhouettes alone, and what would make it agree."""
+"""Agreement of several cameras' silhouettes: which camera disagrees with the others, by how much, and what would mend it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines, tangent_distances
-from shadowpuppet.calibration.silhouette_coverage import Coverage, meeting_place
+from shadowpuppet.calibration.epipolar_tangency import tangent_distances
+from shadowpuppet.calibration.silhouette_coverage import pixels_beyond, triangulated_centre
+from shadowpuppet.calibration.silhouettes import Row, outlines_of, silhouettes_of
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse
 
-DISAGREES = 0.01
-"""Pixels, over the picture's longer side, from which on cameras are in doubt (6 of 640); good ones are apart by one."""
-MENDED = 0.4
-"""A remedy is told where no more than this of the disagreement is left..."""
-ALIKE = 0.5
-"""... and a camera is blamed where no more than this is left without it."""
-MOVED = 12
-"""Sets by which a camera's pictures are moved, to and fro, to see whether they come late."""
-COMPARED, TRIED = 10, 4
+MAX_DISAGREEMENT = 0.01
+"""Disagreement from which on a camera is in doubt, over the picture's longer side (6 of 640 pixels); good cameras differ by one pixel."""
+REMEDY_SHARE = 0.4
+"""A remedy is named if it leaves at most this share of the disagreement."""
+BLAME_SHARE = 0.5
+"""A single camera is blamed if at most this share of the disagreement is left without it."""
+MAX_SHIFT = 12
+"""Greatest time shift of a camera that is tried, sets."""
+SETS_COMPARED, SETS_PER_REMEDY = 10, 4
 """Sets in which cameras are compared, and in which each remedy is tried."""
-MILLIMETRES = 100.0
-"""Height (metres by the calibration) of a person from which on it is in millimetres."""
-PEOPLE = (0.5, 2.8)
-"""Height of people, metres: sitting, and with raised arms."""
+MILLIMETRE_HEIGHT = 100.0
+"""Height of the person, metres by the calibration, from which on its unit is taken for millimetres."""
+PERSON_HEIGHTS = (0.5, 2.8)
+"""Range of people's heights, metres: sitting, and with raised arms."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,19 +36,19 @@ class Agreement:
     """How well cameras fit together; plain values."""
 
     names: tuple[str, ...]
-    """Of the cameras."""
+    """Names of the cameras."""
     apart: tuple[float | None, ...]
-    """By how many pixels each disagrees with the others (with those that agree, where one is to blame); None where it cannot be told."""
+    """Disagreement of each camera with the others, pixels (with those that agree, if one is to blame); None if unknown."""
     pairs: tuple[tuple[float | None, ...], ...]
-    """By how many pixels every two cameras' tangents differ."""
+    """Distance of the tangents of every two cameras, pixels."""
     limit: float
-    """Pixels from which on cameras are in doubt."""
+    """Disagreement from which on a camera is in doubt, pixels."""
     height: float | None
-    """What the silhouettes measure at their longest, at the place where they meet, metres by the calibration, median."""
+    """Median of the silhouettes' greatest extents at the place where they meet, metres by the calibration."""
     remedy: str | None = None
-    """What would make them agree, where that is known."""
+    """What would make the cameras agree, if known."""
     hopeless: bool = False
-    """Whether nothing can be tracked as it is."""
+    """Whether nothing can be tracked with this calibration."""
 
     @property
     def wrong(self) -> tuple[str, ...]:
@@ -55,11 +56,11 @@ class Agreement:
         return tuple(name for name, apart in zip(self.names, self.apart) if apart is not None and apart > self.limit)
 
     def refusal(self) -> str | None:
-        """Why tracking is hopeless, and the remedy; None where it is not."""
+        """Why tracking is hopeless, and the remedy; None if it is not."""
         return self.remedy if self.hopeless else None
 
     def doubts(self) -> tuple[str, ...]:
-        """Which cameras disagree, by how much, and the remedy, a sentence each; none where there is a refusal."""
+        """A sentence on each camera that disagrees, with the remedy; none if there is a refusal."""
         if self.hopeless:
             return ()
         if self.remedy is not None:
@@ -69,8 +70,8 @@ class Agreement:
     def _disagreements(self) -> Iterator[str]:
         rest = {name: apart for name, apart in zip(self.names, self.apart) if name not in self.wrong}
         if self.wrong and len(rest) < 2:
-            told = ", ".join(f"{name} {apart:.0f}" for name, apart in zip(self.names, self.apart) if apart is not None)
-            yield (f"the cameras' silhouettes do not fit together (pixels apart: {told}; expected under {self.limit:.0f}): does the "
+            values = ", ".join(f"{name} {apart:.0f}" for name, apart in zip(self.names, self.apart) if apart is not None)
+            yield (f"the cameras' silhouettes do not fit together (pixels apart: {values}; expected under {self.limit:.0f}): does the "
                    "calibration belong to these films, and were they begun together? calibrate again, or say in [start] of recording.toml "
                    "when each began")
             return
@@ -81,63 +82,64 @@ class Agreement:
                    f"{','.join(rest)}")
 
 
-def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan,
-              remedies: bool = True) -> Agreement:
-    """How well the cameras' silhouettes fit together: `masks` (H, W) by set and camera, None where there is none.
+def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan) -> Agreement:
+    """`compare_cameras` of masks (H, W) by set and camera, None where there is none."""
+    return compare_cameras(cameras, [silhouettes_of(row) for row in masks], seconds)
 
-    `seconds`: from set to set, by which it is told how late a film is; if left out, sets do not follow one another, and that is not asked.
-    `remedies`: whether what would mend them is looked for.
+
+def compare_cameras(cameras: Sequence[Camera], rows: Sequence[Row], seconds: float = np.nan, remedies: bool = True) -> Agreement:
+    """How well the cameras' silhouettes fit together.
+
+    seconds: time between consecutive sets; without it, sets are not consecutive and no camera is tried for being late.
+    remedies: whether to look for what would mend a disagreement.
     """
-    scene = _Scene(tuple(cameras), [list(row) for row in masks])
-    limit = DISAGREES * max(max(camera.size) for camera in cameras)
+    scene = _Scene(tuple(cameras), rows)
+    limit = MAX_DISAGREEMENT * max(max(camera.size) for camera in cameras)
     apart, blamed = scene.judged(limit)
     height = scene.height()
-    names, pairs = tuple(camera.name for camera in cameras), tuple(map(_plain, scene.tangents()))
-    found = Agreement(names=names, apart=_plain(apart), pairs=pairs, limit=limit, height=height)
-    if height is not None and height > MILLIMETRES:
-        told = (f"the calibration makes the person {height:,.0f} m high and the cameras up to {_spread(cameras):,.0f} m apart: it is in "
-                "millimetres, it seems; divide every translation in calibration.toml by 1000")
-        return replace(found, remedy=told, hopeless=True)
+    found = Agreement(names=tuple(camera.name for camera in cameras), apart=plain_values(apart), limit=limit, height=height,
+                      pairs=tuple(map(plain_values, scene.tangents())))
+    if height is not None and height > MILLIMETRE_HEIGHT:
+        spread = max(float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(cameras, 2))
+        remedy = (f"the calibration makes the person {height:,.0f} m high and the cameras up to {spread:,.0f} m apart: it is in "
+                  "millimetres, it seems; divide every translation in calibration.toml by 1000")
+        return replace(found, remedy=remedy, hopeless=True)
     if found.wrong:
         return replace(found, remedy=_remedy(scene, found, blamed, seconds) if remedies else None)
-    if height is not None and not PEOPLE[0] < height < PEOPLE[1]:
-        told = (f"the calibration makes the person {height:.2g} m high, expected {PEOPLE[0]:g} to {PEOPLE[1]:g} m: is it in metres? "
-                "multiply every translation in calibration.toml by what is missing")
-        return replace(found, remedy=told)
+    low, high = PERSON_HEIGHTS
+    if height is not None and not low < height < high:
+        remedy = (f"the calibration makes the person {height:.2g} m high, expected {low:g} to {high:g} m: is it in metres? "
+                  "multiply every translation in calibration.toml by what is missing")
+        return replace(found, remedy=remedy)
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """Cameras and what they saw, by set; what is known of each mask is shared by the scenes made from one another."""
+    """Cameras and their silhouettes by set."""
 
     cameras: tuple[Camera, ...]
-    masks: list[list[Mask | None]]
-    outlines: Outlines = field(default_factory=Outlines)
-    coverage: Coverage = field(default_factory=Coverage)
+    rows: Sequence[Row]
 
-    def rows(self, count: int = COMPARED) -> list[list[Mask | None]]:
-        """Some of the sets, spread."""
-        return [self.masks[f] for f in np.unique(np.linspace(0, len(self.masks) - 1, count).astype(int)) if self.masks]
+    def spread(self, count: int) -> list[Row]:
+        """`count` of the sets at most, evenly spread."""
+        return [self.rows[f] for f in np.unique(np.linspace(0, len(self.rows) - 1, count).astype(int)) if self.rows]
 
-    def seen(self, row: Sequence[Mask | None]) -> list[Outline | None]:
-        return [self.outlines.of(camera, mask) for camera, mask in zip(self.cameras, row)]
+    def tangents(self, count: int = SETS_COMPARED) -> Array:
+        """Distances (C, C) between the tangents of every two cameras, pixels."""
+        return tangent_distances(self.cameras, self.spread(count))
 
-    def tangents(self, count: int = COMPARED) -> Array:
-        """Pixels (C, C) between the tangents of every two cameras."""
-        return tangent_distances(self.cameras, [self.seen(row) for row in self.rows(count)])
-
-    def beyond(self, count: int = COMPARED) -> Array:
-        """Pixels (C, C + 1) of `Coverage.beyond`, median over sets."""
-        values = np.array([self.coverage.beyond(self.cameras, row, self.seen(row)) for row in self.rows(count)])
+    def beyond(self, count: int = SETS_COMPARED) -> Array:
+        """`pixels_beyond` (C, C + 1), median over sets."""
+        values = np.array([pixels_beyond(self.cameras, row) for row in self.spread(count)])
         return _median(values.reshape(-1, len(self.cameras), len(self.cameras) + 1))
 
     def total(self) -> float:
-        """One figure for how badly all fit together, pixels."""
-        return _mean(self.tangents(TRIED)) + float(np.nan_to_num(_mean(self.beyond(TRIED)[:, -1])))
+        """One figure for the disagreement of all cameras, pixels."""
+        return _mean(self.tangents(SETS_PER_REMEDY)) + float(np.nan_to_num(_mean(self.beyond(SETS_PER_REMEDY)[:, -1])))
 
     def judged(self, limit: float) -> tuple[Array, int | None]:
-        """By how many pixels each camera (C,) disagrees, and which one is to blame for it, if one alone is."""
+        """Disagreement of each camera (C,), pixels, and the index of the camera to blame, if it is a single one."""
         tangents, beyond = self.tangents(), self.beyond()
         lowest = np.array([_lower_median(row) for row in tangents])  # so that one wrong camera blames no other
         apart, C = np.fmax(lowest, beyond[:, -1]), len(tangents)
@@ -147,18 +149,18 @@ class _Scene:
         if np.isnan(without).all():
             return apart, None
         w = int(np.nanargmin(without))
-        if without[w] > min(ALIKE * _mean(apart), limit):
+        if without[w] > min(BLAME_SHARE * _mean(apart), limit):
             return apart, None
         rest = np.fmax(lowest, beyond[:, w])
         rest[w] = apart[w]
         return rest, w
 
     def height(self) -> float | None:
-        """What the silhouettes measure at their longest, at the place where they meet; the median."""
+        """Median of the silhouettes' greatest extents at the place where they meet, metres."""
         heights = []
-        for row in self.rows():
-            outlines = self.seen(row)
-            middle = meeting_place(self.cameras, outlines)
+        for row in self.spread(SETS_COMPARED):
+            outlines = outlines_of(self.cameras, row)
+            middle = triangulated_centre(self.cameras, outlines)
             for camera, outline in zip(self.cameras, outlines):
                 if middle is not None and outline is not None:
                     mean = outline.rays.mean(0)
@@ -171,23 +173,23 @@ class _Scene:
 
 
 def _remedy(scene: _Scene, found: Agreement, blamed: int | None, seconds: float) -> str | None:
-    """What would make the cameras agree; None where nothing of what is known to happen would."""
+    """The one of the known mistakes that explains the disagreement best, with its remedy; None if none does."""
     before = scene.total()
-    tried = ((changed.total(), told) for changed, told in _changes(scene, found.names, blamed, seconds))
-    after, told = min(tried, key=lambda each: each[0])
-    if after > min(MENDED * before, found.limit):
+    tried = ((changed.total(), sentence) for changed, sentence in _changes(scene, found.names, blamed, seconds))
+    after, sentence = min(tried, key=lambda each: each[0])
+    if after > min(REMEDY_SHARE * before, found.limit):
         return None
-    return f"{told}: then all agree within {after:.1f} pixels, instead of {before:.0f}"
+    return f"{sentence}: then all agree within {after:.1f} pixels, instead of {before:.0f}"
 
 
 def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: float) -> Iterator[tuple[_Scene, str]]:
-    """What may be wrong: the scene with it mended, and how to say so."""
+    """Known mistakes: the scene with each mended, and the sentence to the user."""
     C = len(names)
     for a, b in combinations(range(C), 2):
         if scene.cameras[a].size == scene.cameras[b].size:
             order = list(range(C))
             order[a], order[b] = b, a
-            yield (replace(scene, masks=[[row[n] for n in order] for row in scene.masks]),
+            yield (replace(scene, rows=[[row[n] for n in order] for row in scene.rows]),
                    f"cameras {names[a]!r} and {names[b]!r} are swapped, it seems; exchange their films, or their names in calibration.toml")
     for n in range(C):
         yield _mirrored(scene, [n]), f"camera {names[n]!r} shows mirrored pictures, it seems; turn the mirroring off, or flip its film"
@@ -200,21 +202,22 @@ def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: f
     if not np.isfinite(seconds):
         return
     for n in range(C) if blamed is None and C < 4 else [blamed] if blamed is not None else []:
-        for steps in range(-MOVED, MOVED + 1):
+        for steps in range(-MAX_SHIFT, MAX_SHIFT + 1):
             if steps:
                 yield _shifted(scene, n, steps), _late(names, n, seconds * steps)
 
 
 def _mirrored(scene: _Scene, which: Sequence[int]) -> _Scene:
-    return replace(scene, masks=[[np.ascontiguousarray(mask[:, ::-1]) if mask is not None and n in which else mask
-                                  for n, mask in enumerate(row)] for row in scene.masks])
+    """The scene with the pictures of the cameras `which` mirrored."""
+    return replace(scene, rows=[[silhouette.mirrored() if silhouette is not None and n in which else silhouette
+                                 for n, silhouette in enumerate(row)] for row in scene.rows])
 
 
 def _shifted(scene: _Scene, n: int, steps: int) -> _Scene:
-    """With camera `n`'s pictures so many sets earlier; sets for which it then has none are left out."""
-    F = len(scene.masks)
-    return replace(scene, masks=[[*scene.masks[f][:n], scene.masks[f + steps][n], *scene.masks[f][n + 1 :]]
-                                 for f in range(F) if 0 <= f + steps < F])
+    """The scene with camera `n`'s pictures `steps` sets earlier; sets for which it then has none are left out."""
+    rows = scene.rows
+    return replace(scene, rows=[[*rows[f][:n], rows[f + steps][n], *rows[f][n + 1 :]]
+                                for f in range(len(rows)) if 0 <= f + steps < len(rows)])
 
 
 def _late(names: Sequence[str], n: int, late: float) -> str:
@@ -238,17 +241,13 @@ def _mean(values: Array) -> float:
 
 
 def _median(values: Array) -> Array:
-    """Over the first axis, of what is known; not a number where nothing is."""
+    """Over the first axis, without NaN; NaN where there is nothing else."""
     known = np.isfinite(values).any(0)
     out = np.full(values.shape[1:], np.nan)
     out[known] = np.nanmedian(values[:, known], axis=0)
     return out
 
 
-def _spread(cameras: Sequence[Camera]) -> float:
-    """Greatest distance between two cameras, metres by the calibration."""
-    return max(float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(cameras, 2))
-
-
-def _plain(values: Array) -> tuple[float | None, ...]:
+def plain_values(values: Array) -> tuple[float | None, ...]:
+    """Values rounded to 0.01, None for NaN: as they are saved."""
     return tuple(round(float(value), 2) if np.isfinite(value) else None for value in values)

@@ -1,6 +1,6 @@
-"""Outermost planes through two cameras that touch a silhouette: both cameras' must be the same (epipolar tangency).
+"""Epipolar tangency: the outermost planes through two camera centres that touch the silhouettes must be the same for both cameras.
 
-After Wong & Cipolla 2001, "Structure and motion from silhouettes". Distances are told in pixels.
+After Wong & Cipolla 2001, "Structure and motion from silhouettes". Distances are in pixels.
 """
 
 from __future__ import annotations
@@ -11,66 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 
-WIDE = 2.6
-"""Radians that a silhouette may cover around the line from camera to camera: beyond, that line runs through or along it."""
-EVERY = 2
-"""Pixels of a contour from one taken to the next."""
-BORDER = 2
-"""Pixels from the picture's border within which nothing can be said of an outline."""
-SMALL = 0.1
-"""Outlines shorter than this, over the longest, are specks."""
+MAX_ANGULAR_EXTENT = 2.6
+"""Greatest angle (rad) of a silhouette about the baseline: beyond it, the baseline runs through or along the person."""
 
 
-class Outline(NamedTuple):
-    """A silhouette's outline as one camera sees it."""
-
-    pixels: Array
-    """Of shape (K, 2)."""
-    firm: Mask
-    """Whether each is far from the picture's border, of shape (K,)."""
-    rays: Array
-    """Unit directions in the world, of shape (K, 3)."""
-
-
-class Outlines:
-    """Outlines of masks in cameras, each found once."""
-
-    def __init__(self) -> None:
-        """None yet."""
-        self._pixels: dict[int, tuple[Mask, Array, Mask]] = {}
-        self._known: dict[tuple[int, int], tuple[Camera, Outline]] = {}
-
-    def of(self, camera: Camera, mask: Mask | None) -> Outline | None:
-        """The outline of a mask (H, W); None where nobody is in it."""
-        if mask is None or not may_be_person(mask):
-            return None
-        if id(mask) not in self._pixels:
-            self._pixels[id(mask)] = (mask, *_followed(mask))  # the mask is kept, so that no other gets its number
-        if (id(camera), id(mask)) not in self._known:
-            _, pixels, firm = self._pixels[id(mask)]
-            rays = camera.rays(pixels) @ camera.T_camera_world[:3, :3]
-            self._known[id(camera), id(mask)] = camera, Outline(pixels, firm, rays / np.linalg.norm(rays, axis=1, keepdims=True))
-        return self._known[id(camera), id(mask)][1]
-
-
-def _followed(mask: Mask) -> tuple[Array, Mask]:
-    import cv2
-
-    contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
-    longest = max(map(len, contours))
-    pixels = np.concatenate([c[::EVERY, 0] for c in contours if len(c) > SMALL * longest]).astype(float)
-    return pixels, np.asarray(((pixels >= BORDER) & (pixels < np.array(mask.shape[::-1]) - BORDER)).all(1))
-
-
-def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]]) -> Array:
-    """Median distance (C, C) of the tangents of every two cameras, pixels, over rows of outlines; not a number where there is none."""
+def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Row]) -> Array:
+    """Median distance (C, C) of the tangents of every two cameras over sets, pixels; NaN where there is none."""
     out = np.full((len(cameras), len(cameras)), np.nan)
+    outlines = [outlines_of(cameras, row) for row in rows]
     for i, j in combinations(range(len(cameras)), 2):
-        pairs = [(row[i], row[j]) for row in rows]
+        pairs = [(row[i], row[j]) for row in outlines]
         values = np.array([_apart(cameras[i], a, cameras[j], b) for a, b in pairs if a is not None and b is not None]).ravel()
         values = values[np.isfinite(values)]
         out[i, j] = out[j, i] = np.median(values) if len(values) else np.nan
@@ -78,21 +32,23 @@ def tangent_distances(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline
 
 
 class Tangents(NamedTuple):
-    """The outermost planes through two cameras that touch their silhouettes."""
+    """The outermost planes through two camera centres that touch their silhouettes."""
 
     angles: Array
-    """About the line from the first camera to the second (2 cameras, 2 planes), radians; not a number at a picture's border."""
+    """Angles about the baseline, of shape (2 cameras, 2 planes), radians; NaN at a picture's border."""
     levers: Array
-    """Pixels a radian is (2 planes,)."""
+    """Pixels per radian, of shape (2 planes,)."""
     lever: float
-    """Of both, mean."""
+    """Mean of `levers`."""
     reference: Array
-    """Where angles count from (3,)."""
+    """Direction of angle 0, of shape (3,)."""
 
 
 def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outline], reference: Array | None = None) -> Tangents | None:
-    """Where the tangent planes of two outlines lie; None where cameras stand at one place, or a silhouette lies about the line from one to
-    the other. `reference`: a direction (3,) to count from; if left out, the middle of both silhouettes."""
+    """The tangent planes of two outlines; None if the cameras stand at one place or a silhouette surrounds the baseline.
+
+    reference: direction (3,) of angle 0; by default the middle of both silhouettes.
+    """
     line = cameras[1].centre - cameras[0].centre
     length = float(np.linalg.norm(line))
     if length < 1e-9:
@@ -103,7 +59,7 @@ def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outl
         ahead = _unit(aside[0].sum(0)) + _unit(aside[1].sum(0))
         reference = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else aside[0].sum(0))
     angles = [np.arctan2(part @ np.cross(line, reference), part @ reference) for part in aside]
-    if max(float(np.ptp(each)) for each in angles) > WIDE:
+    if max(float(np.ptp(each)) for each in angles) > MAX_ANGULAR_EXTENT:
         return None
     focal = [float(np.diag(camera.matrix)[:2].mean()) for camera in cameras]
     out, levers = np.full((2, 2), np.nan), np.zeros(2)
@@ -115,7 +71,7 @@ def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outl
 
 
 def _apart(first: Camera, a: Outline, second: Camera, b: Outline) -> tuple[float, float]:
-    """Distances (pixels) of both pairs of outermost tangents; not a number at the border, or where they cannot be told."""
+    """Distances (pixels) of both pairs of outermost tangents; NaN at the border, or if unknown."""
     found = tangent_angles((first, second), (a, b))
     if found is None:
         return np.nan, np.nan

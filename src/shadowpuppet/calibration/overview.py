@@ -1,4 +1,4 @@
-"""A calibration in words: where cameras stand, what they look at, what of it they see together, and what is odd about it."""
+"""Overview of a calibration: where cameras stand, what they look at and see together, and what is implausible."""
 
 from __future__ import annotations
 
@@ -13,83 +13,83 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import UPS, Calibration, look_into
 
-PERSON = (0.0, 0.9, 1.8)
-"""Heights (metres) at which a standing person must be in the picture to be seen whole."""
-UPRIGHT = 0.7
-"""Cosine of the mean way up in the pictures to Z under which Z is not up; and to another axis, from which on it is that one."""
-SPREADS = (0.3, 30.0)
-"""Metres between the cameras farthest apart, beyond which lengths are hardly in metres."""
-ASIDE = 0.2
-"""How far from the picture's middle, over its size, a principal point is odd."""
-PAST = 0.35
-"""How far beside the place that all look at a camera may look, over its distance, before that is said."""
-AHEAD = 4.0
-"""Metres before cameras that the top view takes in where they do not look at one place, and its least side."""
-SIDE = 48
-"""Columns of the top view, and twice its rows."""
+PERSON_HEIGHTS = (0.0, 0.9, 1.8)
+"""Heights (metres) of a standing person that must lie in the picture for the person to be seen whole."""
+MIN_UP_COSINE = 0.7
+"""Least cosine of the pictures' mean up direction to an axis that counts as up."""
+RIG_EXTENT = (0.3, 30.0)
+"""Plausible range of the greatest distance between cameras, metres."""
+MAX_CENTRE_OFFSET = 0.2
+"""Greatest plausible distance of the principal point from the picture's middle, over its size."""
+MAX_AIM_OFFSET = 0.35
+"""Greatest distance of a camera's axis from the place that all look at, over its distance to the camera."""
+VIEW_DISTANCE = 4.0
+"""Metres before cameras that the top view shows if they do not look at one place; also its least side."""
+MAP_COLUMNS = 48
+"""Columns of the top view; it has half as many rows."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standpoint:
-    """One camera; plain values."""
+class CameraPlacement:
+    """Place, direction and lens of one camera; plain values."""
 
     name: str
     size: tuple[int, int]
     """Width and height, pixels."""
     fov: tuple[float, float]
-    """Across and down, degrees, without distortion."""
+    """Horizontal and vertical field of view, degrees, without distortion."""
     lens: str
     """pinhole, distorted or fisheye."""
     bend: float
-    """By how many pixels distortion moves the picture's corners, at most."""
+    """Greatest displacement of the picture's corners by distortion, pixels."""
     place: tuple[float, float, float]
-    """Metres."""
+    """Camera centre, metres."""
     facing: float
-    """The way it looks, seen from above: degrees counter-clockwise from x."""
+    """Viewing direction seen from above, degrees counter-clockwise from x."""
     down: float
-    """By how many degrees it looks down from the level."""
+    """Angle below the horizontal, degrees."""
     roll: float
-    """By how many degrees its pictures are turned clockwise about its axis."""
+    """Clockwise roll about its axis, degrees."""
     away: float | None
-    """Metres to the place that all look at; None where there is none."""
+    """Distance to the place that all look at, metres; None if there is none."""
     placed: bool
-    """Whether the file tells where it stands."""
+    """Whether the file gives its place and orientation."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationLook:
-    """What a calibration tells; plain values, so that it can be saved."""
+    """Overview of a calibration; plain values, so that it can be saved."""
 
     path: str
     format: str
     unit: str
-    """What the file's lengths are in."""
+    """Unit of the file's lengths."""
     unit_told: bool
-    """Whether the file says so, or the user; metres are taken otherwise."""
-    cameras: tuple[Standpoint, ...]
+    """Whether the file or the user states the unit; metres are assumed otherwise."""
+    cameras: tuple[CameraPlacement, ...]
     middle: tuple[float, float, float] | None
-    """The place that all look at, nearest to their axes, metres."""
+    """The point nearest to all optical axes, metres."""
     apart: tuple[float, float] | None
-    """Metres between the cameras nearest to each other and those farthest apart."""
+    """Least and greatest distance between two cameras, metres."""
     seen: tuple[tuple[int, ...], ...]
-    """How many cameras see a standing person whole, by rows of a map from its top (greatest y) and columns from its left."""
+    """Number of cameras that see a standing person whole, by rows (from the greatest y) and columns of a map."""
     corners: tuple[float, float, float, float]
-    """Of the map: least x and y, greatest x and y, metres."""
+    """Least x and y, greatest x and y of the map, metres."""
     notes: tuple[str, ...]
-    """How it was read."""
+    """How the file was read."""
     doubts: tuple[str, ...]
-    """What is odd, and the remedy, a sentence each."""
+    """What is implausible, and the remedy, a sentence each."""
 
 
 def look_at_calibration(path: str | Path, unit: str | None = None, up: str | None = None) -> tuple[CalibrationLook, Calibration]:
-    """What a calibration tells, and its cameras. Raises `CalibrationError`."""
+    """Overview of a calibration file, and its cameras. Raises `CalibrationError`."""
     found = look_into(path, unit, up)
     cameras, middle = found.cameras, meeting_point(found.cameras)
     gaps = [float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(cameras, 2)]
     corners = _corners(cameras, middle)
     look = CalibrationLook(
         path=str(path), format=found.format, unit=found.unit, unit_told=found.told,
-        cameras=tuple(_standpoint(camera, middle) for camera in cameras), middle=_three(middle) if middle is not None else None,
+        cameras=tuple(_placement(camera, middle) for camera in cameras), middle=_three(middle) if middle is not None else None,
         apart=(min(gaps), max(gaps)) if gaps else None, seen=tuple(map(tuple, _seen(cameras, corners).tolist())), corners=corners,
         notes=found.notes, doubts=tuple(_doubts(found, middle)),
     )  # fmt: skip
@@ -97,7 +97,7 @@ def look_at_calibration(path: str | Path, unit: str | None = None, up: str | Non
 
 
 def meeting_point(cameras: Sequence[Camera]) -> Array | None:
-    """The place (3,) nearest to the cameras' optical axes; None where these are nearly parallel, or it lies behind most of them."""
+    """The point (3,) nearest to the cameras' optical axes; None if they are nearly parallel, or it lies behind most cameras."""
     axes = np.array([camera.T_camera_world[2, :3] for camera in cameras]).reshape(-1, 3)
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     A, b = across.sum(0), sum((P @ camera.centre for P, camera in zip(across, cameras)), np.zeros(3))
@@ -108,17 +108,17 @@ def meeting_point(cameras: Sequence[Camera]) -> Array | None:
     return middle if 2 * sum(ahead) > len(cameras) else None
 
 
-def way_up(cameras: Sequence[Camera]) -> Array:
-    """What is up in the pictures, on the whole, in the world (3,), at most 1 long."""
+def up_direction(cameras: Sequence[Camera]) -> Array:
+    """Mean of the pictures' up directions in the world, of shape (3,), at most 1 long."""
     return -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
 
 
-def _standpoint(camera: Camera, middle: Array | None) -> Standpoint:
+def _placement(camera: Camera, middle: Array | None) -> CameraPlacement:
     R, (width, height) = camera.T_camera_world[:3, :3], camera.size
     fov = [float(np.degrees(2 * np.arctan(side / 2 / focal))) for side, focal in zip(camera.size, np.diag(camera.matrix))]
     lens = "fisheye" if camera.fisheye else "distorted" if camera.distortion.any() else "pinhole"
     away = float(np.linalg.norm(middle - camera.centre)) if middle is not None else None
-    return Standpoint(
+    return CameraPlacement(
         name=camera.name, size=(width, height), fov=(fov[0], fov[1]), lens=lens, bend=_bend(camera), place=_three(camera.centre),
         facing=float(np.degrees(np.arctan2(R[2, 1], R[2, 0]))),
         down=float(np.degrees(-np.arcsin(np.clip(R[2, 2], -1, 1)))), roll=float(np.degrees(np.arctan2(-R[0, 2], -R[1, 2]))), away=away,
@@ -127,13 +127,13 @@ def _standpoint(camera: Camera, middle: Array | None) -> Standpoint:
 
 
 def _bend(camera: Camera) -> float:
-    """Pixels by which distortion moves the corners of the picture."""
+    """Greatest displacement of the picture's corners by distortion, pixels."""
     if not (camera.fisheye or camera.distortion.any()):
         return 0.0
     width, height = camera.size
     corners = np.array([[0, 0, 1], [width - 1, 0, 1], [0, height - 1, 1], [width - 1, height - 1, 1]], float)
-    seen = replace(camera, T_camera_world=np.eye(4)).project(corners @ np.linalg.inv(camera.matrix).T)
-    return float(np.linalg.norm(seen - corners[:, :2], axis=1).max())
+    distorted = replace(camera, T_camera_world=np.eye(4)).project(corners @ np.linalg.inv(camera.matrix).T)
+    return float(np.linalg.norm(distorted - corners[:, :2], axis=1).max())
 
 
 def _three(values: Array) -> tuple[float, float, float]:
@@ -142,30 +142,30 @@ def _three(values: Array) -> tuple[float, float, float]:
 
 
 def _corners(cameras: Sequence[Camera], middle: Array | None) -> tuple[float, float, float, float]:
-    """A square about all that stands in the map."""
-    ahead = [middle] if middle is not None else [camera.centre + AHEAD * camera.T_camera_world[2, :3] for camera in cameras]
+    """A square around the cameras and what they look at."""
+    ahead = [middle] if middle is not None else [camera.centre + VIEW_DISTANCE * camera.T_camera_world[2, :3] for camera in cameras]
     points = np.array([camera.centre for camera in cameras] + ahead)[:, :2]
-    half = 0.55 * max(float(np.ptp(points, axis=0).max()), AHEAD)
+    half = 0.55 * max(float(np.ptp(points, axis=0).max()), VIEW_DISTANCE)
     x, y = (points.min(0) + points.max(0)) / 2
     return float(x - half), float(y - half), float(x + half), float(y + half)
 
 
-def cells(corners: tuple[float, float, float, float]) -> Array:
-    """Middles (SIDE / 2, SIDE, 2) of the map's cells, metres, the greatest y first."""
+def map_cells(corners: tuple[float, float, float, float]) -> Array:
+    """Centres (rows, columns, 2) of the map's cells, metres, the greatest y first."""
     x0, y0, x1, y1 = corners
-    xs, ys = ((np.arange(n) + 0.5) / n for n in (SIDE, SIDE // 2))
+    xs, ys = ((np.arange(n) + 0.5) / n for n in (MAP_COLUMNS, MAP_COLUMNS // 2))
     return np.stack(np.broadcast_arrays(x0 + xs * (x1 - x0), (y1 - ys * (y1 - y0))[:, None]), -1)
 
 
 def _seen(cameras: Sequence[Camera], corners: tuple[float, float, float, float]) -> Array:
-    """How many cameras see a person whole who stands on the floor, Z = 0, by cells of the map."""
-    places = cells(corners)
-    people = np.concatenate([np.broadcast_to(places[:, :, None], (*places.shape[:2], len(PERSON), 2)),
-                             np.broadcast_to(np.array(PERSON)[:, None], (*places.shape[:2], len(PERSON), 1))], -1)
+    """Number of cameras that see a person standing on the floor, Z = 0, whole, by cells of the map."""
+    places = map_cells(corners)
+    people = np.concatenate([np.broadcast_to(places[:, :, None], (*places.shape[:2], len(PERSON_HEIGHTS), 2)),
+                             np.broadcast_to(np.array(PERSON_HEIGHTS)[:, None], (*places.shape[:2], len(PERSON_HEIGHTS), 1))], -1)
     count = np.zeros(places.shape[:2], int)
     for camera in cameras:
         pixels = camera.project(people)
-        inside = (pixels >= 0).all(-1) & (pixels <= np.array(camera.size) - 1).all(-1)  # not a number is not inside
+        inside = (pixels >= 0).all(-1) & (pixels <= np.array(camera.size) - 1).all(-1)  # NaN is not inside
         count += inside.all(-1)
     return count
 
@@ -176,7 +176,7 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
     if placed:
         yield from _up_doubts(placed)
     gaps = {(a.name, b.name): float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(placed, 2)}
-    if gaps and not found.told and not SPREADS[0] < max(gaps.values()) < SPREADS[1]:
+    if gaps and not found.told and not RIG_EXTENT[0] < max(gaps.values()) < RIG_EXTENT[1]:
         yield (f"the cameras stand up to {max(gaps.values()):.3g} m apart: is that in metres? say what the file's lengths are in: "
                "--unit mm, or unit = \"mm\" in recording.toml")
     same = [pair for pair, gap in gaps.items() if gap < 1e-3]
@@ -186,18 +186,18 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
         yield from _lens_doubts(camera)
         if middle is not None and len(placed) > 2:
             beside = np.linalg.norm(np.cross(camera.T_camera_world[2, :3], middle - camera.centre)) / np.linalg.norm(middle - camera.centre)
-            if beside > PAST or camera.T_camera_world[2, :3] @ (middle - camera.centre) < 0:
+            if beside > MAX_AIM_OFFSET or camera.T_camera_world[2, :3] @ (middle - camera.centre) < 0:
                 yield f"camera {camera.name!r} looks past the place that the others look at"
 
 
 def _up_doubts(cameras: Sequence[Camera]) -> Iterator[str]:
-    mean = way_up(cameras)
-    if mean[2] < UPRIGHT:
+    mean = up_direction(cameras)
+    if mean[2] < MIN_UP_COSINE:
         named = {name: float(np.dot(axis, mean)) for name, axis in UPS.items() if axis is not None}
         best = max(named, key=lambda name: named[name])
-        up = best if named[best] > UPRIGHT else "cameras"
-        told = f"its direction {best} is" if up == best else "none of its axes is"
-        yield (f"by the pictures the world's Z is not up, {told}: say so, with --up {up} here and up = \"{up}\" in recording.toml, or "
+        up = best if named[best] > MIN_UP_COSINE else "cameras"
+        subject = f"its direction {best} is" if up == best else "none of its axes is"
+        yield (f"by the pictures the world's Z is not up, {subject}: say so, with --up {up} here and up = \"{up}\" in recording.toml, or "
                f"write it upright: --up {up} --to calibration.toml")
         return
     low = [camera.name for camera in cameras if camera.centre[2] < 0]
@@ -207,7 +207,7 @@ def _up_doubts(cameras: Sequence[Camera]) -> Iterator[str]:
 
 def _lens_doubts(camera: Camera) -> Iterator[str]:
     aside = np.abs(camera.matrix[:2, 2] / (np.array(camera.size) - 1) - 0.5)
-    if (aside > ASIDE).any():
+    if (aside > MAX_CENTRE_OFFSET).any():
         x, y = camera.matrix[:2, 2]
         yield (f"camera {camera.name!r}: the principal point {x:.0f}, {y:.0f} is far from the middle of {camera.size[0]} x "
                f"{camera.size[1]} pixels: was it calibrated in pictures of another size?")

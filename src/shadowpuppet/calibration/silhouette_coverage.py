@@ -1,6 +1,6 @@
-"""How far silhouettes reach beyond what the other cameras leave room for: every place on a person's outline must be seen by all.
+"""How far silhouettes reach beyond what the other cameras allow: every ray of an outline must meet all silhouettes.
 
-What tangents of two cameras cannot tell, a shift along the lines on which they see each other, three cameras can.
+Three cameras reveal what tangents of two cannot: a shift along the baseline.
 """
 
 from __future__ import annotations
@@ -10,64 +10,44 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.calibration.epipolar_tangency import Outline
+from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 
-PIXELS, DEPTHS = 24, 32
-"""Pixels of each outline that are looked at, and places along the ray of each."""
-DEEP = 0.3
-"""How far before and behind the middle of the person places are taken, over its distance."""
-SHARE = 75
-"""Percentile over an outline: a camera that looks elsewhere is off along a side of it, a limb missing in another camera is less."""
+RAYS_PER_OUTLINE, DEPTHS_PER_RAY = 24, 32
+"""Number of outline pixels tested, and of places along the ray of each."""
+DEPTH_RANGE = 0.3
+"""Range of these places before and behind the person's middle, over its distance."""
+COVERAGE_PERCENTILE = 75
+"""Percentile over an outline: a misdirected camera is off along a whole side of it, a limb missing in another camera affects less."""
 
 
-class Coverage:
-    """Distances to silhouettes, each made once."""
+def pixels_beyond(cameras: Sequence[Camera], row: Row) -> Array:
+    """By how many pixels the other cameras' silhouettes would have to grow for each camera's outline to fit, in one set.
 
-    def __init__(self) -> None:
-        """None yet."""
-        self._known: dict[int, tuple[Mask, NDArray[np.float32]]] = {}
-
-    def beyond(self, cameras: Sequence[Camera], masks: Sequence[Mask | None], outlines: Sequence[Outline | None]) -> Array:
-        """By how many pixels the others' silhouettes would have to grow for each camera's outline to fit, in one set of masks (H, W).
-
-        Of shape (C, C + 1): row k, column w is camera k's without camera w; the last column without none. Not a number where nothing is
-        known: it takes two other cameras.
-        """
-        out, middle = np.full((len(cameras), len(cameras) + 1), np.nan), meeting_place(cameras, outlines)
-        for k, outline in enumerate(outlines):
-            firm = np.flatnonzero(outline.firm) if outline is not None else []
-            if outline is None or middle is None or len(firm) < PIXELS:
-                continue
-            rays = outline.rays[firm[np.linspace(0, len(firm) - 1, PIXELS).astype(int)]]
-            depth = np.linalg.norm(middle - cameras[k].centre) * np.linspace(1 - DEEP, 1 + DEEP, DEPTHS)
-            away = self._away(cameras, masks, k, cameras[k].centre + rays[:, None] * depth[:, None])
-            if away is not None:
-                out[k] = _percentiles(away)
-        return out
-
-    def _away(self, cameras: Sequence[Camera], masks: Sequence[Mask | None], k: int, places: Array) -> Array | None:
-        """Pixels (C, PIXELS, DEPTHS) of places from the other cameras' silhouettes; 0 in them, and where a camera says nothing."""
-        away, seen = np.zeros((len(cameras), *places.shape[:2])), 0
-        for n, (camera, mask) in enumerate(zip(cameras, masks)):
-            if n != k and mask is not None and may_be_person(mask):
-                away[n] = _sampled(self._distance(mask), camera.project(places))
-                seen += 1
-        return away if seen > 1 else None
-
-    def _distance(self, mask: Mask) -> NDArray[np.float32]:
-        """Pixels (H, W) to the silhouette."""
-        import cv2
-
-        if id(mask) not in self._known:
-            self._known[id(mask)] = mask, np.asarray(cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3), np.float32)
-        return self._known[id(mask)][1]
+    Of shape (C, C + 1): row k, column w is camera k's without camera w; the last column leaves out none. NaN where fewer than two
+    other cameras see the person.
+    """
+    outlines = outlines_of(cameras, row)
+    out, middle = np.full((len(cameras), len(cameras) + 1), np.nan), triangulated_centre(cameras, outlines)
+    for k, outline in enumerate(outlines):
+        firm = np.flatnonzero(outline.firm) if outline is not None else []
+        if outline is None or middle is None or len(firm) < RAYS_PER_OUTLINE:
+            continue
+        rays = outline.rays[firm[np.linspace(0, len(firm) - 1, RAYS_PER_OUTLINE).astype(int)]]
+        depth = np.linalg.norm(middle - cameras[k].centre) * np.linspace(1 - DEPTH_RANGE, 1 + DEPTH_RANGE, DEPTHS_PER_RAY)
+        places = cameras[k].centre + rays[:, None] * depth[:, None]
+        others = {n: other for n, other in enumerate(row) if n != k and other is not None}
+        if len(others) > 1:
+            away = np.zeros((len(cameras), *places.shape[:2]))  # 0 in a silhouette, and where a camera says nothing
+            for n, other in others.items():
+                away[n] = _sampled(other.distance, cameras[n].project(places))
+            out[k] = _percentiles(away)
+    return out
 
 
-def meeting_place(cameras: Sequence[Camera], outlines: Sequence[Outline | None]) -> Array | None:
-    """The place (3,) nearest to the rays through the outlines' middles; None where there are not two."""
+def triangulated_centre(cameras: Sequence[Camera], outlines: Sequence[Outline | None]) -> Array | None:
+    """The point (3,) nearest to the rays through the outlines' middles; None for fewer than two outlines."""
     A, b, count = np.zeros((3, 3)), np.zeros(3), 0
     for camera, outline in zip(cameras, outlines):
         if outline is not None:
@@ -78,7 +58,7 @@ def meeting_place(cameras: Sequence[Camera], outlines: Sequence[Outline | None])
 
 
 def _sampled(distance: NDArray[np.float32], pixels: Array) -> Array:
-    """Values at the nearest pixels (..., 2); 0 outside the picture, of which it says nothing."""
+    """Values at the nearest pixels (..., 2); 0 outside the picture, where nothing is known."""
     height, width = distance.shape
     x, y = np.moveaxis(np.rint(np.clip(np.nan_to_num(pixels, nan=-9), -9, 1e6)).astype(int), -1, 0)
     inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
@@ -86,8 +66,8 @@ def _sampled(distance: NDArray[np.float32], pixels: Array) -> Array:
 
 
 def _percentiles(away: Array) -> Array:
-    """Of the least over depths of the greatest over cameras (C, P, Z): without each camera, and without none, of shape (C + 1,)."""
+    """Percentile over rays of the least over depths of the greatest over cameras (C, P, Z): without each camera, with all, (C + 1,)."""
     order = np.sort(away, axis=0)
     most, next_most, which = order[-1], order[-2], away.argmax(0)
     without = [np.where(which == n, next_most, most) for n in range(len(away))]
-    return np.array([np.percentile(each.min(1), SHARE) for each in (*without, most)])
+    return np.array([np.percentile(each.min(1), COVERAGE_PERCENTILE) for each in (*without, most)])

@@ -1,8 +1,8 @@
-"""By how many frames each camera's film is late, from the motion of silhouettes alone.
+"""Time offsets between films, from the motion of silhouettes alone.
 
-Planes through two cameras that touch a silhouette touch it for both at the same time (`tangency`). So the angle of that plane about the
-line from camera to camera is one signal, which both films show: what shifts them onto each other is the difference in time. A camera
-that was moved a little changes such a signal by a nearly constant angle, which is taken off: time is told apart from place.
+A plane through two camera centres touches the person for both cameras at the same time (`epipolar_tangency`). So its angle about the
+baseline is a signal that both films show, and the shift that aligns the two signals is their time offset. A camera that was moved a
+little changes its signal by a nearly constant angle, which is removed: this separates time from place.
 """
 
 from __future__ import annotations
@@ -14,37 +14,39 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.calibration.epipolar_tangency import Outline, tangent_angles
+from shadowpuppet.calibration.agreement import plain_values
+from shadowpuppet.calibration.epipolar_tangency import tangent_angles
+from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 
-LEAST = 24
-"""Sets that two signals must have in common."""
-TRIMMED = 80
-"""Percentile of differences up to which they are averaged: a limb that is missing in one silhouette is not a difference in time."""
-TELLING = 0.6
-"""Two signals say something about time where no more than this of their usual difference is left at the best shift."""
-ROUNDS = 30
-"""Of the solution for all cameras, each with less weight on pairs that disagree."""
+MIN_COMMON_SETS = 24
+"""Least number of sets that two signals must share."""
+TRIM_PERCENTILE = 80
+"""Percentile up to which differences are averaged: a limb missing in one silhouette is no difference in time."""
+MAX_RESIDUAL_SHARE = 0.6
+"""Two signals give an offset if at most this share of their median difference is left at the best shift."""
+SOLVER_ROUNDS = 30
+"""Rounds of iteratively reweighted least squares for all cameras."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lateness:
-    """Frames by which films are late against most of the others; plain values."""
+class TimeOffsets:
+    """Time offsets of films against most of the others; plain values."""
 
     names: tuple[str, ...]
-    """Of the cameras."""
+    """Names of the cameras."""
     frames: tuple[float | None, ...]
-    """By how many sets each film is late (less than 0: early); None where nothing moves that tells."""
+    """Sets by which each film is late (negative: early); None if its silhouettes move too little to tell."""
     spread: tuple[float | None, ...]
-    """By how many sets a camera's pairs differ about that: how sure it is."""
+    """Median deviation of a camera's pairs from that, sets: its uncertainty."""
     pairs: tuple[tuple[float | None, ...], ...]
-    """By how many sets the film of the second of a pair is later than that of the first; None where it cannot be told."""
+    """Sets by which the second film of a pair is later than the first; None if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """What two cameras say of their times."""
+    """Time offset of two cameras."""
 
     first: int
     second: int
@@ -53,29 +55,29 @@ class _Pair:
     weight: float
 
 
-def lateness(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]], most: int | None = None) -> Lateness:
-    """How late each film is, from outlines by set and camera, which follow one another; `most`: sets that are tried, to and fro."""
-    most = min(len(rows) - LEAST, len(rows) // 2) if most is None else most
+def time_offsets(cameras: Sequence[Camera], rows: Sequence[Row]) -> TimeOffsets:
+    """How late each film is, from consecutive sets of silhouettes."""
+    most = min(len(rows) - MIN_COMMON_SETS, len(rows) // 2)
+    outlines = [outlines_of(cameras, row) for row in rows]
     pairs = [pair for i, j in combinations(range(len(cameras)), 2)
-             if most > 0 and (pair := _compared(i, j, tangent_signals(cameras, rows, i, j), most)) is not None]
+             if most > 0 and (pair := _compared(i, j, tangent_signals(cameras, outlines, i, j), most)) is not None]
     late, known = _solved(len(cameras), pairs)
     table = np.full((len(cameras), len(cameras)), np.nan)
-    off: list[list[float]] = [[] for _ in cameras]
+    deviations: list[list[float]] = [[] for _ in cameras]
     for pair in pairs:
         table[pair.first, pair.second], table[pair.second, pair.first] = pair.shift, -pair.shift
         for n in (pair.first, pair.second):
-            off[n].append(abs(late[pair.second] - late[pair.first] - pair.shift))
-    spread = np.array([np.median(values) if values else np.nan for values in off])
-    return Lateness(names=tuple(camera.name for camera in cameras), frames=_plain(np.where(known, late, np.nan)), spread=_plain(spread),
-                    pairs=tuple(map(_plain, table)))
+            deviations[n].append(abs(late[pair.second] - late[pair.first] - pair.shift))
+    spread = np.array([np.median(values) if values else np.nan for values in deviations])
+    return TimeOffsets(names=tuple(camera.name for camera in cameras), frames=plain_values(np.where(known, late, np.nan)),
+                       spread=plain_values(spread), pairs=tuple(map(plain_values, table)))
 
 
-def tangent_signals(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline | None]], i: int, j: int) -> Array:
-    """Angles (2 cameras, 2 tangents, F sets) of the outermost planes through cameras i and j that touch their silhouettes, in pixels of
-    the one that sees them smaller; not a number where there is none."""
-    signals, reference = np.full((2, 2, len(rows)), np.nan), None
+def tangent_signals(cameras: Sequence[Camera], outlines: Sequence[Sequence[Outline | None]], i: int, j: int) -> Array:
+    """Signals (2 cameras, 2 tangents, F sets): angles of the outermost tangent planes of cameras i and j, scaled to pixels; NaN if none."""
+    signals, reference = np.full((2, 2, len(outlines)), np.nan), None
     levers = []
-    for f, row in enumerate(rows):
+    for f, row in enumerate(outlines):
         a, b = row[i], row[j]
         found = None if a is None or b is None else tangent_angles((cameras[i], cameras[j]), (a, b), reference)
         if found is not None:
@@ -86,13 +88,13 @@ def tangent_signals(cameras: Sequence[Camera], rows: Sequence[Sequence[Outline |
 
 
 def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
-    """The shift at which two cameras' signals differ least; None where none does markedly."""
+    """The shift at which two cameras' signals differ least; None if there is no distinct minimum."""
     shifts = np.arange(-most, most + 1)
     cost = np.array([_difference(signals, s) for s in shifts.tolist()])
     if np.isfinite(cost).sum() < 5:
         return None
-    usual, k = float(np.nanmedian(cost)), int(np.nanargmin(cost))
-    if not 0 < k < len(cost) - 1 or not np.isfinite(cost[k - 1 : k + 2]).all() or cost[k] > TELLING * usual:
+    median, k = float(np.nanmedian(cost)), int(np.nanargmin(cost))
+    if not 0 < k < len(cost) - 1 or not np.isfinite(cost[k - 1 : k + 2]).all() or cost[k] > MAX_RESIDUAL_SHARE * median:
         return None
     before, least, after = cost[k - 1 : k + 2]
     rise = max(before, after) - least
@@ -102,25 +104,25 @@ def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
 
 
 def _difference(signals: Array, shift: int) -> float:
-    """Mean difference of two signals (2, 2, F), the second taken so many sets later; constant ones are none."""
+    """Trimmed mean difference of two signals (2, 2, F), the second taken `shift` sets later, without its constant part."""
     F = signals.shape[2]
     a, b = signals[0, :, max(0, -shift) : F - max(0, shift)], signals[1, :, max(0, shift) : F + min(0, shift)]
     total, tangents = 0.0, 0
     for d in a - b:
         d = d[np.isfinite(d)]
-        if len(d) >= LEAST:
-            d = np.sort(np.abs(d - np.median(d)))[: max(1, len(d) * TRIMMED // 100)]
+        if len(d) >= MIN_COMMON_SETS:
+            d = np.sort(np.abs(d - np.median(d)))[: max(1, len(d) * TRIM_PERCENTILE // 100)]
             total, tangents = total + float(d.mean()), tangents + 1
     return total / tangents if tangents else np.nan
 
 
 def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, NDArray[np.bool_]]:
-    """Sets (C,) by which each is late against most others, least absolute differences; and which of them are known (C,)."""
+    """Sets (C,) by which each film is late against most others (least absolute deviations), and whether each is known (C,)."""
     late, known = np.zeros(count), np.zeros(count, bool)
     for pair in pairs:
         known[[pair.first, pair.second]] = True
     weights = np.array([pair.weight for pair in pairs])
-    for _ in range(ROUNDS if pairs else 0):
+    for _ in range(SOLVER_ROUNDS if pairs else 0):
         A, b = np.zeros((len(pairs) + 1, count)), np.zeros(len(pairs) + 1)
         for n, (pair, weight) in enumerate(zip(pairs, np.sqrt(weights))):
             A[n, [pair.first, pair.second]], b[n] = (-weight, weight), weight * pair.shift
@@ -131,7 +133,3 @@ def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, NDArray[np.bool_
     if known.sum() == 2:
         return late - late[np.argmax(known)], known  # the second against the first
     return late - (np.sort(late[known])[(known.sum() - 1) // 2] if known.any() else 0.0), known
-
-
-def _plain(values: Array) -> tuple[float | None, ...]:
-    return tuple(round(float(value), 2) if np.isfinite(value) else None for value in values)

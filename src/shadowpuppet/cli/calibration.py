@@ -15,8 +15,8 @@ from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import RecordingError, SettingsError
 
 if TYPE_CHECKING:
-    from shadowpuppet.calibration.overview import CalibrationLook, Standpoint
-    from shadowpuppet.pipeline.check_calibration import RigCheck
+    from shadowpuppet.calibration.overview import CalibrationLook, CameraPlacement
+    from shadowpuppet.pipeline.check_calibration import CalibrationCheck
 
 ARROWS = "→↗↑↖←↙↓↘"
 """By eighths of a turn, counter-clockwise from +x."""
@@ -29,14 +29,14 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
     turned; and by how many frames each film is late."""
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.check_calibration import check_rig
+    from shadowpuppet.pipeline.check_calibration import check_calibration
     from shadowpuppet.pipeline.footage_rig import open_rig
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
     options = options_from(flags, config)
     with terminal(quiet=as_json) as listener:
-        found = check_rig(open_rig(recording, options), options, listener)
+        found = check_calibration(open_rig(recording, options), options, listener)
     if as_json:
         show_json(found)
     else:
@@ -112,7 +112,7 @@ def _camera_rows(look: CalibrationLook) -> Iterator[tuple[str, ...]]:
                f"{bend}{', fisheye' if camera.lens == 'fisheye' else ''}")  # fmt: skip
 
 
-def _looks(camera: Standpoint) -> str:
+def _looks(camera: CameraPlacement) -> str:
     return "level" if abs(camera.down) < 0.5 else f"{abs(camera.down):.0f}° {'down' if camera.down > 0 else 'up'}"
 
 
@@ -122,15 +122,15 @@ def _letter(n: int) -> str:
 
 def top_view(look: CalibrationLook) -> Text:
     """The scene from above in characters: cameras with arrows the way they look, and how many cameras see all of a standing person."""
-    from shadowpuppet.calibration.overview import SIDE
+    from shadowpuppet.calibration.overview import MAP_COLUMNS
 
     x0, y0, x1, y1 = look.corners
     rows = [["·" if not count else str(count) if count < 10 else "#" for count in row] for row in look.seen]
 
     def put(x: float, y: float, mark: str) -> None:
-        column, row = int((x - x0) / (x1 - x0) * SIDE), int((y1 - y) / (y1 - y0) * SIDE / 2)
+        column, row = int((x - x0) / (x1 - x0) * MAP_COLUMNS), int((y1 - y) / (y1 - y0) * MAP_COLUMNS / 2)
         for n, character in enumerate(mark):
-            if 0 <= row < len(rows) and 0 <= column + n < SIDE:
+            if 0 <= row < len(rows) and 0 <= column + n < MAP_COLUMNS:
                 rows[row][column + n] = character
 
     if look.middle is not None:
@@ -152,7 +152,7 @@ def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
                       else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
 
 
-def check_table(check: RigCheck) -> RenderableType:
+def check_table(check: CalibrationCheck) -> RenderableType:
     """How far each camera disagrees with the others, and the verdict."""
     found = check.agreement
     columns = ("camera", "disagrees by", "with", "late by", "sure to", "")
@@ -166,7 +166,7 @@ def check_table(check: RigCheck) -> RenderableType:
     return Group(pairs(rows), "", table("", columns, _agreement_rows(check), right=(1, 3, 4)), "", pairs([("verdict", verdict)]))
 
 
-def _agreement_rows(check: RigCheck) -> Iterator[tuple[Any, ...]]:
+def _agreement_rows(check: CalibrationCheck) -> Iterator[tuple[Any, ...]]:
     found, late = check.agreement, check.lateness
     for n, name in enumerate(found.names):
         apart, others = found.apart[n], sum(pair is not None for pair in found.pairs[n])

@@ -29,8 +29,8 @@ from shadowpuppet.cli.tables import pairs, show, show_json
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices
 from shadowpuppet.settings import validate
 from shadowpuppet.synthetic.collection import named_specs
-from shadowpuppet.synthetic.shorthand import Shorthand, expanded
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
+from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 from shadowpuppet.synthetic.spec_file import read_spec
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ else:
         **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
         **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
     }
-    SpecFlags = unpacked(flags_of(Shorthand, groups=SPEC_GROUPS))
+    SpecFlags = unpacked(flags_of(SpecChanges, groups=SPEC_GROUPS))
 
 
 def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film, folder of pictures; or a calibration of any kind.")], /, *,
@@ -142,7 +142,7 @@ def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -
     spec = read_spec(path) if path is not None else named[like] if like is not None else Spec()
     if seed is not None:
         spec = spec_from(spec_values(spec) | {"seed": seed}, "flags")
-    return expanded(validate(Shorthand, given(flags), "flags"), spec)
+    return apply_changes(validate(SpecChanges, given(flags), "flags"), spec)
 
 
 def _spec_line(spec: Spec) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.silhouette.background import Spread, smoothed, to_planes
+from shadowpuppet.silhouette.background import FrameSampler, smoothed, to_planes
 from shadowpuppet.video import Image
 
 KEPT = 20
@@ -23,7 +23,7 @@ class Learner:
         """Seconds until learning begins, and how long it takes."""
         self.countdown, self.seconds = countdown, seconds
         self.tries, self.note = 0, ""
-        self._spread, self._began, self._left = Spread(KEPT), np.nan, countdown + seconds
+        self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, countdown + seconds
 
     def see(self, now: float, image: Image) -> list[Image] | None:
         """A picture (H, W, 3) or (H, W) at a time (s); the empty scene's pictures, once there are enough."""
@@ -36,13 +36,13 @@ class Learner:
         scene = self._spread.kept
         self.tries += 1
         if self.tries < TRIES and moved(scene):
-            self.note, self._spread, self._began = "something moved: ", Spread(KEPT), np.nan
+            self.note, self._spread, self._began = "something moved: ", FrameSampler(KEPT), np.nan
             return None
         return scene
 
     def wait(self) -> None:
         """No pictures came for a while: what was begun begins again with the next one."""
-        self._spread, self._began, self._left = Spread(KEPT), np.nan, self.countdown + self.seconds
+        self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, self.countdown + self.seconds
 
     @property
     def left(self) -> float:

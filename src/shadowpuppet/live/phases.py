@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from shadowpuppet.pipeline.footage import Mask
-from shadowpuppet.silhouette.quality import CONTACT, NEARLY_ALL
+from shadowpuppet.silhouette.quality import MIN_CONTACT, NEARLY_ALL
 
 NOBODY, TOO_NEAR = 0.015, 0.6
 """Share of the picture under which a silhouette is nobody, and from which on a person is too near."""
@@ -63,8 +63,8 @@ def unfit(mask: Mask) -> str:
         return "nearly all of the picture has changed: let the background be learnt anew"
     if share < NOBODY:
         return "step into the picture, facing the camera"
-    if share > TOO_NEAR or int(mask[0].sum()) >= CONTACT:
+    if share > TOO_NEAR or int(mask[0].sum()) >= MIN_CONTACT:
         return "step back: the head must be in the picture"
-    if max(int(mask[:, 0].sum()), int(mask[:, -1].sum())) >= CONTACT:
+    if max(int(mask[:, 0].sum()), int(mask[:, -1].sum())) >= MIN_CONTACT:
         return "move to the middle of the picture"
     return ""

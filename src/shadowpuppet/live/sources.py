@@ -13,7 +13,7 @@ from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.live.learning_phase import KEPT
 from shadowpuppet.pipeline.footage import worked_size
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.silhouette.background import spread
+from shadowpuppet.silhouette.background import sample_frames
 from shadowpuppet.video import Image, Size, open_frames
 
 USUAL_FOV = 65.0
@@ -55,7 +55,7 @@ def empty_scene(options: Options, full: Camera) -> list[Image]:
     if size != full.size:
         raise RecordingError(f"{options.background}: found the empty scene of {size[0]} x {size[1]} pixels, expected {full.size[0]} x "
                              f"{full.size[1]} as the camera's: it must come from the same camera at the same setting")
-    return spread((frame.image for frame in open_frames(options.background, size=worked_size(size, options.max_size))), KEPT)
+    return sample_frames((frame.image for frame in open_frames(options.background, size=worked_size(size, options.max_size))), KEPT)
 
 
 def _warn(message: str) -> None:

@@ -9,69 +9,66 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shadowpuppet.calibration.agreement import DISAGREES, Agreement, agreement
-from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines
-from shadowpuppet.calibration.rotation_error import Turn, turned_outline, turning
-from shadowpuppet.calibration.time_offset import Lateness, lateness
-from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import may_be_person
+from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement, compare_cameras
+from shadowpuppet.calibration.rotation_error import RotationError, estimate_rotation_error
+from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
+from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
-from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
+from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Silhouettes, silhouettes, take_sample
 from shadowpuppet.pipeline.footage_rig import Rig, follow, usable_cores
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 
-SETS, FEWEST, LONGEST = 240, 120, 3000
-"""Sets of silhouettes that are compared, so many at least where the films are long enough, and among how many they are looked for."""
-FASTEST = 31.0
-"""Sets/s at most: more of them tell no more."""
-COMPARED = 12
-"""Sets, spread over them, by which places are judged."""
-BRIEFLY = 240
-"""Frames of each film that are looked at where its background need not be made from it."""
-LATE, MISPLACED, SURE = 0.5, 1.5, 3.0
-"""Sets from which on a film is said to be late; the same of a camera that disagrees about places, where time is told less well; and how
-many times its pairs' spread."""
-SLIGHT = 0.004
-"""Pixels, over the picture's longer side, from which on a camera is looked into that agrees on the whole (2.6 of 640)."""
-ALONE = 3.0
-"""... and how many times as much as the middle one it must disagree, to be named where no turn explains it."""
-MENDS = 0.5
-"""A turn is told where no more than this of the disagreement is left."""
+SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
+"""Number of sets of silhouettes compared; their least number if the films are long enough; the greatest number of sets read."""
+MAX_SET_RATE = 31.0
+"""Greatest rate of sets, 1/s: a higher one adds nothing."""
+SETS_COMPARED = 12
+"""Number of sets, spread over all, in which places are compared."""
+SAMPLE_FRAMES = 240
+"""Frames of each film that are sampled if its background is not made from the film."""
+MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 3.0
+"""Sets from which on a film counts as late; the same for a camera that disagrees about places, whose time is less certain; and how
+many times the spread of its pairs the offset must be."""
+SLIGHT_DISAGREEMENT = 0.004
+"""Disagreement, over the picture's longer side, from which on the worst camera is tested for a rotation (2.6 of 640 pixels)."""
+STANDOUT_FACTOR = 3.0
+"""How many times the median disagreement a camera must have to be named if no rotation explains it."""
+ROTATION_SHARE = 0.5
+"""A rotation is reported if it leaves at most this share of the disagreement."""
 
 
-class Mended(NamedTuple):
-    """What turning a camera back does."""
+class RotationFix(NamedTuple):
+    """Effect of rotating a camera back."""
 
-    turn: Turn
+    turn: RotationError
     apart: float
-    """Pixels by which it then disagrees with the others."""
+    """Disagreement with the others that is left, pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigCheck:
+class CalibrationCheck:
     """What silhouettes say of a calibration; plain values, so that it can be saved."""
 
     recording: str
     """Its path."""
     sets: int
-    """How many sets of silhouettes were compared."""
+    """Number of sets of silhouettes compared."""
     rate: float
-    """Sets/s among which lateness is told."""
+    """Sets/s."""
     frame_rate: float
     """Frames/s of the films."""
     agreement: Agreement
-    """Of the cameras, at the times that fit best."""
-    lateness: Lateness | None
-    """In frames of the films; None where it cannot be told as the cameras are."""
+    """Agreement of the cameras, at the times that fit best."""
+    lateness: TimeOffsets | None
+    """In frames of the films; None if the cameras disagree too much to tell."""
     late: tuple[str, ...]
     """Cameras whose films are late or early for certain."""
     starts: dict[str, float]
-    """What [start] of recording.toml should say, seconds, where films are late; empty where none is."""
-    turns: dict[str, Mended]
-    """By how much cameras that disagree were turned, where that explains it."""
+    """What [start] of recording.toml should say, seconds; empty if no film is late."""
+    turns: dict[str, RotationFix]
+    """Rotations that explain why cameras disagree, by camera."""
     doubts: tuple[str, ...] = ()
     """What is wrong, and the remedy, a sentence each."""
 
@@ -81,160 +78,146 @@ class RigCheck:
         return not self.doubts
 
 
-class Seen(NamedTuple):
-    """Sets of silhouettes that follow one another, by camera."""
+class SilhouetteSets(NamedTuple):
+    """Consecutive sets of silhouettes."""
 
-    packed: list[list[NDArray[np.uint8] | None]]
-    """Bits of masks; None where nobody is seen."""
-    outlines: list[list[Outline | None]]
+    rows: list[Row]
+    """By set and camera."""
     every: int
     """Frames of the films from set to set."""
 
 
-def check_rig(rig: Rig, options: Options, listener: Listener | None = None) -> RigCheck:
-    """Test the calibration of several cameras. Raises a `ShadowPuppetError` where silhouettes cannot be had, or show nobody."""
+def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
+    """Test the calibration of several cameras. Raises a `ShadowPuppetError` if there are no silhouettes, or no person in them."""
     listener = listener or Listener()
-    seen = gather(rig, options, listener)
+    sets = gather_silhouettes(rig, options, listener)
     listener.begin("comparing")
-    return judge(rig, seen)
+    return judge_calibration(rig, sets)
 
 
-def judge(rig: Rig, seen: Seen) -> RigCheck:
-    """What silhouettes say of the calibration of `rig`. Raises `RecordingError` where no two cameras see a person at a time."""
-    if sum(sum(outline is not None for outline in row) > 1 for row in seen.outlines) < 2:
+def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> SilhouetteSets:
+    """Silhouettes from the first set on in which two cameras see a person."""
+    every = max(1, min(round(rig.rate / MAX_SET_RATE), (rig.count or SETS * 9) // MIN_SETS))
+    listener.begin("looking")
+    with ThreadPoolExecutor(usable_cores(), "check") as pool:
+        segmenters = list(pool.map(lambda footage: _silhouettes(footage, options), rig.footage))
+    rows: list[Row] = []
+    listener.begin("reading", SETS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
+        for n, each in enumerate(follow(rig, segmenters, ready=options.masks, every=every, threads=usable_cores())):
+            row = silhouettes_of(each.masks)
+            if rows or sum(silhouette is not None for silhouette in row) > 1:
+                rows.append(row)
+                listener.advance(len(rows))
+            if len(rows) >= SETS or n >= MAX_SETS_READ:
+                break
+    return SilhouetteSets(rows, every)
+
+
+def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
+    sample = take_sample(footage, options.masks, LOOKED_AT if footage.view.background is None and not options.masks else SAMPLE_FRAMES)
+    return silhouettes(footage, sample, options)
+
+
+def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:
+    """What silhouettes say of the calibration of `rig`. Raises `RecordingError` if no two cameras see a person at the same time."""
+    if sum(sum(silhouette is not None for silhouette in row) > 1 for row in sets.rows) < 2:
         raise RecordingError(f"{rig.recording.path}: no two cameras see a person at the same time: do the films belong together?")
-    found, late, shifts, turns = _judged(rig, seen)
-    check = RigCheck(
-        recording=str(rig.recording.path), sets=len(seen.outlines), rate=rig.rate / seen.every, frame_rate=rig.rate, agreement=found,
-        lateness=None if late is None else _in_frames(late, seen.every), turns=turns,
-        late=tuple(name for name, shift in zip(rig.names, shifts) if shift), starts=_starts(rig, shifts, seen.every),
+    found = _judged(rig, sets.rows)
+    offsets = None if found.offsets is None else _in_frames(found.offsets, sets.every)
+    check = CalibrationCheck(
+        recording=str(rig.recording.path), sets=len(sets.rows), rate=rig.rate / sets.every, frame_rate=rig.rate,
+        agreement=found.agreement, lateness=offsets, turns=found.rotations, starts=_starts(rig, found.shifts, sets.every),
+        late=tuple(name for name, shift in zip(rig.names, found.shifts) if shift),
     )  # fmt: skip
     return replace(check, doubts=tuple(_doubts(check)))
 
 
 class _Judgement(NamedTuple):
     agreement: Agreement
-    lateness: Lateness | None
+    rotations: dict[str, RotationFix]
+    offsets: TimeOffsets | None
+    """In sets."""
     shifts: list[float]
     """Sets by which each film is late for certain."""
-    turns: dict[str, Mended]
+
+    def left(self) -> float:
+        """Mean disagreement of the cameras, pixels, once those that were rotated are rotated back."""
+        known = [self.rotations[name].apart if name in self.rotations else apart
+                 for name, apart in zip(self.agreement.names, self.agreement.apart) if apart is not None]
+        return float(np.mean(known)) if known else np.inf
 
 
-def _judged(rig: Rig, seen: Seen) -> _Judgement:
-    """Places and times. A camera that was turned is turned back before times are asked for, and asked again once they are right."""
-    still, rows = [0.0] * len(rig.cameras), _spread(rig, seen)
-    found = agreement(rig.cameras, rows)
+def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
+    """Places, then times, then places again at the times that fit; the second judgement counts if less disagreement is left."""
+    still = [0.0] * len(rig.cameras)
+    chosen = _spread(rows, still)
+    found = compare_cameras(rig.cameras, chosen)
     if found.remedy is not None:
-        return _Judgement(found, None, still, {})
-    turns = _turns(rig, found, rows)
-    late = _late(rig, seen, turns)
-    shifts = _certain(late, found)
-    if not any(shifts):
-        return _Judgement(found, late, still, turns)
-    aligned = _spread(rig, seen, shifts)
-    later = agreement(rig.cameras, aligned, remedies=False)
-    then = _turns(rig, later, aligned)
-    if _left(later, then) >= _left(found, turns):
-        return _Judgement(found, late, still, turns)  # what differs is not time
-    late = _late(rig, seen, then)
-    return _Judgement(later, late, _certain(late, later), then)
+        return _Judgement(found, {}, None, still)
+    first = _with_times(rig, rows, found, chosen)
+    if not any(first.shifts):
+        return first
+    aligned = _spread(rows, first.shifts)
+    second = _with_times(rig, rows, compare_cameras(rig.cameras, aligned, remedies=False), aligned)
+    return second if second.left() < first.left() else first._replace(shifts=still)  # what differs is not time
 
 
-def _left(found: Agreement, turns: dict[str, Mended]) -> float:
-    """Pixels by which cameras disagree, mean, once those that were turned are turned back."""
-    known = [turns[name].apart if name in turns else apart for name, apart in zip(found.names, found.apart) if apart is not None]
-    return float(np.mean(known)) if known else np.inf
+def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequence[Row]) -> _Judgement:
+    """Rotations of cameras that disagree in the `chosen` sets, and the time offsets in all once these are rotated back."""
+    rotations = _rotations(rig, found, chosen)
+    cameras = [rotations[camera.name].turn.of(camera) if camera.name in rotations else camera for camera in rig.cameras]
+    offsets = time_offsets(cameras, rows)
+    return _Judgement(found, rotations, offsets, _certain(offsets, found))
 
 
-def _mended(rig: Rig, turns: dict[str, Mended]) -> tuple[Camera, ...]:
-    return tuple(turns[camera.name].turn.of(camera) if camera.name in turns else camera for camera in rig.cameras)
-
-
-def _late(rig: Rig, seen: Seen, turns: dict[str, Mended]) -> Lateness:
-    """How late films are, with cameras that were turned turned back."""
-    mended = _mended(rig, turns)
-    rows = [[turned_outline(outline, before, after) if outline is not None and before is not after else outline
-             for outline, before, after in zip(row, rig.cameras, mended)] for row in seen.outlines]
-    return lateness(mended, rows)
-
-
-def gather(rig: Rig, options: Options, listener: Listener) -> Seen:
-    """Silhouettes from the first set on in which two cameras see a person."""
-    every = max(1, min(round(rig.rate / FASTEST), (rig.count or SETS * 9) // FEWEST))
-    listener.begin("looking")
-    with ThreadPoolExecutor(usable_cores(), "check") as pool:
-        see = list(pool.map(lambda footage: _silhouettes(footage, options), rig.footage))
-    seen = Seen([], [], every)
-    listener.begin("reading", SETS)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when a run comes to it
-        for n, each in enumerate(follow(rig, see, ready=options.masks, every=every, threads=usable_cores())):
-            here = [mask is not None and may_be_person(mask) for mask in each.masks]
-            if seen.outlines or sum(here) > 1:
-                outlines = Outlines()
-                seen.packed.append([np.packbits(mask) if mask is not None and good else None for mask, good in zip(each.masks, here)])
-                seen.outlines.append([outlines.of(camera, mask) for camera, mask in zip(rig.cameras, each.masks)])
-                listener.advance(len(seen.outlines))
-            if len(seen.outlines) >= SETS or n >= LONGEST:
-                break
-    return seen
-
-
-def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
-    sample = take_sample(footage, options.masks, LOOKED_AT if footage.view.background is None and not options.masks else BRIEFLY)
-    return silhouettes(footage, sample, options)
-
-
-def _spread(rig: Rig, seen: Seen, shifts: Sequence[float] | None = None) -> list[list[Mask | None]]:
-    """Some sets of masks, each camera's so many sets later."""
-    steps, F = [round(shift) for shift in shifts or [0.0] * len(rig.cameras)], len(seen.packed)
+def _spread(rows: Sequence[Row], shifts: Sequence[float]) -> list[Row]:
+    """`SETS_COMPARED` of the sets, evenly spread, in which camera k's silhouette is taken `shifts[k]` sets later."""
+    steps, F = [round(shift) for shift in shifts], len(rows)
     first, last = max(0, -min(steps)), F - 1 - max(0, *steps)
-    chosen = np.unique(np.linspace(first, max(first, last), COMPARED).astype(int))
-    return [[_unpacked(seen.packed[f + step][k], rig.cameras[k].size) if f + step < F else None for k, step in enumerate(steps)]
-            for f in chosen.tolist()]
+    chosen = np.unique(np.linspace(first, max(first, last), SETS_COMPARED).astype(int))
+    return [[rows[f + step][k] if f + step < F else None for k, step in enumerate(steps)] for f in chosen.tolist()]
 
 
-def _unpacked(bits: NDArray[np.uint8] | None, size: tuple[int, int]) -> Mask | None:
-    return None if bits is None else np.unpackbits(bits, count=size[0] * size[1]).reshape(size[1], size[0]).astype(bool)
-
-
-def _certain(late: Lateness, found: Agreement) -> list[float]:
+def _certain(offsets: TimeOffsets, found: Agreement) -> list[float]:
     """Sets by which films are late for certain; 0 for the others."""
-    least = [max(MISPLACED if name in found.wrong else LATE, SURE * (spread or 0.0)) for name, spread in zip(late.names, late.spread)]
-    return [frames if frames is not None and abs(frames) > limit else 0.0 for frames, limit in zip(late.frames, least)]
+    limits = [max(MIN_OFFSET_MISPLACED if name in found.wrong else MIN_OFFSET, SPREAD_FACTOR * (spread or 0.0))
+              for name, spread in zip(offsets.names, offsets.spread)]
+    return [late if late is not None and abs(late) > limit else 0.0 for late, limit in zip(offsets.frames, limits)]
 
 
-def _turns(rig: Rig, found: Agreement, rows: Sequence[Sequence[Mask | None]]) -> dict[str, Mended]:
-    """Turns of cameras that disagree, or of the worst one, where they mend it."""
-    turns = {}
+def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, RotationFix]:
+    """Rotations of the cameras that disagree, or of the one that stands out, if they mend the disagreement."""
+    fixes = {}
     for name in found.wrong or _standing_out(found, 1.0):
         n = rig.names.index(name)
-        turn, apart = turning(rig.cameras, rows, n), found.apart[n]
-        if turn is not None and apart is not None:
-            after = agreement([turn.of(camera) if k == n else camera for k, camera in enumerate(rig.cameras)], rows,
-                              remedies=False).apart[n]
-            if after is not None and after < MENDS * apart and after < found.limit:
-                turns[name] = Mended(turn, after)
-    return turns
+        rotation, apart = estimate_rotation_error(rig.cameras, rows, n), found.apart[n]
+        if rotation is not None and apart is not None:
+            cameras = [rotation.of(camera) if k == n else camera for k, camera in enumerate(rig.cameras)]
+            after = compare_cameras(cameras, rows, remedies=False).apart[n]
+            if after is not None and after < ROTATION_SHARE * apart and after < found.limit:
+                fixes[name] = RotationFix(rotation, after)
+    return fixes
 
 
 def _standing_out(found: Agreement, times: float) -> tuple[str, ...]:
-    """The camera that disagrees most, where it does by more than good ones do, and so many times as much as the middle one."""
+    """The camera that disagrees most, if it does by more than good ones do and by more than `times` the median."""
     apart = {name: value for name, value in zip(found.names, found.apart) if value is not None}
     worst = max(apart, key=lambda name: apart[name], default="")
-    least = max(SLIGHT / DISAGREES * found.limit, times * float(np.median(list(apart.values()))) if apart else 0.0)
+    least = max(SLIGHT_DISAGREEMENT / MAX_DISAGREEMENT * found.limit, times * float(np.median(list(apart.values()))) if apart else 0.0)
     return (worst,) if worst and len(apart) > 2 and apart[worst] > least else ()
 
 
-def _in_frames(late: Lateness, every: int) -> Lateness:
+def _in_frames(offsets: TimeOffsets, every: int) -> TimeOffsets:
     def times(values: Sequence[float | None]) -> tuple[float | None, ...]:
         return tuple(None if value is None else round(value * every, 2) for value in values)
 
-    return replace(late, frames=times(late.frames), spread=times(late.spread), pairs=tuple(map(times, late.pairs)))
+    return replace(offsets, frames=times(offsets.frames), spread=times(offsets.spread), pairs=tuple(map(times, offsets.pairs)))
 
 
 def _starts(rig: Rig, shifts: Sequence[float], every: int) -> dict[str, float]:
-    """[start] of recording.toml that mends times: what it is now, and the frames that a late film has too many."""
+    """[start] of recording.toml that aligns the films: the present values plus the surplus of late films, seconds."""
     if not any(shifts):
         return {}
     least = min(shifts)
@@ -242,29 +225,30 @@ def _starts(rig: Rig, shifts: Sequence[float], every: int) -> dict[str, float]:
     return {name: round(start, 4) for name, start in starts.items() if start > 1e-4}
 
 
-def _doubts(check: RigCheck) -> list[str]:
+def _doubts(check: CalibrationCheck) -> list[str]:
     said, found = list[str](), check.agreement
     if check.late and check.lateness is not None:
         frames = {name: value for name, value in zip(check.lateness.names, check.lateness.frames) if name in check.late}
-        told = ", ".join(f"{name} {abs(value or 0):.1f} frames {'late' if (value or 0) > 0 else 'early'}" for name, value in frames.items())
+        text = ", ".join(f"{name} {abs(value or 0):.1f} frames {'late' if (value or 0) > 0 else 'early'}" for name, value in frames.items())
         start = ", ".join(f"{name} = {value:.4g}" for name, value in check.starts.items())
-        said.append(f"the films do not begin together ({told}): put into [start] of recording.toml: {start}")
+        said.append(f"the films do not begin together ({text}): put into [start] of recording.toml: {start}")
     if found.hopeless and found.remedy is not None:
         return [*said, found.remedy]
     said += [doubt for doubt in found.doubts() if not any(f"camera {name!r} disagrees" in doubt for name in check.turns)]
-    for name in check.turns or (() if found.doubts() else _standing_out(found, ALONE)):
+    for name in check.turns or (() if found.doubts() else _standing_out(found, STANDOUT_FACTOR)):
         others = [other for other in found.names if other != name]
         rest = max(value for other, value in zip(found.names, found.apart) if other != name and value is not None)
-        told = f"camera {name!r} disagrees with the others by {found.apart[found.names.index(name)]:.1f} pixels, they by {rest:.1f} at most"
+        text = f"camera {name!r} disagrees with the others by {found.apart[found.names.index(name)]:.1f} pixels, they by {rest:.1f} at most"
         if name in check.turns:
-            turn, after = check.turns[name]
-            told += (f"; it is as if it had been turned by {turn.degrees:.1f} degrees ({_ways(turn)}) since it was calibrated: turned "
-                     f"back, {after:.1f} pixels would be left")
-        said.append(f"{told}; calibrate it again, or leave it out: --camera {','.join(others)}")
+            rotation, after = check.turns[name]
+            text += (f"; it is as if it had been turned by {rotation.degrees:.1f} degrees ({_directions(rotation)}) since it was "
+                     f"calibrated: turned back, {after:.1f} pixels would be left")
+        said.append(f"{text}; calibrate it again, or leave it out: --camera {','.join(others)}")
     return said
 
 
-def _ways(turn: Turn) -> str:
-    ways = [(turn.right, "to the right", "to the left"), (turn.down, "down", "up"), (turn.clockwise, "clockwise", "counter-clockwise")]
-    told = [f"{abs(value):.1f} {more if value > 0 else less}" for value, more, less in ways if abs(value) >= 0.05]
-    return ", ".join(told) or "hardly"
+def _directions(rotation: RotationError) -> str:
+    directions = [(rotation.right, "to the right", "to the left"), (rotation.down, "down", "up"),
+                  (rotation.clockwise, "clockwise", "counter-clockwise")]
+    text = [f"{abs(value):.1f} {more if value > 0 else less}" for value, more, less in directions if abs(value) >= 0.05]
+    return ", ".join(text) or "hardly"

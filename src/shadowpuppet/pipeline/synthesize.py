@@ -13,7 +13,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.track import Listener, Summary, track_recording
 from shadowpuppet.synthetic import Spec, demo_ring_spec, demo_spec, synthesize
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.spec_file import HEAD, SPEC_FILE, read_spec
+from shadowpuppet.synthetic.spec_file import SPEC_FILE, SPEC_HEADER, read_spec
 from shadowpuppet.video import open_frames, write_image
 
 
@@ -65,7 +65,7 @@ def _made(path: Path) -> Spec | None:
     """The spec that a recording was made of; None where it is no made one: a spec that a person wrote has another first line."""
     try:
         with path.open(encoding="utf-8") as file:
-            return read_spec(path) if file.readline() == HEAD else None
+            return read_spec(path) if file.readline() == SPEC_HEADER else None
     except (OSError, UnicodeDecodeError, SettingsError):
         return None
 

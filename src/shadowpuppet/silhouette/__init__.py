@@ -1,6 +1,6 @@
-"""Pictures into silhouettes of a person before a fixed camera.
+"""Frames of a fixed camera to silhouettes of a person.
 
-`learn_background` learns the empty scene; the `Segmenter` that it returns turns each picture into a mask.
+`learn_background` learns the empty scene; the `Segmenter` that it returns turns each frame into a mask.
 """
 
 from shadowpuppet.silhouette.background import background_from_film

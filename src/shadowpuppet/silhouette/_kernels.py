@@ -1,4 +1,4 @@
-"""Loops over pixels. They let go of Python's lock: several cameras are segmented at once."""
+"""Per-pixel kernels. They release the GIL: several cameras are segmented in parallel."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.jit import compiled
 
 NEUTRAL = 128.0
-"""Cr and Cb of a pixel without colour, 8 bit."""
+"""Cr and Cb of a grey pixel, 8 bit."""
 
 
 @compiled(nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
@@ -15,9 +15,9 @@ def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, aske
     """Label (H, W) pixels: 0 background, 1 differing by `weak` standard deviations, 2 by `strong`.
 
     `planes` uint8, `mean`, `inverse_sigma` float32, all of shape (H, W, 3): Y, Cr, Cb. The channels of `keyed` (3,), 0 or 1,
-    are compared. Where the background, darkened to no less than `darkest` (1: not at all), explains the channels of `shadowed`
-    (3,), the pixel is background, and so it is where `within` (H, W) is not 0; but label 3 says that it has less than `asked` of the
-    background's brightness.
+    are compared. A pixel is background if `within` (H, W) is not 0, or if the background darkened to no less than `darkest` (1: not at
+    all) explains its channels of `shadowed` (3,); in the latter case it gets label 3 if it has less than `asked` of the background's
+    brightness.
     """
     weak, strong, centre = weak * weak, strong * strong, np.float32(NEUTRAL)
     for y in range(planes.shape[0]):

@@ -1,4 +1,4 @@
-"""What the empty scene looks like, and how much it varies."""
+"""Statistics of the empty scene, and the noise of a film."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shadowpuppet.errors import SilhouetteError
 Image = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 SMOOTHING = 0.7
-"""Standard deviation (pixels) of the smoothing that detection sees: it halves the noise, and the outline is drawn without it."""
+"""Standard deviation (pixels) of the smoothing before classification: it halves the noise. The outline is drawn without it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Background:
     """Statistics of an empty scene."""
 
     frames: int
-    """How many pictures they were learnt from."""
+    """Number of pictures they were learnt from."""
     colour: bool
     """Whether the pictures have colour channels."""
     brightness: NDArray[np.float64]
@@ -44,10 +44,10 @@ class Background:
         return (*self.shape, 3) if self.colour else self.shape
 
 
-def learn_statistics(images: Iterable[Image], see: Callable[[Image], object] = lambda image: None) -> Background:
-    """Means and standard deviations of pictures (H, W, 3) or (H, W), taken one at a time and shown to `see`.
+def learn_statistics(images: Iterable[Image], observe: Callable[[Image], object] = lambda image: None) -> Background:
+    """Means and standard deviations of pictures (H, W, 3) or (H, W); `observe` is called with each.
 
-    Raises `SilhouetteError` for pictures that are none or unlike each other, and without any.
+    Raises `SilhouetteError` for invalid pictures, pictures of different sizes or kinds, and none at all.
     """
     sums = None
     for n, image in enumerate(images):
@@ -56,7 +56,7 @@ def learn_statistics(images: Iterable[Image], see: Callable[[Image], object] = l
             sums = _Sums(image)
         check_alike(image, sums.shape, f"background frame {n}")
         sums.add(image)
-        see(image)
+        observe(image)
     if sums is None:
         raise SilhouetteError("background: found no frame, expected a picture or film of the empty scene; "
                               "without one, it is taken from the film itself (background_from_film)")
@@ -64,7 +64,7 @@ def learn_statistics(images: Iterable[Image], see: Callable[[Image], object] = l
 
 
 class _Sums:
-    """Running sums; exact, since pixels are whole numbers."""
+    """Running sums; exact, since pixels are integers."""
 
     def __init__(self, image: Image) -> None:
         self.shape, self.frames = image.shape, 0
@@ -76,8 +76,8 @@ class _Sums:
 
         self.frames += 1
         planes = to_planes(image)
-        seen = [(self.grey, to_brightness(image)), (self.planes, planes), (self.smooth, smoothed(planes))]
-        for (first, second), values in seen:
+        channels = [(self.grey, to_brightness(image)), (self.planes, planes), (self.smooth, smoothed(planes))]
+        for (first, second), values in channels:
             cv2.accumulate(values, first)
             cv2.accumulateSquare(values, second)
 
@@ -93,12 +93,12 @@ class _Sums:
 
 
 def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
-    """The empty scene as the median, pixel by pixel, of `count` to twice as many frames spread over a film: (H, W, 3) or (H, W).
+    """The empty scene (H, W, 3) or (H, W): the median of `count` to twice as many frames spread over a film, pixel by pixel.
 
-    Memory does not grow with the film. Right wherever the person is elsewhere for more than half of it; who stands still becomes
-    background. Raises `SilhouetteError` for fewer than 3 frames.
+    Memory does not grow with the film. A pixel is right if the person is elsewhere for more than half of the film; a person who stands
+    still becomes background. Raises `SilhouetteError` for fewer than 3 frames.
     """
-    frames = spread(images, count)
+    frames = sample_frames(images, count)
     if len(frames) < 3:
         raise SilhouetteError(f"background: found a film of {len(frames)} frames, expected at least 3 to tell a person who moves "
                               "from the scene; give a picture or film of the empty scene")
@@ -110,16 +110,16 @@ def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
     return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
 
 
-class Spread:
-    """Copies of `count` to twice as many of the pictures added (of all, where they are fewer), evenly spread over them."""
+class FrameSampler:
+    """Keeps copies of `count` to twice as many of the frames added, evenly spread; all if there are fewer."""
 
     def __init__(self, count: int) -> None:
-        """Start with none."""
+        """Empty."""
         self.kept: list[Image] = []
         self._count, self._step, self._seen = count, 1, 0
 
     def add(self, image: Image) -> None:
-        """The next picture."""
+        """Add the next frame."""
         if self._seen % self._step == 0:
             self.kept.append(np.array(image))
             if len(self.kept) == 2 * self._count:
@@ -127,26 +127,26 @@ class Spread:
         self._seen += 1
 
 
-def spread(images: Iterable[Image], count: int) -> list[Image]:
-    """The pictures that `Spread` keeps of a sequence."""
-    kept = Spread(count)
+def sample_frames(images: Iterable[Image], count: int) -> list[Image]:
+    """The frames that a `FrameSampler` keeps of a sequence."""
+    kept = FrameSampler(count)
     for image in images:
         kept.add(image)
     return kept.kept
 
 
 def film_noise(frames: list[Image], mean: Floats) -> NDArray[np.float64]:
-    """Standard deviation of a film's Y, Cr, Cb (3,), grey levels, from the smoothed background (H, W, 3) where nobody is.
+    """Noise of a film: standard deviation of its Y, Cr, Cb (3,), grey levels, from the smoothed background `mean` (H, W, 3).
 
-    It is what 68 % of all pixels stay under, as one standard deviation of a normal distribution; a person who covers less than a
-    third of the picture hardly moves it.
+    It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution), so that a person who
+    covers less than a third of the picture hardly changes it.
     """
     differences = [np.abs(smoothed(to_planes(f).astype(np.float32)) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
     return np.percentile(np.concatenate(differences), 68, axis=0)
 
 
 def to_planes(image: Image) -> Image:
-    """Y, Cr, Cb (H, W, 3) of a picture (H, W, 3) blue green red, or (H, W) grey: without colour then."""
+    """Y, Cr, Cb (H, W, 3) of a picture (H, W, 3), blue green red, or (H, W), grey: neutral Cr and Cb."""
     import cv2
 
     if image.ndim == 3:
@@ -163,14 +163,14 @@ def to_brightness(image: Image) -> Image:
 
 
 def smoothed(planes: np.ndarray) -> np.ndarray:
-    """Planes (H, W, 3) with the noise of single pixels averaged out."""
+    """Planes (H, W, 3) smoothed by a small Gaussian against pixel noise."""
     import cv2
 
     return np.asarray(cv2.GaussianBlur(planes, (3, 3), SMOOTHING), planes.dtype)
 
 
 def check_image(image: np.ndarray, name: str) -> None:
-    """Raise `SilhouetteError` for what is no picture (H, W) or (H, W, 3) of 8 bits."""
+    """Raise `SilhouetteError` if `image` is no 8-bit picture (H, W) or (H, W, 3)."""
     shape = getattr(image, "shape", ())
     if len(shape) not in (2, 3) or shape[2:] not in ((), (3,)) or not image.size:
         found = f"an array of shape {shape}" if shape else type(image).__name__
@@ -180,7 +180,7 @@ def check_image(image: np.ndarray, name: str) -> None:
 
 
 def check_alike(image: np.ndarray, shape: tuple[int, ...], name: str) -> None:
-    """Raise `SilhouetteError` for a picture of another size, or with or without colour unlike `shape`."""
+    """Raise `SilhouetteError` if a picture has another size or number of channels than `shape`."""
     if image.shape != shape:
         found, expected = (f"{s[1]} x {s[0]} {'grey' if len(s) == 2 else 'colour'}" for s in (image.shape, shape))
         raise SilhouetteError(f"{name}: found {found}, expected {expected} as the background; "

@@ -1,4 +1,4 @@
-"""From labelled pixels to one person: specks and small holes removed, the largest part kept, the outline drawn by contrast."""
+"""From labelled pixels to one person: specks removed, the largest part kept, the outline placed by contrast, small holes filled."""
 
 from __future__ import annotations
 
@@ -7,45 +7,45 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.silhouette.boundary import REACH, Contrast, Mask, Outline, at_half_contrast, disc
+from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, at_half_contrast, disc
 
 Window = tuple[slice, slice]
 """Rows and columns."""
-LIMB = 0.02
-"""Least share of the largest part's pixels that another part has which belongs to it: a hand..."""
-GAP = 0.06
-"""... and how near it must be, over the root of the largest part's area (half a neck)."""
-SMALL_HOLE = 0.004
+MIN_PART_SHARE = 0.02
+"""Least size, over the largest part's, of another part that belongs to the person: a hand."""
+MAX_PART_GAP = 0.06
+"""Greatest distance of such a part, over the root of the largest part's area: half a neck."""
+MAX_HOLE_SHARE = 0.004
 """Holes of up to this share of the person's area are filled."""
 
 
-def clean(label: Mask, contrast: Callable[[Window], Contrast], outline: Outline) -> Mask:
-    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely); empty where nobody is."""
+def clean(label: Labels, contrast: Callable[[Window], Contrast], outline: EdgeProfile) -> Labels:
+    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely); empty if there is none."""
     mask = coarse_person(label)
     out = np.zeros_like(mask)
     if mask.any():
-        window = window_around(mask, outline.width + REACH + 1)
+        window = bounding_window(mask, outline.width + OUTWARD_REACH + 1)
         inside = at_half_contrast(np.ascontiguousarray(mask[window]), contrast(window), outline)
-        out[window] = without_holes(person(inside, inside > 0))
+        out[window] = fill_small_holes(main_part(inside, inside > 0))
     return out
 
 
-def coarse_person(label: Mask) -> Mask:
-    """Pixels labelled 1 or 2, without specks, that hang together with the most that are labelled 2."""
+def coarse_person(label: Labels) -> Labels:
+    """The connected part, without specks, with the most pixels labelled 2."""
     import cv2
 
     likely = cv2.medianBlur((label > 0).astype(np.uint8), 3)
     likely = np.asarray(cv2.morphologyEx(likely, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8)
-    out, window = np.zeros_like(likely), window_around(likely, 0)
+    out, window = np.zeros_like(likely), bounding_window(likely, 0)
     if likely[window].size:
-        out[window] = person(likely[window], (label[window] == 2) & (likely[window] > 0))
+        out[window] = main_part(likely[window], (label[window] == 2) & (likely[window] > 0))
     return out
 
 
-def person(mask: Mask, sure: NDArray[np.bool_]) -> Mask:
-    """The connected part with the most `sure` pixels, and parts that nearly touch it, as a head does where the neck is lost.
+def main_part(mask: Labels, sure: NDArray[np.bool_]) -> Labels:
+    """The connected part with the most `sure` pixels, and parts that nearly touch it, such as a head if the neck is lost.
 
-    Empty where no pixel is sure.
+    Empty if no pixel is sure.
     """
     import cv2
 
@@ -58,30 +58,30 @@ def person(mask: Mask, sure: NDArray[np.bool_]) -> Mask:
         return mask.copy()
     counts[0] = 0
     kept = (parts == counts.argmax()).astype(np.uint8)
-    others = np.flatnonzero((counts >= LIMB * counts.max()) & (counts < counts.max()))
+    others = np.flatnonzero((counts >= MIN_PART_SHARE * counts.max()) & (counts < counts.max()))
     if len(others):
-        near = cv2.dilate(kept, disc(max(1, round(GAP * counts.max() ** 0.5))))
+        near = cv2.dilate(kept, disc(max(1, round(MAX_PART_GAP * counts.max() ** 0.5))))
         touching = np.intersect1d(others, parts[near > 0])
         kept |= np.isin(parts, touching)
     return kept
 
 
-def window_around(mask: Mask, margin: int) -> Window:
-    """The box around what is set, with a margin (pixels)."""
+def bounding_window(mask: Labels, margin: int) -> Window:
+    """Bounding box of the set pixels, with a margin (pixels)."""
     import cv2
 
     x, y, width, height = cv2.boundingRect(mask)
     return slice(max(y - margin, 0), y + height + margin), slice(max(x - margin, 0), x + width + margin)
 
 
-def without_holes(mask: Mask) -> Mask:
-    """The mask with its small holes filled; what touches the border is no hole."""
+def fill_small_holes(mask: Labels) -> Labels:
+    """The mask with its small holes filled; background that touches the border is no hole."""
     import cv2
 
-    # Of OpenCV's functions the one that counts pixels too takes ten times as long.
+    # OpenCV's function that counts pixels as well takes ten times as long.
     _, labels = cv2.connectedComponents(1 - mask, connectivity=4)
     parts = np.asarray(labels, np.intp)
-    filled = np.bincount(parts.ravel()) <= SMALL_HOLE * np.count_nonzero(mask)
+    filled = np.bincount(parts.ravel()) <= MAX_HOLE_SHARE * np.count_nonzero(mask)
     for border in (parts[0], parts[-1], parts[:, 0], parts[:, -1]):
         filled[border] = False
     return mask | filled[parts]

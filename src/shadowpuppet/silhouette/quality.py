@@ -1,4 +1,4 @@
-"""What can be said of silhouettes before tracking, and without it."""
+"""Quality of silhouettes, judged without tracking: size, steadiness, contact with the border, specks and holes."""
 
 from __future__ import annotations
 
@@ -12,61 +12,61 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask
 from shadowpuppet.errors import SilhouetteError
 
-TINY = 0.003
-"""Share of the picture below which limbs are too few pixels wide (15 pixels high of 240)."""
-JUMP = 0.25
-"""Relative change of the area from one frame to the next that no motion makes: a part of the person was lost or found."""
-CONTACT = 2
-"""Pixels on a side of the picture from which on the person touches it: one may be noise."""
+MIN_AREA = 0.003
+"""Least share of the picture that a person must cover for limbs to be wide enough (15 pixels high of 240)."""
+AREA_JUMP = 0.25
+"""Relative change of the area between frames that no motion causes: a part of the person was lost or found."""
+MIN_CONTACT = 2
+"""Pixels on a side of the picture from which on the person touches it; one may be noise."""
 
-# From here on a warning is due. Exact silhouettes of walking, running and waving people reach at most a third of these.
-MUCH_CONTACT = 0.02
-MUCH_CHANGE = 0.05
-MANY_JUMPS = 0.02
-MUCH_FLICKER = 0.06
-MUCH_SPECK = 0.02
-MUCH_HOLE = 0.1
-MANY_HOLES = 10
+# Limits of the warnings. Exact silhouettes of walking, running and waving people reach at most a third of these.
+WARN_CONTACT = 0.02
+WARN_AREA_CHANGE = 0.05
+WARN_JUMPS = 0.02
+WARN_FLICKER = 0.06
+WARN_SPECK_AREA = 0.02
+WARN_HOLE_AREA = 0.1
+WARN_HOLES = 10
 
 
 @dataclass(frozen=True)
 class MaskQuality:
-    """Silhouettes in figures. `warnings` puts into words what is wrong with them, `refusal` whether tracking is hopeless."""
+    """Quality measures of silhouettes. `warnings` says what is wrong with them, `refusal` whether tracking is hopeless."""
 
     frames: int
-    """How many there are."""
+    """Number of silhouettes."""
     area: float
-    """Median share of the picture that the person covers, where there is one."""
+    """Median share of the picture that the person covers, over frames with a person."""
     area_change: float
     """Median relative change of the area from one frame to the next; a moving person's changes by a percent or two."""
     area_jumps: float
     """Share of frames in which the area changed by over a quarter of itself."""
     flicker: float
-    """Median over frames of the pixels that differ from the frame before and the one after alike, over the person's area.
+    """Median over frames of the pixels that differ from both the frame before and the one after, over the person's area.
 
-    Motion makes such pixels only where something thinner than its own step passes, so few in the typical frame.
+    Motion causes such pixels only where something thinner than its own step passes: few in a typical frame.
     """
     border: dict[str, float]
     """Share of frames in which the person touches the left, right, top and bottom side of the picture."""
     specks: float
-    """Parts beyond the largest, mean a frame."""
+    """Mean number of parts beside the largest."""
     speck_area: float
-    """Their area over the largest part's, mean."""
+    """Mean of their area over the largest part's."""
     holes: float
-    """Holes in the largest part, mean a frame."""
+    """Mean number of holes in the largest part."""
     hole_area: float
-    """Their area over the largest part's, mean."""
+    """Mean of their area over the largest part's."""
     empty: int
     """Frames without any silhouette."""
     full: int
-    """Frames in which nearly all is silhouette."""
+    """Frames in which silhouette covers nearly all of the picture."""
     first_empty: int | None = None
     """The first empty frame, from 0."""
     first_full: int | None = None
     """The first full frame, from 0."""
 
     def refusal(self) -> str | None:
-        """Why tracking is hopeless, and the remedy, in a sentence; None where it is not."""
+        """Why tracking is hopeless, and the remedy, in a sentence; None if it is not."""
         if not self.frames:
             return "there is no silhouette: the film has no frames"
         if self.empty > 0.9 * self.frames:
@@ -78,7 +78,7 @@ class MaskQuality:
         return None
 
     def warnings(self) -> tuple[str, ...]:
-        """What harms tracking, and the remedy, a sentence each; none where there is a refusal."""
+        """What harms tracking, and the remedy, a sentence each; none if there is a refusal."""
         return () if self.refusal() else (*self._incomplete(), *self._unsteady(), *self._unclean())
 
     def _incomplete(self) -> Iterator[str]:
@@ -89,30 +89,30 @@ class MaskQuality:
             yield (f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
                    f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure")
         for side in ("left", "right", "top"):
-            if self.border[side] > MUCH_CONTACT:
+            if self.border[side] > WARN_CONTACT:
                 yield (f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
                        "is partly outside the picture, and what is outside is guessed; step back, or turn the camera")
-        if 0 < self.area < TINY:
+        if 0 < self.area < MIN_AREA:
             yield (f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
                    "camera with more pixels")
 
     def _unsteady(self) -> Iterator[str]:
         remedy = ("the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
-        if self.area_jumps > MANY_JUMPS:
-            yield (f"the area of the silhouette changes by over {_percent(JUMP)} at once in {_percent(self.area_jumps)} of the "
+        if self.area_jumps > WARN_JUMPS:
+            yield (f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
                    f"frames, as parts are lost and found: {remedy}")
-        elif self.area_change > MUCH_CHANGE:
+        elif self.area_change > WARN_AREA_CHANGE:
             yield f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}"
-        if self.flicker > MUCH_FLICKER:
+        if self.flicker > WARN_FLICKER:
             yield (f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
                    "a lamp's flicker, or silhouettes that are not cleaned; use more light, or the setting clean")
 
     def _unclean(self) -> Iterator[str]:
-        if self.speck_area > MUCH_SPECK:
+        if self.speck_area > WARN_SPECK_AREA:
             yield (f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
                    "noise, shadow or another person; use the setting clean, or keep others out of the picture")
-        if self.hole_area > MUCH_HOLE or self.holes > MANY_HOLES:
+        if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
             yield (f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
                    "background, or noise; try another method, or other clothes")
 
@@ -124,8 +124,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
 
 
-class _Look(NamedTuple):
-    """What one silhouette shows."""
+class _Measures(NamedTuple):
+    """Measures of one silhouette."""
 
     area: int
     touched: tuple[bool, bool, bool, bool]
@@ -136,21 +136,21 @@ class _Look(NamedTuple):
 
 
 def mask_quality(masks: Iterable[Mask]) -> MaskQuality:
-    """Look through silhouettes (H, W), in order of time, of which three at most are held.
+    """Quality of silhouettes (H, W) in order of time; at most three are in memory.
 
-    Raises `SilhouetteError` for what is none, or where sizes differ.
+    Raises `SilhouetteError` for an array that is no silhouette, and for different sizes.
     """
-    looks: list[_Look] = []
+    measures: list[_Measures] = []
     blinks: list[int] = []
     last: list[Mask] = []
     for n, mask in enumerate(masks):
         _check(mask, last[-1].shape if last else None, n)
-        looks.append(_look(mask))
+        measures.append(_measure(mask))
         last = [*last[-2:], mask]
         if len(last) == 3:
             before, now, after = last
             blinks.append(int(np.count_nonzero((now ^ before) & (now ^ after))))
-    return _summary(looks, blinks, last[0].size if last else 0)
+    return _summary(measures, blinks, last[0].size if last else 0)
 
 
 def _check(mask: Mask, shape: tuple[int, ...] | None, n: int) -> None:
@@ -162,11 +162,11 @@ def _check(mask: Mask, shape: tuple[int, ...] | None, n: int) -> None:
         raise SilhouetteError(f"silhouette {n}: found {found[1]} x {found[0]} pixels, expected {shape[1]} x {shape[0]}")
 
 
-def _look(mask: Mask) -> _Look:
+def _measure(mask: Mask) -> _Measures:
     import cv2
 
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
-    # A margin joins all of the outside, so that what else is not silhouette is a hole.
+    # A margin joins the whole outside, so that all other background is a hole.
     pixels = np.pad(mask[y : y + height, x : x + width].view(np.uint8), 1)
     _, _, parts, _ = cv2.connectedComponentsWithStats(pixels, connectivity=8)
     areas = np.sort(parts[1:, cv2.CC_STAT_AREA])[::-1]
@@ -174,25 +174,25 @@ def _look(mask: Mask) -> _Look:
     holes = gaps[2:, cv2.CC_STAT_AREA]
     largest = max(int(areas[0]) if len(areas) else 0, 1)
     sides = (mask[:, 0], mask[:, -1], mask[0], mask[-1])
-    left, right, top, bottom = (int(np.count_nonzero(side)) >= CONTACT for side in sides)
+    left, right, top, bottom = (int(np.count_nonzero(side)) >= MIN_CONTACT for side in sides)
     specks = areas[1:]
-    return _Look(int(areas.sum()), (left, right, top, bottom), len(specks), float(specks.sum() / largest), len(holes),
-                 float(holes.sum() / largest))
+    return _Measures(int(areas.sum()), (left, right, top, bottom), len(specks), float(specks.sum() / largest), len(holes),
+                     float(holes.sum() / largest))
 
 
-def _summary(looks: list[_Look], blinks: list[int], size: int) -> MaskQuality:
-    areas = np.array([look.area for look in looks], float)
+def _summary(measures: list[_Measures], blinks: list[int], size: int) -> MaskQuality:
+    areas = np.array([each.area for each in measures], float)
     empty = np.flatnonzero(areas == 0)
     full = np.flatnonzero(areas >= NEARLY_ALL * max(size, 1))
     person = _median(areas[areas > 0])
     change = np.abs(np.diff(areas)) / np.maximum(np.maximum(areas[1:], areas[:-1]), 1)
-    touched = np.mean([look.touched for look in looks] or [(0, 0, 0, 0)], axis=0)
-    specks, speck_area, holes, hole_area = np.mean([look[2:] for look in looks] or [(0, 0, 0, 0)], axis=0).tolist()
+    touched = np.mean([each.touched for each in measures] or [(0, 0, 0, 0)], axis=0)
+    specks, speck_area, holes, hole_area = np.mean([each[2:] for each in measures] or [(0, 0, 0, 0)], axis=0).tolist()
     return MaskQuality(
-        frames=len(looks),
+        frames=len(measures),
         area=person / max(size, 1),
         area_change=_median(change),
-        area_jumps=float(np.mean(change > JUMP)) if len(change) else 0.0,
+        area_jumps=float(np.mean(change > AREA_JUMP)) if len(change) else 0.0,
         flicker=_median(np.array(blinks)) / max(person, 1),
         border=dict(zip(("left", "right", "top", "bottom"), touched.tolist())),
         specks=specks,

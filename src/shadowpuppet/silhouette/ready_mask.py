@@ -1,4 +1,4 @@
-"""Silhouettes that somebody else has made."""
+"""Silhouettes made by other programs."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from shadowpuppet.errors import SilhouetteError
 
 THRESHOLD = 128
-"""From this value on a pixel is the person's."""
-MOST_BETWEEN = 0.1
-"""Share of pixels that may be neither dark nor bright: smooth outlines and compression."""
+"""Least value of the person's pixels."""
+MAX_GREY_SHARE = 0.1
+"""Greatest share of pixels neither dark nor bright: smooth outlines and compression."""
 
 
 def ready_mask(image: NDArray[np.uint8] | NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A silhouette (H, W) from a picture (H, W), or (H, W, 3) of equal channels, dark outside and bright (from 128 on) inside.
+    """A mask (H, W) from a picture (H, W), or (H, W, 3) of equal channels, dark outside and bright (128 or more) inside the person.
 
     Raises `SilhouetteError` for a picture that is no silhouette.
     """
@@ -31,7 +31,7 @@ def ready_mask(image: NDArray[np.uint8] | NDArray[np.bool_]) -> NDArray[np.bool_
         raise SilhouetteError("mask: found a picture in colour, expected black outside and white inside the person; "
                               "pictures of the person belong under video, not masks")
     between = float(np.mean((grey >= 64) & (grey < 192)))
-    if between > MOST_BETWEEN:
+    if between > MAX_GREY_SHARE:
         raise SilhouetteError(f"mask: found {100 * between:.0f} % of the pixels neither dark nor bright, expected black outside "
                               "and white inside the person; pictures of the person belong under video, not masks")
     if grey.max() == 1 and np.mean(grey) > 0.002:

@@ -1,8 +1,8 @@
-"""Dark skin or clothes before a background of the same hue, told from that background in shadow.
+"""Distinguishes dark skin or clothes from a shadow on a background of the same hue.
 
-Pixel by pixel they are alike: less light, the same colour. Part by part they are not. A limb hangs broadly together with the rest of the
-person, ends at an edge as sharp as the film shows edges, and is shaded as round things are, or slightly of another hue; a shadow fades
-out, touches the person at the feet, or lies evenly on what it falls on.
+Single pixels are alike: less light, the same colour. Connected parts differ. A limb is broadly connected to the rest of the person, ends
+at an edge as sharp as the film shows edges, and is shaded like a round object or of a slightly different hue. A shadow fades out,
+touches the person at the feet, or darkens its surface evenly.
 """
 
 from __future__ import annotations
@@ -15,43 +15,43 @@ from shadowpuppet.jit import compiled
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image
-    from shadowpuppet.silhouette.boundary import Mask
+    from shadowpuppet.silhouette.boundary import Labels
 
-SHADED = 3
-"""The label of pixels that may be either."""
-ASKED = 0.92
-"""Share of its light that a background must have lost some of for the question to be asked: shadows' faint borders have more."""
-LEAST = 12
-"""Pixels that a part must have; smaller ones are shadow, and closed or filled if they lie in a person."""
-DARK = 0.8
-"""Share of the light that a limb has at most. Soft shadows in well-lit rooms leave more."""
-NARROW, BROAD, ENCLOSED = 0.1, 0.35, 0.7
-"""Share of a limb's edge that lies along the rest of the person: as that of a head at the neck; as that of most; and from which on nothing
-is asked of the rest of the edge."""
-SHARP, SURELY_SHARP = 0.3, 0.5
-"""Share of the lost light that is there again across a sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
-EVEN, NEUTRAL, UNEVEN = 0.6, 0.4, 1.0
-"""Standard deviation of brightness, and difference of hue, both over the standard deviation assumed, under which a part is only
-background with less light; and the deviation from which on it surely is not."""
-OUTWARD, INWARD = 2, 1
-"""Pixels from an edge between which light is compared across it."""
+MAYBE_SHADOW = 3
+"""Label of pixels that may be either."""
+MAX_SHADE = 0.92
+"""Share of the background's light below which a pixel gets that label: faint borders of shadows have more."""
+MIN_PART_PIXELS = 12
+"""Least size of a limb, pixels; smaller parts are shadow, and closed or filled if they lie inside a person."""
+MAX_LIMB_LIGHT = 0.8
+"""Greatest share of the background's light in a limb. Soft shadows in well-lit rooms leave more."""
+NECK_CONTACT, BROAD_CONTACT, ENCLOSED_CONTACT = 0.1, 0.35, 0.7
+"""Share of a part's edge along the rest of the person: that of a head at the neck; that of most limbs; and the share from which on the
+rest of the edge does not matter."""
+SHARP_EDGE, VERY_SHARP_EDGE = 0.3, 0.5
+"""Share of the lost light regained across a sharp, and a very sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
+MAX_EVEN_SPREAD, MAX_NEUTRAL_HUE, MIN_UNEVEN_SPREAD = 0.6, 0.4, 1.0
+"""Standard deviation of brightness and difference of hue, over the assumed standard deviation, below which a part is only darkened
+background; and the deviation of brightness from which on it surely is a limb."""
+OUTWARD_STEP, INWARD_STEP = 2, 1
+"""Distances from an edge, pixels, between which light is compared."""
 
 
-def resolve(label: Mask, planes: Image, mean: Floats, inverse_sigma: Floats) -> Mask:
-    """Labels (H, W) in which those that are `SHADED` have become 1, a person's perhaps, or 0, background.
+def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats) -> Labels:
+    """Labels (H, W) in which `MAYBE_SHADOW` is replaced by 1, perhaps a person, or 0, background.
 
-    `planes`, `mean` and `inverse_sigma` are (H, W, 3): smoothed Y, Cr, Cb, the background's, and one over its standard deviation.
+    planes, mean, inverse_sigma: smoothed Y, Cr, Cb of frame and background and the inverse standard deviation, of shape (H, W, 3).
     """
     import cv2
 
-    either = np.asarray(cv2.inRange(label, SHADED, SHADED), np.uint8)
+    either = np.asarray(cv2.inRange(label, MAYBE_SHADOW, MAYBE_SHADOW), np.uint8)
     firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
     x, y, width, height = cv2.boundingRect(firm)
     label = label & ~either
     if width * height:
         window = slice(y, y + height), slice(x, x + width)
         number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-        limbs = _limbs(_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma))
+        limbs = _limbs(_part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma))
         if limbs.any():
             found = np.zeros_like(label)
             found[window] = limbs[np.asarray(parts, np.intp)]
@@ -59,26 +59,26 @@ def resolve(label: Mask, planes: Image, mean: Floats, inverse_sigma: Floats) -> 
     return label
 
 
-def _limbs(sums: np.ndarray) -> Mask:
-    """Which of the parts (K, 11) that `_sums` measured are a person's."""
+def _limbs(sums: np.ndarray) -> Labels:
+    """Which parts are limbs, of shape (K,); sums: `_part_sums` (K, 11)."""
     size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
     spread = np.sqrt(np.maximum(square / inner - light**2, 0)) * sigma / inner
     sharpness = across / open_edge / np.maximum(1 - light, 1e-3)
-    shaded = (spread >= EVEN) | (np.hypot(cr, cb) / inner >= NEUTRAL)
-    joined = (touching >= ENCLOSED) | ((touching >= BROAD) & (sharpness >= SHARP))
-    alone = (touching >= NARROW) & (sharpness >= SURELY_SHARP) & (spread >= UNEVEN)
-    return ((size >= LEAST) & (light <= DARK) & ((shaded & joined) | alone)).astype(np.uint8)
+    shaded = (spread >= MAX_EVEN_SPREAD) | (np.hypot(cr, cb) / inner >= MAX_NEUTRAL_HUE)
+    joined = (touching >= ENCLOSED_CONTACT) | ((touching >= BROAD_CONTACT) & (sharpness >= SHARP_EDGE))
+    alone = (touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE) & (spread >= MIN_UNEVEN_SPREAD)
+    return ((size >= MIN_PART_PIXELS) & (light <= MAX_LIMB_LIGHT) & ((shaded & joined) | alone)).astype(np.uint8)
 
 
 @compiled(nogil=True)
-def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
+def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
     """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 11).
 
-    Pixels; and of those well within a part: their number, light (the share of the background's brightness), its square, what colour differs
-    from the background in that light (Cr, Cb, in standard deviations), and the background's brightness in standard deviations. Sides
-    of pixels on the edge; and of those: along the person; others; and how much more light there is across these.
+    Columns: 0 pixels. Over pixels well inside: 1 their number, 2 light (share of the background's brightness), 3 its square, 4 and 5
+    difference of Cr and Cb from the darkened background, 6 the background's brightness, 4 to 6 in standard deviations. Sides of pixels
+    on the edge: 7 their number, 8 those along the person, 9 others, 10 gain of light across those others.
     """
     out = np.zeros((number, 11))
     height, width = label.shape
@@ -101,12 +101,12 @@ def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
                 if label[y + dy, x + dx]:
                     out[part, 8] += 1
                     continue
-                v, u, b, a = y + OUTWARD * dy, x + OUTWARD * dx, y - INWARD * dy, x - INWARD * dx
+                v, u, b, a = y + OUTWARD_STEP * dy, x + OUTWARD_STEP * dx, y - INWARD_STEP * dy, x - INWARD_STEP * dx
                 if min(v, u, b, a) >= 0 and max(v, b) < height and max(u, a) < width:
                     out[part, 9] += 1
                     out[part, 10] += planes[v, u, 0] / max(mean[v, u, 0], np.float32(1))
                     out[part, 10] -= planes[b, a, 0] / max(mean[b, a, 0], np.float32(1))
-            if inside == 4 and _deep(parts, row, column, part):
+            if inside == 4 and _well_inside(parts, row, column, part):
                 out[part, 1] += 1
                 out[part, 2] += light
                 out[part, 3] += light * light
@@ -117,8 +117,8 @@ def _sums(parts, number, label, top, left, planes, mean, inverse_sigma):
 
 
 @compiled(nogil=True)
-def _deep(parts, row, column, part):
-    """Whether a pixel's neighbours but one are of its part, too: nearer to the edge its light is blurred with that beyond."""
+def _well_inside(parts, row, column, part):
+    """Whether the part reaches two pixels to every side: nearer to the edge its light is mixed with that beyond."""
     if row < 2 or column < 2 or row + 2 >= parts.shape[0] or column + 2 >= parts.shape[1]:
         return False
     return (parts[row - 2, column] == part and parts[row + 2, column] == part and parts[row, column - 2] == part

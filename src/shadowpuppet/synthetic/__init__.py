@@ -1,4 +1,4 @@
-"""Made recordings with known truth: a person by published proportions, motions, cameras and noise as data."""
+"""Synthetic recordings with known truth: body, motions, cameras and noise are data."""
 
 from __future__ import annotations
 
@@ -18,27 +18,8 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-__all__ = [
-    "Bystander",
-    "Gesture",
-    "Mannequin",
-    "Obstacle",
-    "Ring",
-    "Scene",
-    "Spec",
-    "Viewpoint",
-    "around",
-    "demo_ring_spec",
-    "demo_spec",
-    "humaneva",
-    "named_specs",
-    "proving_ground",
-    "proving_rings",
-    "read_spec",
-    "spec_from",
-    "spec_text",
-    "synthesize",
-]
+__all__ = ["Bystander", "Gesture", "Mannequin", "Obstacle", "Ring", "Scene", "Spec", "Viewpoint", "around", "demo_ring_spec", "demo_spec",
+           "humaneva", "named_specs", "proving_ground", "proving_rings", "read_spec", "spec_from", "spec_text", "synthesize"]
 
 
 def synthesize(

@@ -1,10 +1,9 @@
-"""Kernels of the renderer: sphere tracing of the blended lofts (Hart 1996). Arrays and scalars only; see `renderer.py`.
+"""Kernels of `PersonRenderer`: sphere tracing of the blended lofts (Hart 1996).
 
-A placed part is a row of `PLACED` numbers: 0-8 its frame's columns width, depth, axis; 9-11 its start; 12-15 middle and radius of
-a sphere about it; 16 length; 17, 18 one over its caps; 19 blend; 20 samples per length; 21 where the second material begins.
-`table` (P, samples, 4) holds one over the half widths and half depths, and the centres along the axes, `code` (P, 3) the group
-and both materials, `joints` (groups, 4) where a group melts into the trunk and how far around. `parts` lists a tile's parts:
-their count, then their indices, ordered by group.
+`placed` (P, PLACED_COLUMNS), a row per part: 0-8 columns width, depth, axis of its frame; 9-11 start of the axis; 12-15 centre and radius
+of a bounding sphere; 16 length; 17, 18 inverse of its caps; 19 blend; 20 samples per length; 21 where the second material begins.
+`table` (P, samples, 4): inverse half widths and half depths, and the centres along the axis. `code` (P, 3): group and both materials.
+`joints` (groups, 4): where a group blends into the trunk, and the radius. `parts`: number of a tile's parts, then their indices by group.
 """
 
 from __future__ import annotations
@@ -14,20 +13,20 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.jit import compiled
+from shadowpuppet.synthetic.compositing import FAR
 
-PLACED = 22
-FAR = 1e9
-STEP = 0.85
-"""Share of the distance bound that a step takes: lofts' distances are first-order estimates."""
+PLACED_COLUMNS = 22
+STEP_SHARE = 0.85
+"""Length of a step over the distance bound: distances to lofts are first-order estimates."""
 HIT, EDGE_HIT = 2.5e-4, 1e-3
-"""A ray that comes this close to the surface (m) hits it: rays of pixel centres, and the others at edges."""
-MELT = 0.06
+"""Distance (m) at which a ray hits the surface: rays of pixel centres, and additional rays at edges."""
+JOINT_BLEND = 0.06
 """Width of the smooth union of limb and trunk at the joint, metres."""
 TILE = 8
-"""Pixels along the side of the tiles that list the parts in reach of their rays."""
+"""Side (pixels) of the tiles that list the parts in reach of their rays."""
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
-# Without reference counting ("_nrt"): the kernels make no arrays, and counting references at every call took half of the time.
+# "_nrt": no reference counting. The kernels allocate no arrays, and counting references at every call took half of the time.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FAST, "_nrt": False}
 kernel = compiled(**OPTIONS)
 
@@ -67,11 +66,11 @@ def blend(a, b, k):
 
 @kernel
 def _join(total, limb, x, y, z, group, joints):
-    """A limb's distance joined to the trunk's: blended near the joint only."""
+    """Union of a limb's distance with the trunk's, blended near the joint only."""
     if total >= FAR:
         return limb
     dx, dy, dz = x - joints[group, 0], y - joints[group, 1], z - joints[group, 2]
-    k = MELT * (1.0 - np.sqrt(dx * dx + dy * dy + dz * dz) / joints[group, 3])
+    k = JOINT_BLEND * (1.0 - np.sqrt(dx * dx + dy * dy + dz * dz) / joints[group, 3])
     return blend(total, limb, k) if k > 1e-4 else min(total, limb)
 
 
@@ -88,7 +87,7 @@ def distance(x, y, z, parts, placed, table, code, joints):
             group, limb = code[p, 0], FAR
         k = placed[p, 19]
         dx, dy, dz = x - placed[p, 12], y - placed[p, 13], z - placed[p, 14]
-        far = min(limb + k, total + MELT) + placed[p, 15]  # beyond it the part changes nothing
+        far = min(limb + k, total + JOINT_BLEND) + placed[p, 15]  # beyond it the part has no influence
         if dx * dx + dy * dy + dz * dz > far * far:
             continue
         d = part_distance(x, y, z, p, placed, table)
@@ -100,9 +99,9 @@ def distance(x, y, z, parts, placed, table, code, joints):
 
 @kernel
 def list_parts(direction, sine, cosine, eye, spheres, lists, span):
-    """For each tile the parts that its rays may meet, and between which distances.
+    """For each tile the parts that its rays may meet, and the range of their distances.
 
-    direction, sine, cosine: each tile's middle ray (N, 3) and half-angle; spheres: (P, 4, 4) that cover the parts.
+    direction, sine, cosine: middle ray (N, 3) and half-angle of each tile; spheres: (P, 4, 4), covering the parts.
     Fills lists (N, P + 1), the count first, and span (N, 2).
     """
     for t in range(direction.shape[0]):
@@ -127,13 +126,13 @@ def list_parts(direction, sine, cosine, eye, spheres, lists, span):
 
 @kernel
 def march(eye, rx, ry, rz, start, stop, hit, parts, placed, table, code, joints):
-    """Where along a unit ray (m) the surface is met, FAR where it is missed, and the part met."""
+    """Distance (m) along a unit ray at which the surface is met, FAR if it is missed, and the part met."""
     t = start
     for _ in range(96):
         d, near = distance(eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz, parts, placed, table, code, joints)
         if d < hit:
             return t, near
-        t += max(STEP * d, 2.0 * hit)
+        t += max(STEP_SHARE * d, 2.0 * hit)
         if t > stop:
             break
     return FAR, -1
@@ -141,7 +140,7 @@ def march(eye, rx, ry, rz, start, stop, hit, parts, placed, table, code, joints)
 
 @kernel
 def _weave(x, y, z):
-    """Smooth variation about 0, within 1.5, a few centimetres in size: sines in odd directions."""
+    """Texture of cloth: smooth variation within 1.5 of 0, a few centimetres in size."""
     return np.sin(61.0 * x + 23.0 * y + 3.0 * np.sin(31.0 * z)) * np.sin(
         47.0 * z + 37.0 * y + 2.0 * np.sin(43.0 * x)
     ) + 0.5 * np.sin(151.0 * x - 89.0 * z) * np.sin(131.0 * z + 113.0 * y)
@@ -149,7 +148,7 @@ def _weave(x, y, z):
 
 @kernel
 def shade(x, y, z, p, parts, placed, table, code, joints, lights, stripes):
-    """Material at a point of the surface, on part `p`, and how bright it is: two lamps, ambient light, occlusion in creases."""
+    """Material and brightness at a surface point on part `p`: two lamps, ambient light, occlusion in creases."""
     nx = ny = nz = 0.0
     for i in range(4):
         sx, sy, sz = (1.0 if i & 1 else -1.0), (1.0 if i & 2 else -1.0), (1.0 if i == 0 or i == 3 else -1.0)
@@ -167,7 +166,7 @@ def shade(x, y, z, p, parts, placed, table, code, joints, lights, stripes):
     if placed[p, 6] * dx + placed[p, 7] * dy + placed[p, 8] * dz > placed[p, 21]:
         material = code[p, 2]
     if code[p, 0] == 0 and material == 1:
-        p = 1  # the shirt's pattern runs on over all parts of the trunk
+        p = 1  # the shirt's pattern continues over all parts of the trunk
         dx, dy, dz = x - placed[p, 9], y - placed[p, 10], z - placed[p, 11]
     lx = placed[p, 0] * dx + placed[p, 1] * dy + placed[p, 2] * dz
     ly = placed[p, 3] * dx + placed[p, 4] * dy + placed[p, 5] * dz
@@ -180,7 +179,7 @@ def shade(x, y, z, p, parts, placed, table, code, joints, lights, stripes):
 
 @kernel
 def find_surface(eye, rays, tiles, lists, span, placed, table, code, joints, depth, near):
-    """Fill depth (H, W) along the rays (H, W, 3), FAR where missed, and the part met; `tiles`: how many in a row."""
+    """Fill depth (H, W) along the rays (H, W, 3), FAR where missed, and the part met; tiles: number in a row."""
     for v in range(depth.shape[0]):
         for u in range(depth.shape[1]):
             tile = (v // TILE) * tiles + u // TILE
@@ -192,7 +191,7 @@ def find_surface(eye, rays, tiles, lists, span, placed, table, code, joints, dep
 
 @kernel
 def _edge(v, u, depth, near, code):
-    """Whether a pixel's neighbours show something else: background, another limb, or the same one well behind."""
+    """Whether a neighbouring pixel shows something else: background, another limb, or the same one well behind."""
     for s in range(4):
         vv, uu = v + (s == 0) - (s == 1), u + (s == 2) - (s == 3)
         if 0 <= vv < depth.shape[0] and 0 <= uu < depth.shape[1]:
@@ -204,7 +203,7 @@ def _edge(v, u, depth, near, code):
 
 @kernel
 def _range(v, u, depth):
-    """The least and greatest depth met at a pixel and its eight neighbours."""
+    """Least and greatest depth met at a pixel and its eight neighbours."""
     least, greatest = FAR, 0.0
     for vv in range(max(v - 1, 0), min(v + 2, depth.shape[0])):
         for uu in range(max(u - 1, 0), min(u + 2, depth.shape[1])):
@@ -217,7 +216,7 @@ def _range(v, u, depth):
 def colour_surface(
     eye, rays, tiles, lists, span, placed, table, code, joints, depth, near, colours, lights, stripes, offsets, picture, alpha
 ):
-    """Add to picture (H, W, 3), premultiplied by alpha (H, W), the surface; edges are traced at `offsets` (K, 2), pixels."""
+    """Add the surface to picture (H, W, 3), premultiplied by alpha (H, W); edges are sampled at `offsets` (K, 2), pixels."""
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
@@ -244,19 +243,8 @@ def colour_surface(
                     continue
                 if code[p, 0] != group:
                     group = code[p, 0]
-                    material, light = shade(
-                        eye[0] + t * rx,
-                        eye[1] + t * ry,
-                        eye[2] + t * rz,
-                        p,
-                        lists[tile],
-                        placed,
-                        table,
-                        code,
-                        joints,
-                        lights,
-                        stripes,
-                    )
+                    material, light = shade(eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz, p, lists[tile], placed, table, code, joints,
+                                            lights, stripes)
                 alpha[v, u] += 1.0 / count
                 for c in range(3):
                     picture[v, u, c] += colours[material, c] * light / count

@@ -1,4 +1,4 @@
-"""Specs that the project uses again and again: the demo's, and the proving ground on which settings are chosen."""
+"""Named specs: the demo's, and the proving grounds on which settings are chosen."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
-from shadowpuppet.synthetic.shorthand import gestures_from
 from shadowpuppet.synthetic.spec import Scene, Spec
+from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
 
 
 def demo_spec() -> Spec:
     """The recording of `shadowpuppet demo`: the three motions of Liu 2011 and a reach, 15 s."""
-    gestures = gestures_from("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
+    gestures = parse_gestures("wave_hands 3.6, bend_aside 3.6, bow_forward 2.8, reach 4.2")
     return Spec(name="demo", body=Mannequin(stature=1.78), motion=gestures, scene=Scene(clothing=7, room=2))
 
 
 def demo_ring_spec() -> Spec:
-    """The recording of several cameras of `shadowpuppet demo`: somebody walks and turns before four small cameras, 5.6 s."""
+    """The recording of several cameras of `shadowpuppet demo`: a person walks and turns before four small cameras, 5.6 s."""
     ring = Ring(count=4, radius=3.8, start_deg=35, jitter=0.5, fov_deg=42, seed=5)
-    scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), gestures_from("walk 2, turn_around 2")
+    scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), parse_gestures("walk 2, turn_around 2")
     return Spec(name="demo_ring", body=Mannequin(stature=1.70, build=0.2), motion=gestures, ring=ring, scene=scene, rate=20)
 
 
@@ -51,34 +51,24 @@ PROVING = (
 
 
 def proving_ground() -> tuple[Spec, ...]:
-    """Recordings of one camera, bodies x motions x cameras x noise, each of about ten seconds, to choose settings by.
+    """Recordings of one camera on which settings are chosen: bodies x motions x cameras x noise, about ten seconds each.
 
-    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, for which its own seed is (0, n). Cameras stand
-    at 0.9 of the stature when level, so that the picture cuts the legs; higher or lower when pitched, so that the person stays in it.
+    They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, its own seed being (0, n). Level cameras stand at 0.9 of the
+    stature, so that the picture cuts the legs; pitched ones higher or lower, so that the person stays in the picture.
     """
     return tuple(_proof(n, *row) for n, row in enumerate(PROVING))
 
 
-def _proof(
-    n: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float, turn: float
-) -> Spec:
+def _proof(n: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float, turn: float) -> Spec:
     body = Mannequin.draw(np.random.default_rng(seed), kind)
     height = 0.9 * body.stature + distance * float(np.tan(np.radians(pitch)))
     view = Viewpoint(fov_deg=fov, height=height, distance=distance, pitch_deg=pitch)
-    return Spec(
-        name=name,
-        body=body,
-        motion=gestures_from(gestures),
-        cameras=(view,),
-        scene=Scene(clothing=n, room=n, noise=noise),
-        turn_deg=turn,
-        seed=(0, n),
-    )
+    return Spec(name=name, body=body, motion=parse_gestures(gestures), cameras=(view,), scene=Scene(clothing=n, room=n, noise=noise),
+                turn_deg=turn, seed=(0, n))
 
 
-def _person(kind: Kind, seed: int, **told: float) -> Mannequin:
-    """A body drawn, with a body mass index or an age where they are told."""
-    return Mannequin.draw(np.random.default_rng(seed), kind, bmi=told.get("bmi"), age=told.get("age"))
+def _person(kind: Kind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
+    return Mannequin.draw(np.random.default_rng(seed), kind, bmi=bmi, age=age)
 
 
 AROUND = (
@@ -91,13 +81,13 @@ AROUND = (
 
 
 def around() -> tuple[Spec, ...]:
-    """Recordings of seven cameras around a person, 640 x 480 at 60 pictures a second, of the length of those of HumanEva."""
+    """Recordings of seven cameras around a person, 640 x 480 at 60 frames/s, as long as those of HumanEva."""
     specs = []
     for n, (name, kind, seed, gestures, radius) in enumerate(AROUND):
         body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
         ring = Ring(count=7, radius=radius, jitter=0.5, seed=n, size=(640, 480), distortion=(-0.09, 0.05, 0.0, 0.0))
         scene = Scene(clothing=30 + n, room=30 + n)
-        specs.append(Spec(name=name, body=body, motion=gestures_from(gestures), ring=ring, scene=scene, rate=60, seed=(1, n)))
+        specs.append(Spec(name=name, body=body, motion=parse_gestures(gestures), ring=ring, scene=scene, rate=60, seed=(1, n)))
     return tuple(specs)
 
 
@@ -109,15 +99,15 @@ HUMANEVA: tuple[tuple[str, Kind, int, str, float, int, float, float, tuple[int, 
     ("humaneva_boxing", "man", 23, "box 10", 1.2, 377, 4.2, 42, (91, 92)),
 )
 TRAINING_FRAMES = 100
-"""Frames that Ni 2008 learns from (Table I)."""
+"""Number of training frames in Ni 2008, Table I."""
 
 
 def humaneva() -> tuple[Spec, ...]:
-    """Recordings as those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 pictures a second, 433, 393 and 377 pictures of
-    somebody who walks, jogs and boxes from the first to the last, and 100 frames of the same person's joints to learn from.
+    """Recordings like those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 frames/s; 433 frames of walking, 393 of jogging
+    and 377 of boxing; and 100 training frames of the same person's joints.
 
-    HumanEva itself needs a licence (`io.humaneva`). Here people move by published angles, not by motion capture, and what is learnt from is
-    another performance of the same motion.
+    HumanEva itself needs a licence (`io.humaneva`). Here people move by published angles, not by motion capture, and the training motion
+    is another performance of the same gestures.
     """
     return tuple(_humaneva(n, *row) for n, row in enumerate(HUMANEVA))
 
@@ -126,7 +116,7 @@ def _humaneva(n: int, name: str, kind: Kind, seed: int, gestures: str, begin: fl
               fov: float, look: tuple[int, int]) -> Spec:  # fmt: skip
     body, scene = Mannequin.draw(np.random.default_rng(seed), kind), Scene(clothing=look[0], room=look[1])
     ring = Ring(count=7, radius=radius, fov_deg=fov, jitter=0.5, seed=10 + n, size=VGA, distortion=PLAIN_LENS)
-    return Spec(name=name, body=body, motion=gestures_from(gestures), begin=begin, frames=frames, training_frames=TRAINING_FRAMES,
+    return Spec(name=name, body=body, motion=parse_gestures(gestures), begin=begin, frames=frames, training_frames=TRAINING_FRAMES,
                 ring=ring, scene=scene, rate=60, tells="height", seed=(3, n))
 
 
@@ -135,7 +125,7 @@ Row = tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float]
 
 
 def _rings() -> tuple[Row, ...]:
-    """A row a recording; a function, because a ring with a lens loads OpenCV when it is checked."""
+    """One row per recording; a function, because checking a ring with a distorted lens loads OpenCV."""
     return (
         # name, body, gestures, those of the training (None: the same, "": none), cameras, scene, pictures a second
         ("rings_walk", _person("woman", 41), "walk 4", None, Ring(count=5, radius=4.4, fov_deg=48, size=(480, 360)), {}, 60),
@@ -162,20 +152,20 @@ def _rings() -> tuple[Row, ...]:
 
 
 def proving_rings() -> tuple[Spec, ...]:
-    """Recordings of 3 to 8 cameras around a person, of four to six seconds, to choose the settings of the several-camera tracker by.
+    """Recordings of 3 to 8 cameras, four to six seconds each, on which the settings of the several-camera tracker are chosen.
 
     Bodies (thin to heavy, a child of seven to tall men) x motions x rings (near and far, high and low, irregular, cutting the person,
-    fisheyes) x noise and rooms. The motion to learn from is another performance of the same gestures, or of others, or there is
-    none. They are fixed; the n-th is made with its own seed, (2, n).
+    fisheyes) x noise and rooms. The training motion is another performance of the same gestures, of other gestures, or absent. They are
+    fixed; the n-th is made with its own seed, (2, n).
     """
     return tuple(
-        Spec(name=name, body=body, motion=gestures_from(gestures), ring=replace(ring, seed=n),
-             training=None if training is None else gestures_from(training) if training else (),
+        Spec(name=name, body=body, motion=parse_gestures(gestures), ring=replace(ring, seed=n),
+             training=None if training is None else parse_gestures(training) if training else (),
              scene=Scene(**{"clothing": 60 + n, "room": 60 + n, "empty_seconds": 2.0, **scene}), rate=rate, seed=(2, n))
         for n, (name, body, gestures, training, ring, scene, rate) in enumerate(_rings(), 1)
     )  # fmt: skip
 
 
 def named_specs() -> dict[str, Spec]:
-    """All of them by name: the demo's, the proving ground's, and those of several cameras."""
+    """All specs by name."""
     return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *proving_ground(), *around(), *humaneva(), *proving_rings())}

@@ -1,4 +1,4 @@
-"""Things that stand in the scene: boxes and round posts that hide what is behind them."""
+"""Obstacles in the scene, made of boxes and round posts, and their rendering by ray casting."""
 
 from __future__ import annotations
 
@@ -7,43 +7,45 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.layers import FAR, Layer
+from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.compositing import FAR, Layer
 
-Place = Annotated[float, Field(ge=-10, le=10)]
-NEAREST = 0.25
-"""Metres that a thing keeps from the person's place."""
+Coordinate = Annotated[float, Field(ge=-10, le=10)]
+MIN_DISTANCE = 0.25
+"""Least distance of an obstacle from the person's place, metres."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
+@dataclass(frozen=True, config=STRICT, kw_only=True)
 class Obstacle:
-    """A thing that does not move, from the film of the empty scene on."""
+    """An immobile obstacle, present in the film of the empty scene too."""
 
     kind: Literal["table", "chair", "pillar", "cabinet"]
-    """What it is: a table 74 cm high, a chair with its back 92 cm high, a round pillar, a cabinet 1.05 m high."""
-    ahead: Place = 0.8
-    """How far before the person, metres; negative behind them."""
-    left: Place = 0.0
-    """How far to the person's left, metres."""
+    """Kind: a table 74 cm high, a chair with its back 92 cm high, a round pillar, a cabinet 1.05 m high."""
+    ahead: Coordinate = 0.8
+    """Distance before the person, metres; negative behind."""
+    left: Coordinate = 0.0
+    """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """How far it is turned to the left about the vertical, degrees; 0 shows its front to where the person looks."""
+    """Rotation to the left about the vertical, degrees; at 0 its front faces where the person looks."""
     colour: Annotated[int, Field(ge=0)] = 1
     """Seed of its colour."""
 
     def __post_init__(self) -> None:
-        """It must not stand where the person does."""
-        if np.hypot(self.ahead, self.left) < NEAREST:
-            raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; expected {NEAREST} m of distance")
+        """Refuse the person's place."""
+        if np.hypot(self.ahead, self.left) < MIN_DISTANCE:
+            raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; "
+                             f"expected {MIN_DISTANCE} m of distance")
 
 
 class Block(NamedTuple):
     """A box, or an upright elliptic post within it."""
 
     low: tuple[float, float, float]
-    """Lowest corner, metres, in the thing's frame: x to its left, y backward, z up, the floor below its middle at 0."""
+    """Lowest corner, metres, in the obstacle's frame: x to its left, y backward, z up, the origin on the floor below its middle."""
     high: tuple[float, float, float]
     """Highest corner."""
     round: bool = False
@@ -56,35 +58,29 @@ def _legs(half_x: float, half_y: float, height: float, thick: float) -> list[Blo
 
 SHAPES: dict[str, list[Block]] = {
     "table": [Block((-0.60, -0.36, 0.71), (0.60, 0.36, 0.74)), *_legs(0.56, 0.33, 0.71, 0.025)],
-    "chair": [
-        Block((-0.21, -0.21, 0.43), (0.21, 0.21, 0.47)),
-        *_legs(0.21, 0.21, 0.43, 0.02),
-        Block((-0.21, 0.17, 0.47), (-0.17, 0.21, 0.92)),
-        Block((0.17, 0.17, 0.47), (0.21, 0.21, 0.92)),
-        Block((-0.17, 0.175, 0.62), (0.17, 0.205, 0.90)),
-    ],
+    "chair": [Block((-0.21, -0.21, 0.43), (0.21, 0.21, 0.47)), *_legs(0.21, 0.21, 0.43, 0.02),
+              Block((-0.21, 0.17, 0.47), (-0.17, 0.21, 0.92)), Block((0.17, 0.17, 0.47), (0.21, 0.21, 0.92)),
+              Block((-0.17, 0.175, 0.62), (0.17, 0.205, 0.90))],
     "pillar": [Block((-0.06, -0.06, 0.0), (0.06, 0.06, 9.0), True), Block((-0.11, -0.11, 0.0), (0.11, 0.11, 0.10))],
     "cabinet": [Block((-0.45, -0.20, 0.0), (0.45, 0.20, 1.02)), Block((-0.47, -0.22, 1.02), (0.47, 0.22, 1.05))],
 }
-"""What each kind is made of."""
+"""The blocks of each kind."""
 
 
 class Furniture:
-    """All things of a scene, in the world."""
+    """All obstacles of a scene, in the world."""
 
     def __init__(self, things: Sequence[Obstacle]) -> None:
-        """Nothing is drawn before it is asked for."""
+        """Of the spec's obstacles."""
         self.things = tuple(things)
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
+        """Whether there are obstacles."""
         return bool(self.things)
 
-    def met(self, start: Array, rays: Array) -> tuple[Array, Array, Array, Array]:
-        """How far along rays (..., 3) from `start` the nearest thing is, `FAR` where none is: distances in lengths of the rays.
-
-        start: of shape (3,) or (..., 3), metres, world. Also the normals there (..., 3), the place in the thing's frame (..., 3),
-        and which thing it is.
+    def intersect(self, start: Array, rays: Array) -> tuple[Array, Array, Array, Array]:
+        """Nearest intersections of rays (..., 3): distances in lengths of the rays (`FAR` if none), normals (..., 3), places in the
+        obstacle's frame (..., 3) and the obstacle's index (-1 if none). start: of shape (3,) or (..., 3), metres, world.
         """
         shape = rays.shape[:-1]
         nearest, which = np.full(shape, FAR), np.full(shape, -1)
@@ -102,9 +98,9 @@ class Furniture:
         return nearest, normals, places, which
 
     def layer(self, eye: Array, rays: Array, fine: Array, lights: Array) -> Layer:
-        """As a camera at `eye` sees them, of unit rays (H, W, 3) at pixel centres and `fine` ones (2H, 2W, 3) within the pixels."""
-        depth = self.met(eye, rays)[0]
-        _, normals, places, which = self.met(eye, fine)
+        """What a camera at `eye` sees, from unit rays (H, W, 3) at pixel centres and `fine` ones (2H, 2W, 3), four per pixel."""
+        depth = self.intersect(eye, rays)[0]
+        _, normals, places, which = self.intersect(eye, fine)
         hit = which >= 0
         light = sum(strength * np.maximum(normals @ lamp, 0) for *lamp, strength in lights[:2])
         light = light + lights[2, 3] * (0.65 + 0.35 * normals[..., 2])
@@ -118,11 +114,11 @@ class Furniture:
         return Layer(picture, alpha, depth)
 
     def shades(self, points: Array, lamp: Array) -> np.ndarray:
-        """Which points (..., 3) of floor and walls lie in the shadow of a thing: the lamp is far, in the direction `lamp`."""
-        return self.met(points + 1e-4 * lamp, np.broadcast_to(lamp, points.shape))[0] < FAR
+        """Whether points (..., 3) of floor and walls lie in shadow of a distant lamp in direction `lamp`."""
+        return self.intersect(points + 1e-4 * lamp, np.broadcast_to(lamp, points.shape))[0] < FAR
 
     def holds(self, point: Array, margin: float = 0.1) -> str | None:
-        """The kind of the thing in whose space a point (3,) is, or nearer than `margin` metres to it; None if none."""
+        """Kind of the obstacle that contains a point (3,), enlarged by `margin` metres; None if none does."""
         for thing in self.things:
             turn = np.radians(thing.turn_deg)
             frame = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
@@ -134,7 +130,7 @@ class Furniture:
 
 
 def _box(eye: Array, rays: Array, block: Block) -> tuple[Array, Array]:
-    """Distance along rays to a box, `FAR` where missed or left, and the normal: slabs (Kay & Kajiya 1986)."""
+    """Distance along rays to a box, `FAR` if missed or behind, and the normal: slab method (Kay & Kajiya 1986)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         a, b = (np.array(block.low) - eye) / rays, (np.array(block.high) - eye) / rays
     near, far = np.fmin(a, b), np.fmax(a, b)
@@ -146,7 +142,7 @@ def _box(eye: Array, rays: Array, block: Block) -> tuple[Array, Array]:
 
 
 def _post(eye: Array, rays: Array, block: Block) -> tuple[Array, Array]:
-    """Distance along rays to an upright elliptic cylinder's mantle, and the normal; its ends are beyond sight."""
+    """Distance along rays to the mantle of an upright elliptic cylinder, and the normal; its ends are out of sight."""
     low, high = np.array(block.low), np.array(block.high)
     middle, half = (low + high) / 2, (high - low) / 2
     o, d = ((eye - middle) / half)[..., :2], (rays / half)[..., :2]
@@ -164,7 +160,7 @@ def _post(eye: Array, rays: Array, block: Block) -> tuple[Array, Array]:
 
 
 def _paint(thing: Obstacle, places: Array) -> Array:
-    """Colour (n, 3) at places (n, 3) of a thing: wood with a grain, or plain paint on a pillar."""
+    """Colours (n, 3) at places (n, 3) of an obstacle: wood grain, or plain paint on a pillar."""
     rng = np.random.default_rng(thing.colour)
     colour = np.array(colorsys.hsv_to_rgb(rng.uniform(0.03, 0.12), rng.uniform(0.2, 0.6), rng.uniform(0.35, 0.75)))
     if thing.kind == "pillar":

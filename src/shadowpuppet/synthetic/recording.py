@@ -1,4 +1,4 @@
-"""A made recording as a folder: films, exact masks, truth and reference pictures in the recording layout."""
+"""Write a synthetic recording: films, exact masks, truth and reference pictures in the recording layout."""
 
 from __future__ import annotations
 
@@ -16,27 +16,23 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
+from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
-from shadowpuppet.synthetic.studio import Studio, body_of
 
-Tell = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 
-REFERENCES = {
-    "front_t_pose": LEVEL,
-    "side_arms_hanging": HANGING_ARMS | trunk(turn=90),
-    "front_arms_t_pose": LEVEL,
-}
+REFERENCES = {"front_t_pose": LEVEL, "side_arms_hanging": HANGING_ARMS | trunk(turn=90), "front_arms_t_pose": LEVEL}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
 
 
-def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Tell | None = None) -> Path:
-    """Write the recording that `spec` describes into `folder`, made where missing, and return its path.
+def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Progress | None = None) -> Path:
+    """Write the recording that `spec` describes into `folder`, created if missing, and return its path.
 
-    rng: where none is given, one of the spec's seed. tell: called after each picture with how many are done and how many there
-    will be. The same spec and seed give the same pictures, masks and truth, whatever the number of threads; `spec.toml` keeps
-    both. Interrupted by Ctrl-C, the pictures made so far are a recording, too. Raises `RecordingError` where the folder cannot
-    be written; warns where obstacles hide nothing, and where a camera never sees the person.
+    rng: by default a generator of the spec's seed. tell: called after each frame with the numbers of frames done and in all. The same
+    spec and seed give the same frames, masks and truth, whatever the number of threads; `spec.toml` keeps both. After Ctrl-C the frames
+    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written; warns if obstacles hide nothing, and if a
+    camera never sees the person.
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
@@ -50,7 +46,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     _write_given(folder, spec, cameras, times, figure, for_training)
     hidden = 0
     for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
-        studio = Studio(spec, camera, noise, others, _wall(figure, others))
+        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others))
         hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         hidden += hides
         if not seen:
@@ -63,25 +59,25 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
 
 
 def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
-    """Times (T,), seconds from the first picture, and the figure of `spec` in its motion at those times.
+    """Times (T,), seconds from the first frame, and the moving figure of `spec` at those times.
 
-    Raises `SettingsError` where the motion is over before the film is.
+    Raises `SettingsError` if the motion is shorter than the film.
     """
-    from shadowpuppet.synthetic.performance import perform, seconds_of
+    from shadowpuppet.synthetic.movement.sequence import animate, sequence_seconds
 
-    there = int((seconds_of(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
+    there = int((sequence_seconds(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
     if there < max(spec.frames or 1, 1):
         raise SettingsError(f"frames: found {spec.frames or 1} pictures at {spec.rate:g} a second after {spec.begin:g} s, expected at most "
                             f"{max(there, 0)}: then the motion is over")
     times = np.arange(spec.frames or there) / spec.rate
-    return times, perform(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
+    return times, animate(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
-    """A bystander in `count` pictures, where they stand."""
+    """A bystander's figure in `count` frames, at its place."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
-    always = replace(spec, body=body_of(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
+    always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
     _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
@@ -89,20 +85,20 @@ def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Genera
 
 
 def _wall(figure: Figure, others: list[Figure]) -> float:
-    """How far behind the person the wall must be, metres: 0 where they stay at their place, for which all walls are far enough."""
+    """Least distance of the wall behind the origin, metres: 0 if nobody leaves their place, for which all walls are far enough."""
     people = [one.joints[..., :2] for one in (figure, *others)]
     behind, aside = max(float(one[..., 1].max()) for one in people), max(float(np.abs(one).max()) for one in people)
     return max(behind if others or behind > 1.15 else -0.4, aside if aside > 5.6 else -0.4) + 0.4
 
 
-def _part(tell: Tell | None, before: int, total: int) -> Callable[[int], None]:
+def _part(tell: Progress | None, before: int, total: int) -> Callable[[int], None]:
     return lambda done: tell(before + done, total) if tell is not None else None
 
 
-def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Callable[[int], None]) -> tuple[int, int]:
-    """Write a camera's films, and tell after each picture how many there are; returns how many pixels of the person are hidden and seen.
+def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell: Callable[[int], None]) -> tuple[int, int]:
+    """Write a camera's films; returns the numbers of the person's hidden and visible pixels. tell: called with the frames done.
 
-    After Ctrl-C the films end with the last picture that was made, and have their own names: they can be used.
+    After Ctrl-C the films end with the last frame made and can be used.
     """
     from shadowpuppet.video import write_frames
 
@@ -133,9 +129,9 @@ def _shoot(folder: Path, spec: Spec, studio: Studio, figure: Figure, tell: Calla
 
 
 def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
-    """All that is no film: calibration, what is told of the subject, truth, and for several cameras motion to train with.
+    """Write what is no film: calibration, the subject's data, truth, and for several cameras a training motion.
 
-    The training motion is a second performance of the same gestures, or one of others, by the same body, with another's chance.
+    The training motion is another performance, with other random numbers, of the same or of other gestures by the same body.
     """
     from shadowpuppet.io.calibration.calibration_files import write_calibration
 
@@ -149,7 +145,7 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
 
 def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
-    """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds."""
+    """Write joints (T, 17, 3) at times (T,), seconds, to `<path>.csv` (metres) and `<path>.trc` (millimetres)."""
     names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
     rows = joints.reshape(len(joints), -1)
     lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
@@ -163,15 +159,12 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
         "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"),
         "",
     ]
-    lines = [
-        "\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)])
-        for n, (t, row) in enumerate(zip(times, rows), 1)
-    ]
+    lines = ["\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)]) for n, (t, row) in enumerate(zip(times, rows), 1)]
     _write(trc, [*head, *lines])
 
 
-def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
-    """Reference pictures with masks and joints; none where a thing hides part of them: sizes are fitted to whole silhouettes."""
+def _write_references(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
+    """Write reference pictures with masks and joints; none if an obstacle hides a part, as sizes are fitted to whole silhouettes."""
     from shadowpuppet.video import write_image
 
     figures = {name: pose(spec.body, posture(**named)) for name, named in REFERENCES.items()}
@@ -186,7 +179,7 @@ def _write_references(folder: Path, spec: Spec, studio: Studio) -> None:
 
 
 def _write_subject(path: Path, spec: Spec) -> None:
-    """recording.toml: what is told of the subject."""
+    """Write recording.toml with the subject's data."""
     lines = ["[subject]"]
     if "height" in spec.tells:
         lines.append(f"height = {spec.body.stature:.3f}     # metres, shoes on")
@@ -209,6 +202,4 @@ def _folders(folder: Path, *names: str) -> None:
         for name in names or ("",):
             (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RecordingError(
-            f"{folder}: the recording cannot be written there ({(error.strerror or str(error)).lower()})"
-        ) from None
+        raise RecordingError(f"{folder}: the recording cannot be written there ({(error.strerror or str(error)).lower()})") from None

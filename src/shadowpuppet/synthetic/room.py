@@ -1,4 +1,4 @@
-"""The place: a textured room, its lamps, the person's soft shadow on floor and wall, and the camera's noise."""
+"""The room: textured walls and floor, lamps, soft shadows of people, and the camera's exposure and noise."""
 
 from __future__ import annotations
 
@@ -23,33 +23,21 @@ SHADOW_PARTS = (
     *(
         (f"{side}_{a}", f"{side}_{b}", radius)
         for side in ("left", "right")
-        for a, b, radius in (
-            ("shoulder", "elbow", 0.05),
-            ("elbow", "wrist", 0.04),
-            ("hip", "knee", 0.08),
-            ("knee", "ankle", 0.055),
-        )
+        for a, b, radius in (("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.055))
     ),
 )
-"""What casts the shadow: round sticks between joints, and their radius (m)."""
+"""Shadow casters: round sticks between two joints, and their radius (m)."""
 
-COARSE = 4
-"""Pixels along a cell of the grid on which shadows are computed; they are soft."""
+SHADOW_CELL = 4
+"""Cell size (pixels) of the grid on which the soft shadows are computed."""
 
 
 class Room:
-    """A floor at z = 0, walls around, one of them behind the person, with their texture, and two lamps; all drawn from `rng`."""
+    """A floor at z = 0, four walls, one of them behind the person, their texture, and two lamps; all drawn from `rng`."""
 
-    def __init__(
-        self,
-        camera: Camera,
-        rng: np.random.Generator,
-        shadow: float,
-        least: float = 0.0,
-        background: walls.Background = "room",
-        furniture: Furniture | None = None,
-    ) -> None:
-        """shadow: how dark shadows are, 0 to 1; least: the wall is at least so far behind the person, metres."""
+    def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float, least: float = 0.0, background: walls.WallStyle = "room",
+                 furniture: Furniture | None = None) -> None:
+        """shadow: darkness of shadows, 0 to 1; least: least distance of the wall behind the person, metres."""
         self.camera, self.shadow = camera, shadow
         self.distance = max(rng.uniform(1.2, 3.5), least)
         side = rng.choice([-1, 1])
@@ -63,11 +51,11 @@ class Room:
         across = np.cross(self.lights[0, :3], [0.0, 0.0, 1.0])
         across /= np.linalg.norm(across)
         self._from_lamp = np.stack([across, np.cross(self.lights[0, :3], across), self.lights[0, :3]], 1)
-        coarse = np.stack(np.meshgrid(*(np.arange(-(-n // COARSE)) for n in camera.size)), -1)
-        self._seen = self._points(COARSE * coarse + (COARSE - 1) / 2)[0] @ self._from_lamp
+        coarse = np.stack(np.meshgrid(*(np.arange(-(-n // SHADOW_CELL)) for n in camera.size)), -1)
+        self._seen = self._points(SHADOW_CELL * coarse + (SHADOW_CELL - 1) / 2)[0] @ self._from_lamp
 
     def _points(self, pixels: ArrayLike) -> tuple[Array, Array]:
-        """Where the rays of pixels (..., 2) meet floor or wall, (..., 3), and the place along the walls, (...), metres."""
+        """Points (..., 3) where the rays of pixels (..., 2) meet floor or wall, and places (...) along the walls, metres."""
         eye, ray = self.camera.centre, self.camera.rays(pixels) @ inverse(self.camera.T_camera_world)[:3, :3].T
         half = max(self.distance, 6.0, 1.2 * float(np.hypot(*eye[:2])))
         ends = [(0, half, 20.0), (0, -half, -20.0), (1, self.distance, 0.0), (1, -half, 40.0), (2, 0.0, 0.0)]
@@ -79,13 +67,13 @@ class Room:
         along = np.where(met < 2, points[..., 1], points[..., 0]) + np.array([start for *_, start in ends])[met]
         return points, along
 
-    def _paint(self, rng: np.random.Generator, background: walls.Background, furniture: Furniture | None) -> Array:
-        """The empty room, (H, W, 3) RGB, 0 to 1, each pixel the mean of four rays."""
+    def _paint(self, rng: np.random.Generator, background: walls.WallStyle, furniture: Furniture | None) -> Array:
+        """Picture of the empty room (H, W, 3), RGB, 0 to 1; each pixel is the mean of four rays."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         points, along = self._points(grid)
-        wall = walls.wall(background, along, points[..., 2], rng)
-        floor = walls.floor(background, points[..., 0], points[..., 1], rng)
+        wall = walls.paint_wall(background, along, points[..., 2], rng)
+        floor = walls.paint_floor(background, points[..., 0], points[..., 1], rng)
         picture = np.where(points[..., 2:] < 1e-9, floor, wall)
         picture *= 0.78 + 0.22 * np.exp(-((points[..., :1] - 0.5) ** 2 + (points[..., 2:] - 1.8) ** 2) / 6)
         if furniture:
@@ -96,7 +84,7 @@ class Room:
         return picture.reshape(height, 2, width, 2, 3).mean((1, 3))
 
     def shaded(self, figure: Figure, index: int, *others: Figure) -> Array:
-        """The room's picture with the shadow of the figure and of `others`, (H, W, 3)."""
+        """The room's picture (H, W, 3) with the shadows of the figure and of `others`."""
         import cv2
 
         if self.shadow == 0:
@@ -105,16 +93,16 @@ class Room:
         width, height = self.camera.size
         return (
             self.picture
-            * cv2.resize(light, (COARSE * light.shape[1], COARSE * light.shape[0]), interpolation=cv2.INTER_LINEAR)[
+            * cv2.resize(light, (SHADOW_CELL * light.shape[1], SHADOW_CELL * light.shape[0]), interpolation=cv2.INTER_LINEAR)[
                 :height, :width, None
             ]
         )
 
     def _shade(self, people: list[Array]) -> Array:
-        """How far the key lamp is hidden, 0 to 1, on the coarse grid; people: joints (17, 3) of each.
+        """Share of the key lamp that is hidden, 0 to 1, on the coarse grid; people: joints (17, 3) of each.
 
-        The lamp is distant: seen from it, floor and wall points and sticks are points and lines of a plane. The edge softens
-        with the distance between stick and shadow.
+        The lamp is distant: projected along its direction, points of floor and wall and sticks become points and lines of a plane. The
+        edge softens with the distance between stick and shadow.
         """
         clear = np.ones(self._seen.shape[:2])
         for joints, (a, b, radius) in itertools.product(people, SHADOW_PARTS):
@@ -128,20 +116,20 @@ class Room:
         return 1 - clear
 
 
-def brightness(scene: Scene, seconds: float, length: float) -> float:
-    """How bright the lamps are, 1 as they are meant, `seconds` after the film's first picture; before it in the empty scene.
+def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
+    """Relative brightness of the lamps `seconds` after the film's first frame; negative in the film of the empty scene.
 
-    length: of the film, seconds, over which `scene.drift` builds up, slow at both ends.
+    length: of the film, seconds, over which `scene.drift` builds up, slowly at both ends.
     """
     share = np.clip(seconds / max(length, 1e-9), 0, 1)
     drift = scene.drift * (0.5 - 0.5 * np.cos(np.pi * share))
     return float((1 + drift) * (1 + scene.flicker * np.sin(2 * np.pi * scene.flicker_hz * seconds)))
 
 
-def exposed(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
-    """What the sensor makes of light (H, W, 3), 0 to 1: slight blur of the lens, display gamma, noise; RGB uint8.
+def expose(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
+    """The sensor's picture, RGB uint8, of light (H, W, 3), 0 to 1: slight blur of the lens and noise.
 
-    noise: standard deviation in grey levels at middle grey; it grows with brightness as photon noise does.
+    noise: standard deviation in grey levels at middle grey; it grows with brightness like photon noise.
     """
     import cv2
 

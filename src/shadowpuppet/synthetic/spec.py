@@ -1,4 +1,4 @@
-"""What a made recording is made of, as data: a body, motions, cameras and a scene, each validated."""
+"""The spec of a synthetic recording, validated: body, motions, cameras and scene."""
 
 from __future__ import annotations
 
@@ -11,65 +11,66 @@ from pydantic import Field, PlainValidator, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.synthetic.furniture import Furniture, Obstacle, Place
+from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.furniture import Coordinate, Furniture, Obstacle
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.viewpoint import STRICT, Name, Ring, Viewpoint
-from shadowpuppet.synthetic.walls import Background
+from shadowpuppet.synthetic.viewpoint import Name, Ring, Viewpoint
+from shadowpuppet.synthetic.walls import WallStyle
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Bystander:
-    """Somebody else in the picture, who is not to be tracked. They are not in the film of the empty scene."""
+    """Another person in the picture, not to be tracked; absent from the film of the empty scene."""
 
     kind: Literal["woman", "man", "child", "random"] = "random"
-    """Who it is; body and clothes are drawn."""
+    """Kind of person; body and clothes are drawn."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of body and clothes."""
     motion: Gesture = Gesture(motion="stand")
-    """What they do, as long as the film is."""
-    ahead: Place = -1.0
-    """How far before the person they stand, metres; negative behind."""
-    left: Place = 0.9
-    """How far to the person's left they stand, metres."""
+    """What they do, for the length of the film."""
+    ahead: Coordinate = -1.0
+    """Distance before the person, metres; negative behind."""
+    left: Coordinate = 0.9
+    """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """How far they are turned to their left, degrees; 0 looks where the person looks."""
+    """Rotation to their left, degrees; 0 looks where the person looks."""
 
     def __post_init__(self) -> None:
-        """Two people need room for two."""
+        """Refuse the person's place."""
         if np.hypot(self.ahead, self.left) < 0.5:
             raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; expected 0.5 m of distance")
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Scene:
-    """Clothes, room, what and who else is there, and picture quality."""
+    """Clothes, room, obstacles, bystanders and picture quality."""
 
     clothing: Annotated[int, Field(ge=0)] = 1
     """Seed of clothes, hair and skin."""
     room: Annotated[int, Field(ge=0)] = 1
     """Seed of wall, floor and lamps."""
     shadow: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """How dark the person's shadow is on floor and wall."""
+    """Darkness of the person's shadow on floor and wall."""
     noise: Annotated[float, Field(ge=0, le=40)] = 2.5
     """Sensor noise: standard deviation in grey levels at middle grey."""
     empty_seconds: Annotated[float, Field(ge=0.2, le=60)] = 4.0
     """Length of the film of the empty scene."""
-    background: Background = "room"
-    """What is behind: a room with some posters, a plain wall and floor, a wall cluttered with shelves, or textured bricks and planks."""
+    background: WallStyle = "room"
+    """Walls and floor: a room with some posters, a plain wall and floor, a wall cluttered with shelves, or textured bricks and planks."""
     camouflage: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """How near the colour of shirt and trousers is to the wall's: 0 as drawn, 1 the same."""
+    """Similarity of shirt and trousers to the wall's colour: 0 as drawn, 1 the same."""
     flicker: Annotated[float, Field(ge=0, le=0.5)] = 0.0
-    """Share by which the lamps' brightness wobbles, in the empty scene, too."""
+    """Relative amplitude of the lamps' flicker, also in the empty scene."""
     flicker_hz: Annotated[float, Field(gt=0, le=120)] = 1.7
-    """How often it wobbles in a second: the beat of mains and pictures that a film shows."""
+    """Frequency of the flicker, Hz: the beat of mains and frame rate in a film."""
     drift: Annotated[float, Field(ge=-0.8, le=1)] = 0.0
-    """By which share the light has grown, or with a minus faded, at the end of the film."""
+    """Relative change of the light by the end of the film; negative: it fades."""
     crf: Annotated[int, Field(ge=0, le=51)] = 18
-    """Compression of the films, H.264's constant rate factor: 0 keeps all but half of the colour's detail, 18 is hardly visible, 35
+    """Compression of the films, H.264's constant rate factor: 0 is lossless but for half of the colour resolution, 18 hardly visible, 35
     coarse, 51 the worst."""
     obstacles: tuple[Obstacle, ...] = ()
-    """Things that stand in the scene and hide what is behind them."""
+    """Things in the scene that hide what is behind them."""
     bystanders: tuple[Bystander, ...] = ()
     """Other people."""
 
@@ -83,22 +84,22 @@ def _seed(value: Any) -> int | tuple[int, ...]:
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Spec:
-    """A recording to be made: bodies x motions x cameras x scenes are chosen independently."""
+    """A recording to be made: body, motion, cameras and scene are chosen independently."""
 
     name: Name = "made"
-    """What it is called in tables."""
+    """Its name in tables."""
     body: Mannequin = Mannequin()
     """The person."""
     motion: Annotated[tuple[Gesture, ...], Field(min_length=1)] = (Gesture(motion="wave_hands"),)
-    """Gestures, one after another."""
+    """Gestures, performed one after another."""
     training: tuple[Gesture, ...] | None = None
-    """With several cameras, gestures of the motion to learn from: left out, the same ones a second time; an empty list, there is none."""
+    """Gestures of the training motion of several cameras; by default those of `motion` again; an empty list: no training motion."""
     begin: Annotated[float, Field(ge=0, le=3600)] = 0.0
-    """Seconds of the motion, its 0.8 s of standing included, that are over when the film and the training motion begin."""
+    """Seconds of the motion, including its 0.8 s of standing, before the film and the training motion begin."""
     frames: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """Pictures of the film; left out, to the motion's end."""
+    """Frames of the film; by default to the motion's end."""
     training_frames: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """Frames of the training motion; left out, to its end."""
+    """Frames of the training motion; by default to its end."""
     cameras: Annotated[tuple[Viewpoint, ...], Field(min_length=1)] = (Viewpoint(),)
     """One camera, or several."""
     ring: Ring | None = None
@@ -106,18 +107,18 @@ class Spec:
     scene: Scene = Scene()
     """Clothes, room and noise."""
     rate: Annotated[float, Field(ge=1, le=240)] = 15.0
-    """Pictures a second."""
+    """Frames per second."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """How far the person stands turned to their left, degrees; in the references they do not."""
+    """Rotation of the person to their left, degrees; not in the reference pictures."""
     still: Annotated[float, Field(ge=0, le=3)] = 1.0
-    """Factor on sway and tremor: 0 is a robot."""
+    """Factor on sway and tremor; 0: none."""
     tells: Literal["height and distance", "height", "distance", "nothing"] = "height and distance"
     """What recording.toml says of the subject."""
     seed: Annotated[int | tuple[int, ...], PlainValidator(_seed)] = 0
-    """Seed of the motion's chance and of the noise, where no generator is given: a whole number, or several."""
+    """Seed of motion and noise if no generator is given: a whole number, or several."""
 
     def __post_init__(self) -> None:
-        """Camera names must differ, and no camera may stand in a thing or in somebody."""
+        """Refuse equal camera names, and cameras inside an obstacle or a person."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")
@@ -138,7 +139,7 @@ class Spec:
 
 
 def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
-    """A `Spec` of plain values, as read from TOML. Raises `SettingsError`: one sentence on the first thing that is wrong."""
+    """A `Spec` from plain values, as read from TOML. Raises `SettingsError` with the first mistake."""
     try:
         return TypeAdapter(Spec).validate_python(dict(values))
     except ValidationError as error:
@@ -147,9 +148,9 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
         if first["type"] == "unexpected_keyword_argument":
             raise SettingsError(f"{source}: {place}: no such setting; possible are {_siblings(first['loc'])}") from None
         if first["type"] == "value_error":
-            told = first["msg"].removeprefix("Value error, ")
+            message = first["msg"].removeprefix("Value error, ")
             where = f"{place}: " if first["loc"] else ""
-            raise SettingsError(f"{source}: {where}{told}") from None
+            raise SettingsError(f"{source}: {where}{message}") from None
         if first["type"] in ("dataclass_type", "tuple_type"):
             wanted = "a table" if first["type"] == "dataclass_type" else "a list"
             raise SettingsError(f"{source}: {place}: found {first['input']!r}, expected {wanted}") from None
@@ -158,7 +159,7 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
 
 
 def spec_values(spec: Spec) -> dict[str, Any]:
-    """Plain values that `spec_from` makes the same spec of, and that TOML can hold: every setting, also where it is the default."""
+    """All settings as plain values for TOML, defaults included; the inverse of `spec_from`."""
     from shadowpuppet.io.files.plain import for_toml, plain
 
     values = for_toml(plain(spec, "spec"))
@@ -167,15 +168,8 @@ def spec_values(spec: Spec) -> dict[str, Any]:
     return values
 
 
-TABLES: dict[str, Any] = {
-    "body": Mannequin,
-    "motion": Gesture,
-    "cameras": Viewpoint,
-    "ring": Ring,
-    "scene": Scene,
-    "obstacles": Obstacle,
-    "bystanders": Bystander,
-}
+TABLES: dict[str, Any] = {"body": Mannequin, "motion": Gesture, "cameras": Viewpoint, "ring": Ring, "scene": Scene, "obstacles": Obstacle,
+                          "bystanders": Bystander}
 """The tables of a spec, by name."""
 
 

@@ -1,4 +1,4 @@
-"""Specs as TOML files, with the seed that made a recording."""
+"""Read and write specs as TOML files."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 
 SPEC_FILE = "spec.toml"
-"""What a made recording was made of; it is there from the beginning."""
-HEAD = "# What this recording was made of; the same again: shadowpuppet synthesize spec.toml -o FOLDER\n"
-UNSEEDED = "# The generator that was given had no seed that could be kept: the seed below gives other chance.\n"
+"""The spec in a recording's folder; written first."""
+SPEC_HEADER = "# What this recording was made of; the same again: shadowpuppet synthesize spec.toml -o FOLDER\n"
+UNSEEDED_HEADER = "# The generator that was given had no seed that could be kept: the seed below gives other chance.\n"
 
 
 def read_spec(path: str | Path) -> Spec:
-    """The spec in a TOML file; files that it names are relative to it. Raises `SettingsError`: one sentence with file and field."""
+    """The spec in a TOML file; files that it names are relative to it. Raises `SettingsError` with file and field."""
     from shadowpuppet.io.calibration.calibration_files import read_toml
 
     values = read_toml(path, SettingsError)
@@ -30,7 +30,7 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def _gestures(values: dict[str, Any]) -> list[dict[str, Any]]:
-    """The tables of gestures in a spec's plain values, the bystanders', too; what is of another type is left to be told later."""
+    """The tables of gestures in a spec's plain values, also those of bystanders; other types are left to the validation."""
     scene = values.get("scene")
     others = scene.get("bystanders") if isinstance(scene, dict) else None
     theirs = [one.get("motion") for one in others if isinstance(one, dict)] if isinstance(others, list) else None
@@ -39,7 +39,7 @@ def _gestures(values: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def spec_text(spec: Spec) -> str:
-    """A spec as TOML that `read_spec` reads back: every setting."""
+    """A spec as TOML, with every setting; the inverse of `read_spec`."""
     return _text(spec_values(spec))
 
 
@@ -51,7 +51,7 @@ def _text(values: dict[str, Any]) -> str:
 
 
 def write_spec(path: Path, spec: Spec, seed: int | tuple[int, ...] | None) -> None:
-    """Write a spec with the seed that it was made with. Raises `ShadowPuppetError` where it cannot be written."""
+    """Write a spec with the seed of its recording. Raises `ShadowPuppetError` if it cannot be written."""
     from shadowpuppet.io.files.text import write_whole
 
     known = spec if seed is None else replace(spec, seed=seed)
@@ -59,11 +59,11 @@ def write_spec(path: Path, spec: Spec, seed: int | tuple[int, ...] | None) -> No
     for gesture in _gestures(values):
         if "file" in gesture:
             gesture["file"] = str(Path(gesture["file"]).resolve())
-    write_whole(path, HEAD + ("" if seed is not None else UNSEEDED) + _text(values))
+    write_whole(path, SPEC_HEADER + ("" if seed is not None else UNSEEDED_HEADER) + _text(values))
 
 
 def seed_of(rng: np.random.Generator) -> int | tuple[int, ...] | None:
-    """The seed of a generator of `numpy.random.default_rng(seed)` that has spawned nothing yet; None where there is none."""
+    """The seed of a generator made by `numpy.random.default_rng(seed)` that has not spawned yet; None if there is none."""
     source = rng.bit_generator.seed_seq
     if not isinstance(source, np.random.SeedSequence) or source.spawn_key or source.n_children_spawned or source.entropy is None:
         return None

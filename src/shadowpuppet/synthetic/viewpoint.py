@@ -1,4 +1,4 @@
-"""Where cameras stand and how they see: one by one, or a ring of them."""
+"""Cameras of a spec: placed one by one, or in a ring."""
 
 from __future__ import annotations
 
@@ -17,24 +17,26 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 FovDeg = Annotated[float, Field(ge=10, le=170)]
 Height = Annotated[float, Field(ge=0.05, le=6)]
+Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # `Viewpoint` itself refuses them, with all its numbers
 Distance = Annotated[float, Field(ge=0.8, le=20)]
-WIDEST = 120.0
-"""Widest horizontal field of view of a lens that is no fisheye, degrees."""
-SLACK = 8
-"""Pixels beyond the border of a picture, unless it is a fisheye's, that the renderer's tiles may look at."""
-MIDDLE = 0.52
-"""Height of a person's middle, fraction of the stature."""
-JITTER = {"azimuth_deg": 7.0, "height": 0.25, "yaw_deg": 3.0, "pitch_deg": 3.0, "roll_deg": 4.0}
-"""How far a ring's cameras stray at most, with a jitter of 1; distance and focal length by `STRAY` of themselves."""
-STRAY = 0.07
+MAX_PINHOLE_FOV = 120.0
+"""Greatest horizontal field of view of a pinhole lens, degrees."""
+BORDER_SLACK = 8
+"""Pixels beyond the border of a picture that the renderer's tiles use (not for a fisheye)."""
+BODY_CENTRE = 0.52
+"""Height of a person's middle over the stature."""
+RING_JITTER = {"azimuth_deg": 7.0, "height": 0.25, "yaw_deg": 3.0, "pitch_deg": 3.0, "roll_deg": 4.0}
+"""Greatest irregularity of a ring's cameras at a jitter of 1, metres and degrees."""
+RING_SCALE_JITTER = 0.07
+"""The same for distance and field of view, relative."""
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Viewpoint:
-    """A camera that looks horizontally, or pitched, at the vertical axis through the person's place."""
+    """A camera directed at the vertical axis through the person's place."""
 
     name: Name = "cam"
-    """Its name: that of its films."""
+    """Name of the camera and of its films."""
     size: tuple[Side, Side] = (320, 240)
     """Width and height of its pictures, pixels."""
     fov_deg: FovDeg = 60.0
@@ -44,28 +46,28 @@ class Viewpoint:
     distance: Distance = 2.0
     """Horizontal distance from the person's place, metres."""
     azimuth_deg: Angle = 0.0
-    """Where around the person it stands, degrees: 0 before them, 90 on their left."""
+    """Direction from the person to the camera, degrees: 0 before the person, 90 on their left."""
     pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
-    """How far it looks down, degrees."""
-    distortion: tuple[float, ...] = ()
-    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]], a fisheye's k1 k2 k3 k4; none for a perfect lens."""
+    """Angle below the horizontal, degrees."""
+    distortion: tuple[Coefficient, ...] = ()
+    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]], or a fisheye's k1 k2 k3 k4; empty for no distortion."""
     yaw_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
-    """How far it looks past the person, to its right, degrees."""
+    """Angle by which it looks past the person to its right, degrees."""
     roll_deg: Angle = 0.0
-    """How far it is turned about its own axis, clockwise as it looks, degrees."""
+    """Clockwise rotation about its optical axis, degrees."""
     fisheye: bool = False
     """Whether the lens is a fisheye (OpenCV's model, equidistant without distortion)."""
 
     def __post_init__(self) -> None:
-        """The numbers of distortion must be a model's, and every pixel must see something."""
+        """Check the number of distortion coefficients, and that every pixel has a ray."""
         allowed = (0, 4) if self.fisheye else (0, 4, 5, 8)
         if len(self.distortion) not in allowed:
             expected = f"{', '.join(map(str, allowed[:-1]))} or {allowed[-1]}"
             raise ValueError(f"distortion: found {len(self.distortion)} numbers, expected {expected}")
         if not np.isfinite(self.distortion).all():
             raise ValueError(f"distortion: found {list(self.distortion)}, expected finite numbers")
-        if self.fov_deg > WIDEST and not self.fisheye:
-            raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {WIDEST:g}, or fisheye = true")
+        if self.fov_deg > MAX_PINHOLE_FOV and not self.fisheye:
+            raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {MAX_PINHOLE_FOV:g}, or fisheye = true")
         corner = self.fov_deg / 2 * np.hypot(*self.size) / self.size[0]
         if self.fisheye and corner > 88:
             most = np.floor(self.fov_deg * 88 / corner)
@@ -74,7 +76,7 @@ class Viewpoint:
             raise ValueError(f"distortion: found {list(self.distortion)}, which bends the picture so far that its border shows nothing")
 
     def camera(self) -> Camera:
-        """The calibrated camera in the world: Z up, floor at 0, the person at the origin facing -Y."""
+        """The calibrated camera; world: Z up, floor at 0, the person at the origin facing -Y."""
         half = np.radians(self.fov_deg) / 2
         focal = self.size[0] / (2 * (half if self.fisheye else np.tan(half)))
         matrix = np.array([[focal, 0, (self.size[0] - 1) / 2], [0, focal, (self.size[1] - 1) / 2], [0, 0, 1]])
@@ -91,43 +93,43 @@ class Viewpoint:
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Ring:
-    """Cameras evenly around the person, all looking at their middle, each a little off as real ones are."""
+    """Cameras evenly around the person, directed at their middle, with the irregularity of real rigs."""
 
     count: Annotated[int, Field(ge=2, le=64)] = 7
-    """How many; they are called cam1, cam2, ..."""
+    """Number of cameras; their names are cam1, cam2, ..."""
     radius: Distance = 3.5
     """Horizontal distance from the person's place, metres."""
     height: Height = 1.6
     """Height over the floor, metres."""
     start_deg: Angle = 0.0
-    """Where around the person the first stands, degrees: 0 before them, 90 on their left; the others follow toward their left."""
+    """Direction from the person to the first camera, degrees: 0 before the person, 90 on their left; the others follow to the left."""
     jitter: Annotated[float, Field(ge=0, le=1)] = 0.3
-    """How irregular place, direction and focal length are: 0 a perfect ring; 1 up to 7 degrees, 25 cm, 7 % of the radius."""
+    """Irregularity of place, direction and focal length: 0 a perfect ring; 1 up to 7 degrees, 25 cm, 7 % of the radius."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the irregularities."""
     size: tuple[Side, Side] = (320, 240)
     """Width and height of the pictures, pixels."""
     fov_deg: FovDeg = 60.0
     """Horizontal field of view, degrees, before distortion."""
-    distortion: tuple[float, ...] = ()
-    """As of a single camera."""
+    distortion: tuple[Coefficient, ...] = ()
+    """As in `Viewpoint`."""
     fisheye: bool = False
-    """As of a single camera."""
+    """As in `Viewpoint`."""
 
     def __post_init__(self) -> None:
-        """Every camera must be possible, whatever the person's height."""
+        """Check that every camera is possible for any stature."""
         for stature in (0.9, 2.2):
             self.views(stature)
 
     def views(self, stature: float) -> tuple[Viewpoint, ...]:
-        """The cameras around a person of a `stature` (m), in turn."""
+        """The cameras around a person of a `stature` (m), in order."""
         rng, views = np.random.default_rng(self.seed), []
         for n in range(self.count):
-            off = {name: self.jitter * most * rng.uniform(-1, 1) for name, most in JITTER.items()}
-            distance = float(np.clip(self.radius * (1 + self.jitter * STRAY * rng.uniform(-1, 1)), 0.8, 20))
-            fov = float(np.clip(self.fov_deg * (1 + self.jitter * STRAY * rng.uniform(-1, 0)), 10, 170))
+            off = {name: self.jitter * most * rng.uniform(-1, 1) for name, most in RING_JITTER.items()}
+            distance = float(np.clip(self.radius * (1 + self.jitter * RING_SCALE_JITTER * rng.uniform(-1, 1)), 0.8, 20))
+            fov = float(np.clip(self.fov_deg * (1 + self.jitter * RING_SCALE_JITTER * rng.uniform(-1, 0)), 10, 170))
             height = float(np.clip(self.height + off["height"], 0.05, 6))
-            down = np.degrees(np.arctan2(height - MIDDLE * stature, distance)) + off["pitch_deg"]
+            down = np.degrees(np.arctan2(height - BODY_CENTRE * stature, distance)) + off["pitch_deg"]
             azimuth = (self.start_deg + 360 * n / self.count + off["azimuth_deg"] + 180) % 360 - 180
             views.append(Viewpoint(name=f"cam{n + 1}", size=self.size, fov_deg=fov, height=height, distance=distance,
                                    azimuth_deg=float(azimuth), pitch_deg=float(np.clip(down, -60, 60)), yaw_deg=off["yaw_deg"],
@@ -136,8 +138,8 @@ class Ring:
 
 
 def _sees_everywhere(camera: Camera) -> bool:
-    """Whether every pixel's ray leads back to the pixel: distortion beyond what its polynomial can do folds the picture."""
-    (width, height), slack = camera.size, 0.5 if camera.fisheye else SLACK
+    """Whether every pixel's ray projects back to the pixel: too strong distortion folds the picture."""
+    (width, height), slack = camera.size, 0.5 if camera.fisheye else BORDER_SLACK
     pixels = np.stack(np.meshgrid(np.linspace(-slack, width - 1 + slack, 17), np.linspace(-slack, height - 1 + slack, 17)), -1)
     rays = camera.rays(pixels)
     if not np.isfinite(rays).all() or np.abs(rays).max() > 60:

@@ -1,4 +1,4 @@
-"""Paint of walls and floors: what stands behind the person, from a bare wall to a full shelf."""
+"""Textures of walls and floors, from a bare wall to full shelves."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from shadowpuppet.geometry import Array
 
-Background = Literal["room", "plain", "cluttered", "textured"]
+WallStyle = Literal["room", "plain", "cluttered", "textured"]
 
 
-def wall(kind: Background, x: Array, z: Array, rng: np.random.Generator) -> Array:
+def paint_wall(kind: WallStyle, x: Array, z: Array, rng: np.random.Generator) -> Array:
     """Colours (..., 3), RGB, of walls at places `x` along them and heights `z`, metres."""
     if kind == "plain":
         return _plain(x, z, rng)
@@ -24,33 +24,33 @@ def wall(kind: Background, x: Array, z: Array, rng: np.random.Generator) -> Arra
     return paint
 
 
-def floor(kind: Background, x: Array, y: Array, rng: np.random.Generator) -> Array:
+def paint_floor(kind: WallStyle, x: Array, y: Array, rng: np.random.Generator) -> Array:
     """Colours (..., 3), RGB, of the floor at places (x, y), metres."""
     colour = np.array(colorsys.hsv_to_rgb(rng.uniform(0.02, 0.15), rng.uniform(0.1, 0.5), rng.uniform(0.3, 0.65)))
     if kind == "plain":
-        return colour * (1 + 0.03 * cloud(2 * x, 2 * y, rng))[..., None]
+        return colour * (1 + 0.03 * fractal_noise(2 * x, 2 * y, rng))[..., None]
     if kind == "textured":
         return _planks(colour, x, y, rng)
     size = rng.uniform(0.12, 0.4)
     checks = np.sign(np.sin(np.pi * x / size) * np.sin(np.pi * y / (size * rng.choice([1, 4]))))
-    return colour * (1 + rng.uniform(0.03, 0.10) * checks + 0.06 * cloud(2 * x, 2 * y, rng))[..., None]
+    return colour * (1 + rng.uniform(0.03, 0.10) * checks + 0.06 * fractal_noise(2 * x, 2 * y, rng))[..., None]
 
 
 def wall_colour(rng: np.random.Generator) -> Array:
-    """The colour (3,) that `wall` draws first."""
+    """The wall's colour (3,), which `paint_wall` draws first."""
     return np.array(colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.05, 0.4), rng.uniform(0.45, 0.85)))
 
 
 def _plain(x: Array, z: Array, rng: np.random.Generator) -> Array:
     colour = wall_colour(rng)
-    paint = colour * (1 + 0.03 * cloud(0.5 * x, 0.5 * z, rng))[..., None]
+    paint = colour * (1 + 0.03 * fractal_noise(0.5 * x, 0.5 * z, rng))[..., None]
     paint[z < 0.09] = 0.75 * colour + 0.1
     return paint
 
 
 def _posters(x: Array, z: Array, rng: np.random.Generator) -> Array:
     colour = wall_colour(rng)
-    paint = colour * (1 + rng.uniform(0.04, 0.22) * cloud(x, z, rng))[..., None]
+    paint = colour * (1 + rng.uniform(0.04, 0.22) * fractal_noise(x, z, rng))[..., None]
     for _ in range(rng.integers(3, 9)):
         cx, cz, w, h = rng.uniform(-2.2, 2.2), rng.uniform(0.4, 2.6), rng.uniform(0.1, 0.45), rng.uniform(0.1, 0.35)
         inside = (np.abs(x - cx) < w) & (np.abs(z - cz) < h)
@@ -62,7 +62,7 @@ def _posters(x: Array, z: Array, rng: np.random.Generator) -> Array:
 
 
 def _shelves(paint: Array, x: Array, z: Array, rng: np.random.Generator) -> None:
-    """Book shelves and boxes over the paint of the walls, some two thirds of them."""
+    """Paint book shelves over the walls; some places stay empty."""
     for left, own in zip(np.arange(-27, 47, 1.1), rng.spawn(68)):
         wide, high = own.uniform(0.8, 1.05), own.uniform(1.3, 2.3)
         unit = (x > left) & (x < left + wide) & (z < high)
@@ -87,7 +87,7 @@ def _bricks(x: Array, z: Array, rng: np.random.Generator) -> Array:
     along = x / wide + 0.5 * (row % 2)
     tone = rng.uniform(-1, 1, (64, 64))[np.floor(along).astype(int) % 64, row.astype(int) % 64]
     joint = (np.mod(along, 1) * wide < 0.012) | (np.mod(z, high) < 0.012)
-    paint = colour * (1 + 0.16 * tone + 0.10 * cloud(3 * x, 3 * z, rng))[..., None]
+    paint = colour * (1 + 0.16 * tone + 0.10 * fractal_noise(3 * x, 3 * z, rng))[..., None]
     paint[joint] = (0.4 * colour + 0.45)[None]
     return paint
 
@@ -97,14 +97,14 @@ def _planks(colour: Array, x: Array, y: Array, rng: np.random.Generator) -> Arra
     row = np.floor(x / wide)
     along = y / long + 0.37 * row
     tone = rng.uniform(-1, 1, (64, 64))[np.floor(along).astype(int) % 64, row.astype(int) % 64]
-    grain = np.sin(90 * x + 6 * cloud(2 * x, 0.7 * y, rng))
+    grain = np.sin(90 * x + 6 * fractal_noise(2 * x, 0.7 * y, rng))
     seam = (np.mod(x, wide) < 0.006) | (np.mod(along, 1) * long < 0.006)
     paint = colour * (1 + 0.20 * tone + 0.08 * grain)[..., None]
     paint[seam] *= 0.5
     return paint
 
 
-def cloud(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Array:
+def fractal_noise(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Array:
     """Fractal value noise over the plane, about -1 to 1."""
     total = np.zeros_like(x)
     for octave in range(octaves):
@@ -114,7 +114,5 @@ def cloud(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Arr
         fu, fv = u - i, v - j
         fu, fv = fu * fu * (3 - 2 * fu), fv * fv * (3 - 2 * fv)
         corner = [lattice[(i + a) % 64, (j + b) % 64] for a in (0, 1) for b in (0, 1)]
-        total += (
-            (corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu
-        ) * 0.55**octave
+        total += ((corner[0] * (1 - fv) + corner[1] * fv) * (1 - fu) + (corner[2] * (1 - fv) + corner[3] * fv) * fu) * 0.55**octave
     return total

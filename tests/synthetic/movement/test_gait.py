@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, demo_spec, proving_ground, spec_from
+from shadowpuppet.synthetic.movement.actions import ACTIONS
 from shadowpuppet.synthetic.movement.gait import Walk
 from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
-from shadowpuppet.synthetic.movement.gait_cycle import JOGGING, WALKING, Cycle, Sole, stride_of
+from shadowpuppet.synthetic.movement.gait_cycle import JOGGING, WALKING, GaitCycle, Sole, stride_length
 from shadowpuppet.synthetic.movement.gestures import LEVEL, posture
 from shadowpuppet.synthetic.movement.paths import Path
-from shadowpuppet.synthetic.movement.whole_body import ACTS
-from shadowpuppet.synthetic.performance import SOFT
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, SIDES, figure, lesser, pose
+from shadowpuppet.synthetic.movement.sequence import SOFT_LIMIT
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, SIDES, pose, pose_over, soft_minimum
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, GROWTH, JOINTS
 from shadowpuppet.synthetic.recording import perform
 
 MAN = Mannequin()
-WHOLE = sorted([*ACTS, "walk", "jog"])
+WHOLE = sorted([*ACTIONS, "walk", "jog"])
 
 
 def at(figure, name):
@@ -63,7 +63,7 @@ def steady(jogging=False, speed=None, seconds=24.0, body=MAN, path="line", size=
     """A gait far from its start and end: (walk, figure, phase of the left leg)."""
     walk = Walk(body, seconds, np.random.default_rng(seed), jogging, speed, path, size)
     t = np.arange(3.0, seconds - 3.0, 1 / 100)
-    return walk, figure(body, *walk.at(t), SOFT), np.interp(t, walk.ticks, walk.phase)
+    return walk, pose_over(body, *walk.at(t), SOFT_LIMIT), np.interp(t, walk.ticks, walk.phase)
 
 
 def by_phase(values, phase, places):
@@ -281,7 +281,7 @@ def test_the_cycle_fits_body_and_speed():
         hip = body.rest()["pelvis"][2]
         for share in (0.8, 1.0, 1.25):
             speed = share * (2.6 if jogging else 1.3) * np.sqrt(hip / 0.93)
-            cycle = Cycle(body, JOGGING if jogging else WALKING, speed, stride_of(speed, hip, jogging))
+            cycle = GaitCycle(body, JOGGING if jogging else WALKING, speed, stride_length(speed, hip, jogging))
             phase = np.linspace(0, 0.999, 500)
             gone = cycle.progress(phase)
             assert (gone[phase <= cycle.gait.carries] == 0).all()
@@ -395,7 +395,7 @@ def test_heading_can_be_turned_at_the_beginning():
 
 
 def test_acts_do_what_they_are_called():
-    still = {name: go(name, still=0.0)[1] for name in ACTS}
+    still = {name: go(name, still=0.0)[1] for name in ACTIONS}
     knee = {name: bend(found, "left_hip", "left_knee", "left_ankle").max() for name, found in still.items()}
     assert at(still["lift"], "left_hand")[:, 2].min() < 0.3
     assert at(still["lift"], "right_hand")[:, 1].min() < -0.25
@@ -427,11 +427,11 @@ def test_impossible_motions_are_told(values, words):
 
 @given(a=st.floats(-2, 2), b=st.floats(-2, 2))
 def test_the_lesser_of_two_is_rounded_off_only_where_they_meet(a, b):
-    found = float(lesser(np.array([a]), np.array([b]), 0.1)[0])
+    found = float(soft_minimum(np.array([a]), np.array([b]), 0.1)[0])
     assert min(a, b) - 0.1 / 4 - 1e-12 <= found <= min(a, b)
     if abs(a - b) > 0.1:
         assert found == min(a, b)
-    assert float(lesser(np.array([a]), np.array([np.inf]), 0.1)[0]) == a
+    assert float(soft_minimum(np.array([a]), np.array([np.inf]), 0.1)[0]) == a
 
 
 # People
@@ -501,8 +501,8 @@ def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
 
     from shadowpuppet.synthetic import Viewpoint
     from shadowpuppet.synthetic.person.clothes import Clothes
-    from shadowpuppet.synthetic.person.parts import dressed
-    from shadowpuppet.synthetic.renderer import Renderer
+    from shadowpuppet.synthetic.person.dressed import dressed
+    from shadowpuppet.synthetic.person_renderer import PersonRenderer
 
     bare = Clothes(looseness=0.0)
     for stature, build, wanted in ((1.629, 0.0, 25.6), (1.756, 1.0, 27.8)):
@@ -515,7 +515,7 @@ def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
         axis = [np.arange(low + step / 2, high, step) for low, high in ((-1.0, 1.0), (-0.3, 0.25), (0.0, stature + 0.03))]
         points = np.stack(np.meshgrid(*axis, indexing="ij"), -1).reshape(-1, 3)
         points = points[(np.abs(points[:, 0]) < 0.3) | (points[:, 2] > 0.7 * stature)] + rng.uniform(-0.5, 0.5, 3) * step
-        joints = Renderer(Viewpoint(size=(16, 16)).camera(), surface, bare, LIGHTS)._joins(shape, 0)
+        joints = PersonRenderer(Viewpoint(size=(16, 16)).camera(), surface, bare, LIGHTS)._joins(shape, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             inside = naive_distance(points, surface, axes, origin, joints) < 0
         assert inside.sum() * step**3 * 1000 / stature**2 == pytest.approx(wanted, rel=0.1)

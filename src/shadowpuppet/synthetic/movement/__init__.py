@@ -1,1 +1,1 @@
-"""How made people move: gestures, gait, paths, motion capture."""
+"""Motion of synthetic people: gestures, whole-body actions, gait along paths, motion capture."""

@@ -1,7 +1,7 @@
 """Published joint angles over the gait cycle, as data.
 
-A cycle runs from a foot's contact with the floor (0) to its next (1). All curves are means over people, degrees, read every 4 % of
-the cycle; between them runs a periodic cubic.
+A cycle runs from a foot's contact with the floor (0) to its next (1). Curves are means over people, degrees, every 4 % of the cycle,
+interpolated by periodic cubics.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 STANDING_TILT = 10.0
-"""Forward tilt of the pelvis in quiet standing, degrees, in `WALK`'s way of measuring: here a standing pelvis is upright."""
+"""Forward tilt of the pelvis in quiet standing as `WALK` measures it, degrees; here a standing pelvis is upright."""
 KNEE_ZERO = 3.0
-"""Added to `WALK`'s knee, degrees: nobody is overstretched; zeros of marker sets differ by more than that."""
+"""Offset of `WALK`'s knee against overstretching, degrees; zeros of marker sets differ by more than that."""
 
 WALK = {
     "tilt": (11.1, 11.1, 10.8, 10.3, 10.0, 10.1, 10.2, 10.1, 10.1, 10.3, 10.6, 10.9, 10.9, 10.8, 10.6, 10.1, 9.6, 9.5, 9.6, 9.7,
@@ -49,7 +49,7 @@ processed in R. Fukuchi's repository BMC-RIC-running-biomechanics. Zeros are tho
 
 
 def curve(values: tuple[float, ...], phase: Array) -> Array:
-    """A curve of `WALK` or `RUN`, degrees, at phases (...) of the cycle; whole numbers are contacts."""
+    """A curve of `WALK` or `RUN`, degrees, at phases (...) of the cycle; integers are contacts."""
     return _spline(values)(np.asarray(phase) % 1.0)
 
 

@@ -1,8 +1,8 @@
-"""One cycle of walking or jogging: what published joint angles say of a foot and the pelvis, fitted to a body and a speed.
+"""One cycle of walking or jogging: published joint angles fitted to a body and a speed.
 
-The angles alone would let feet slide and sink a little. So the cycle is taken apart into what must hold on any path (a foot
-stands still from contact to toe-off, rolling over heel and ball) and what the angles say beyond: how the foot swings and how the
-pelvis rises and sinks. `gait.py` puts it together again over footprints.
+The angles alone would let the feet slide and sink a little. So the cycle is split into a constraint (a foot stands still from contact to
+toe-off, rolling over heel and ball) and what remains of the angles: the swing of the foot and the rise and fall of the pelvis. `gait.py`
+combines them over footprints.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GRAVITY = 9.81
-POINTS = 200
-"""Phases at which a cycle is computed."""
-FLAT = np.radians(5.0)
-"""Pitch of the foot, rad, below which it lies almost flat while it carries."""
+CYCLE_SAMPLES = 200
+"""Number of phases at which a cycle is computed."""
+FLAT_PITCH = np.radians(5.0)
+"""Pitch of a loaded foot, rad, below which it lies almost flat."""
 
 
 class Sole(NamedTuple):
-    """The foot in its plane, metres: forward from below the ankle, and up."""
+    """The foot in its sagittal plane, metres."""
 
     heel: float
-    """How far behind the ankle it rolls off at the back."""
+    """Distance of the heel's roll-off behind the ankle."""
     ball: float
-    """How far before the ankle the ball lies."""
+    """Distance of the ball before the ankle."""
     tip: float
-    """How far before the ankle the toes end."""
+    """Distance of the tips of the toes before the ankle."""
     ankle: float
-    """The ankle's height over the floor."""
+    """Height of the ankle over the floor."""
 
     @classmethod
     def of(cls, body: Mannequin) -> Sole:
@@ -42,25 +42,25 @@ class Sole(NamedTuple):
         return cls(0.14 * long, 0.48 * long, 0.72 * long, body.length("ankle"))
 
     def rolled(self, pitch: Array) -> tuple[Array, Array]:
-        """The ankle of a foot that stands with `pitch` (rad, toes up), forward and up from the point below it when flat.
+        """Place of the ankle, forward and up from the point below it when flat, of a foot with `pitch` (rad, toes up).
 
-        It rolls over the heel, or over the ball, and from some 20 degrees on over the tips of the toes, too.
+        The foot rolls over the heel or the ball, and from some 20 degrees on also over the tips of the toes.
         """
         c, s = np.cos(pitch), np.sin(pitch)
-        late = smooth((-pitch - np.radians(20)) / np.radians(60))
+        late = smoothstep((-pitch - np.radians(20)) / np.radians(60))
         lever = np.where(pitch > 0, -self.heel, self.ball + late * (self.tip - self.ball))
         return lever - lever * c - self.ankle * s, -lever * s + self.ankle * c
 
 
 class Gait(NamedTuple):
-    """A way to go."""
+    """A gait as published joint angles over the cycle."""
 
     carries: float
-    """Share of the cycle that a foot stands."""
+    """Share of the cycle in which a foot stands."""
     clears: float
-    """Least height of the ball of a swinging foot, in its middle, in leg lengths; it leaves and meets the floor at a slant."""
+    """Least height of the ball of the foot in mid-swing, leg lengths."""
     bow: float
-    """How far the pelvis is tilted forward against standing, degrees."""
+    """Forward tilt of the pelvis against standing, degrees."""
     thigh: Callable[[Array], Array]
     """Angle of the thigh before the vertical at a phase, degrees."""
     knee: Callable[[Array], Array]
@@ -68,9 +68,9 @@ class Gait(NamedTuple):
     ankle: Callable[[Array], Array]
     """Dorsiflexion, degrees."""
     obliquity: Callable[[Array], Array]
-    """How far the pelvis is raised on the side of the leg, degrees."""
+    """Rise of the pelvis on the side of the leg, degrees."""
     rotation: Callable[[Array], Array]
-    """How far it is turned forward on that side, degrees."""
+    """Forward rotation of the pelvis on that side, degrees."""
 
 
 WALKING = Gait(
@@ -97,19 +97,19 @@ JOGGING = Gait(
 assert STANDING_TILT == 10.0  # what WALKING.bow is counted from: 10.3 on average
 
 
-def stride_of(speed: float, leg: float, jogging: bool) -> float:
+def stride_length(speed: float, leg: float, jogging: bool) -> float:
     """Length (m) of a stride at `speed` (m/s) of a person whose hips are `leg` (m) high.
 
-    Walking: it grows with the root of the speed (Inman 1981), and is 1.2 hip heights at one hip height a second: so long that
-    the angles of `WALK` need no widening at the speed of those who walked; other sizes go alike at equal Froude number. Jogging:
-    2.3 hip heights times the Froude number to the 0.3 (Alexander 1989).
+    Walking: it grows with the root of the speed (Inman 1981) and is 1.2 hip heights at one hip height per second, so that the angles of
+    `WALK` fit at the speed at which they were measured; bodies of other sizes move alike at equal Froude number. Jogging: 2.3 hip
+    heights times the Froude number to the power of 0.3 (Alexander 1989).
     """
     if jogging:
         return 2.3 * leg * (speed**2 / (GRAVITY * leg)) ** 0.3
     return 1.2 * leg * (speed / np.sqrt(0.9 * leg)) ** 0.5
 
 
-class Cycle:
+class GaitCycle:
     """A gait of a body at a speed (m/s)."""
 
     def __init__(self, body: Mannequin, gait: Gait, speed: float, stride: float) -> None:
@@ -118,14 +118,14 @@ class Cycle:
         self.sole = Sole.of(body)
         self.leg = body.length("thigh") + body.length("shank")
         self.amplitude = self._amplitude()
-        phase = np.arange(POINTS) / POINTS
+        phase = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
         thigh, shank, pitch = self._angles(phase, self.amplitude)
         base, drop = self._foot(phase, thigh, shank, pitch)
         carried = phase <= gait.carries
         self.lead = float(base[carried].mean())
-        """Where a foot stands before the pelvis at its contact, metres."""
+        """Distance of a foot before the pelvis at contact, metres."""
         self.middle = self.lead / stride
-        """Phase at which it is below the pelvis."""
+        """Phase at which the foot is below the pelvis."""
         self.height = _harmonics(phase, drop + self.sole.rolled(pitch)[1], np.where(phase < 0.8 * gait.carries, 1.0, 0.02) * carried)
         self._pitch = _periodic(pitch + self._more_pitch(phase, pitch))
         swing = np.linspace(gait.carries, 1, 60)
@@ -136,25 +136,25 @@ class Cycle:
         return self._pitch(phase % 1)
 
     def progress(self, phase: Array) -> Array:
-        """How much of the way to the next footprint is behind the foot, 0 to 1; 0 while it carries."""
+        """Progress of the foot to its next footprint, 0 to 1; 0 in stance."""
         return np.where(phase % 1 > self.gait.carries, self._progress(np.maximum(phase % 1, self.gait.carries)), 0.0)
 
     def lift(self, phase: Array) -> Array:
-        """How far the foot is lifted beyond what its pitch asks for, metres."""
+        """Lift of the foot beyond that of its pitch, metres."""
         return np.where(phase % 1 > self.gait.carries, self._lift(np.maximum(phase % 1, self.gait.carries)), 0.0)
 
     def _angles(self, phase: Array, amplitude: float) -> tuple[Array, Array, Array]:
-        """Thigh and shank before the vertical, and the foot's pitch, rad: swings `amplitude` times as wide as published."""
-        whole = np.arange(POINTS) / POINTS
+        """Thigh and shank before the vertical and the foot's pitch, rad, swinging `amplitude` times as wide as published."""
+        whole = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
         mean, more = self.gait.thigh(whole).mean(), np.sqrt(amplitude)
         least = self.gait.knee(whole).min()
         thigh = np.radians(mean + amplitude * (self.gait.thigh(phase) - mean))
         shank = thigh - np.radians(least + more * (self.gait.knee(phase) - least))
         pitch = shank + np.radians(more * self.gait.ankle(phase))
-        return thigh, shank, pitch * np.abs(pitch) / (np.abs(pitch) + FLAT)
+        return thigh, shank, pitch * np.abs(pitch) / (np.abs(pitch) + FLAT_PITCH)
 
     def _foot(self, phase: Array, thigh: Array, shank: Array, pitch: Array) -> tuple[Array, Array]:
-        """Where the flat foot's ankle would lie along the way, and how far the ankle is below the pelvis, metres."""
+        """Place of the flat foot's ankle along the path, and depth of the ankle below the pelvis, metres."""
         long, short, half = self.body.length("thigh"), self.body.length("shank"), self.body.rest()["left_hip"][0]
         turned, raised = np.radians(self.gait.rotation(phase)), np.radians(self.gait.obliquity(phase))
         ahead = long * np.sin(thigh) + short * np.sin(shank) + half * np.sin(turned)
@@ -162,7 +162,7 @@ class Cycle:
         return self.stride * phase + ahead - self.sole.rolled(pitch)[0], drop
 
     def _amplitude(self) -> float:
-        """How much wider than published the leg swings so that at this speed a carrying foot stays where it is."""
+        """Factor on the leg's swing at which a foot in stance stays in place at this speed."""
         from scipy.optimize import brentq
 
         phase = np.linspace(0.02, self.gait.carries - 0.02, 80)
@@ -176,9 +176,9 @@ class Cycle:
         return float(brentq(slope, low, high, xtol=1e-4))  # pyright: ignore[reportArgumentType]
 
     def _more_pitch(self, phase: Array, pitch: Array) -> Array:
-        """By how much more the heel rises late in stance so that the knee bends as published over a foot that stays: rad.
+        """Additional rise of the heel late in stance, rad, with which the knee bends as published over a foot that does not slip.
 
-        Over a foot that does not slip at all, small errors of the published angles would stretch or bend the knee by far more.
+        Without it, small errors of the published angles would stretch or bend the knee far more.
         """
         from scipy.ndimage import gaussian_filter1d
 
@@ -194,12 +194,12 @@ class Cycle:
         late = (phase > 0.55 * self.gait.carries) & (phase <= self.gait.carries)
         more = np.where(late, tries[off.argmin(1)], 0.0)
         last = int(np.flatnonzero(late)[-1])
-        after = np.arange(last + 1, POINTS)
-        more[after] = more[last] * (1 - smooth((phase[after] - phase[last]) / 0.25))
-        return -gaussian_filter1d(more, 0.02 * POINTS, mode="wrap")
+        after = np.arange(last + 1, CYCLE_SAMPLES)
+        more[after] = more[last] * (1 - smoothstep((phase[after] - phase[last]) / 0.25))
+        return -gaussian_filter1d(more, 0.02 * CYCLE_SAMPLES, mode="wrap")
 
     def _swing(self, phase: Array) -> tuple[Callable, Callable]:
-        """`progress` and `lift` between toe-off and contact: the published way, less what would jerk at its ends."""
+        """`progress` and `lift` from toe-off to contact: as published, without jerks at the ends."""
         from scipy.interpolate import CubicSpline
 
         thigh, shank, pitch = self._angles(phase, self.amplitude)
@@ -213,14 +213,14 @@ class Cycle:
         return CubicSpline(phase, progress, bc_type="clamped"), CubicSpline(phase, lift)
 
 
-def smooth(x: Array) -> Array:
-    """From 0 to 1 as x goes from 0 to 1, with no jump in speed or acceleration (a quintic)."""
+def smoothstep(x: Array) -> Array:
+    """From 0 to 1 as x goes from 0 to 1, with continuous speed and acceleration (a quintic)."""
     x = np.clip(x, 0, 1)
     return x**3 * (10 - 15 * x + 6 * x * x)
 
 
 def _ends(x: Array, y: Array, wanted: tuple[float, float] = (0, 0)) -> Array:
-    """What to take off `y` (n,) at `x` (n,) so that it has `wanted` values and no slopes at its ends: a cubic."""
+    """The cubic to subtract from `y` (n,) at `x` (n,) for `wanted` values and zero slopes at the ends."""
     from scipy.interpolate import CubicHermiteSpline
 
     return CubicHermiteSpline(x[[0, -1]], y[[0, -1]] - wanted, np.gradient(y, x)[[0, -1]])(x)
@@ -234,7 +234,7 @@ def _periodic(values: Array) -> Callable:
 
 
 def _harmonics(phase: Array, wanted: Array, weight: Array) -> Callable[[Array], Array]:
-    """What both legs, half a cycle apart, want on average, by `weight`: the first two harmonics of a step."""
+    """Weighted fit of `wanted` for both legs, half a cycle apart: mean and first two harmonics of a step."""
 
     def waves(p: Array) -> Array:
         return np.stack([np.ones_like(p), *(f(4 * np.pi * k * p) for k in (1, 2) for f in (np.cos, np.sin))], -1)

@@ -1,7 +1,7 @@
-"""Motions as data: key postures over time, joined smoothly, with what no person can suppress on top.
+"""Gestures of arms and trunk: key postures over time, interpolated smoothly, plus involuntary motion.
 
-A gesture is a function of its length (s) and a generator that returns key postures `(time, {channel: value})`; channels it
-does not name rest. All time is continuous: the same spec at another frame rate is the same motion.
+A gesture is a function of its length (s) and a generator that returns key postures `(time, {channel: value})`; channels it does not name
+stay as in standing. Time is continuous: the same spec at another frame rate is the same motion.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement.sway import band_noise, involuntary, plain
+from shadowpuppet.synthetic.movement.involuntary import band_noise, involuntary_motion, without_side
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS, Mannequin
 
 Posture = dict[str, float]
 Keys = list[tuple[float, Posture]]
 
-LEAD, TAIL = 0.8, 0.8
+LEAD_SECONDS, TAIL_SECONDS = 0.8, 0.8
 """Seconds of standing before the first gesture and for lowering the arms after the last."""
 
 
@@ -71,15 +71,13 @@ def wave_hands(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def _swings(seconds: float, rng: np.random.Generator, ends: Sequence[Posture], between: Posture, period: float) -> Keys:
-    """From one end to the other and back through `between`, as often as the time allows."""
+    """Swings from end to end through `between`, as often as the time allows."""
     keys = [(0.8, between)]
     count = max(1, round((seconds - 1.2) / period)) * len(ends)
     each = (seconds - 1.2) / count
     for n in range(count):
         vary = rng.uniform(0.85, 1.1)
-        end = {
-            name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()
-        }
+        end = {name: between.get(name, 0.0) + vary * (value - between.get(name, 0.0)) for name, value in ends[n % len(ends)].items()}
         keys.append((0.8 + (n + rng.uniform(0.45, 0.6)) * each, between | end))
     return [*keys, (seconds - 0.3, between)]
 
@@ -102,17 +100,11 @@ def twist(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def reach(seconds: float, rng: np.random.Generator) -> Keys:
-    """The left hand toward the camera, then the right, then both; fewer where there is no time (some 2 s each)."""
+    """The left hand toward the camera, then the right, then both; fewer if there is no time (some 2 s each)."""
     arms = (left, right, both)[-int(np.clip(seconds / 1.9, 1, 3)) :]
     each, keys = seconds / len(arms), []
     for n, chosen in enumerate(arms):
-        aim = chosen(
-            front=rng.uniform(74, 90),
-            side=rng.uniform(-4, 14),
-            elbow=rng.uniform(4, 22),
-            supination=rng.uniform(0, 40),
-            curl=15,
-        )
+        aim = chosen(front=rng.uniform(74, 90), side=rng.uniform(-4, 14), elbow=rng.uniform(4, 22), supination=rng.uniform(0, 40), curl=15)
         turn = trunk(spine_twist={left: -8, right: 8, both: 0}[chosen], spine_bow=3)
         keys += [(each * (n + 0.44), aim | turn), (each * (n + 0.62), {**aim, **turn}), (each * (n + 0.98), {})]
     return keys
@@ -125,40 +117,26 @@ def forearms_up(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def overhead(seconds: float, rng: np.random.Generator) -> Keys:
-    """Arms raised over the sides above the head and lowered again."""
+    """Arms raised sideways above the head and lowered again."""
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
-LIMITS = {
-    "spine_bow": (-5, 24),
-    "spine_side": (-17, 17),
-    "spine_twist": (-26, 26),
-    "pelvis_bow": (-2, 12),
-    "pelvis_twist": (-10, 10),
-    "head_nod": (-15, 22),
-    "head_tilt": (-10, 10),
-    "head_turn": (-35, 35),
-    "side": (2, 130),
-    "front": (-18, 100),
-    "roll": (-25, 75),
-    "elbow": (6, 125),
-    "supination": (-30, 70),
-    "wrist_flex": (-30, 35),
-    "wrist_side": (-12, 15),
-    "curl": (0, 40),
-}
+RANDOM_LIMITS = {"spine_bow": (-5, 24), "spine_side": (-17, 17), "spine_twist": (-26, 26), "pelvis_bow": (-2, 12),
+                 "pelvis_twist": (-10, 10), "head_nod": (-15, 22), "head_tilt": (-10, 10), "head_turn": (-35, 35), "side": (2, 130),
+                 "front": (-18, 100), "roll": (-25, 75), "elbow": (6, 125), "supination": (-30, 70), "wrist_flex": (-30, 35),
+                 "wrist_side": (-12, 15), "curl": (0, 40)}
 """Ranges of `random` motion, degrees: inside what healthy adults reach (Boone & Azen 1979)."""
 
 
 def random(seconds: float, rng: np.random.Generator) -> Keys:
-    """Smooth random motion of the upper body within `LIMITS`, below about 0.5 Hz, with pauses."""
+    """Smooth random motion of the upper body within `RANDOM_LIMITS`, below about 0.5 Hz, with pauses."""
     step = 0.16
     t = np.arange(0.7, max(seconds - 0.3, 0.9), step)
     pace = np.clip(1.4 + 1.6 * band_noise(t, 0.25, rng), 0.0, 1.6)
     own = np.cumsum(pace) * step
     table = np.zeros((len(t), len(CHANNELS)))
     for column, channel in enumerate(CHANNELS):
-        low, high = np.radians(LIMITS.get(plain(channel), (0, 0)))
+        low, high = np.radians(RANDOM_LIMITS.get(without_side(channel), (0, 0)))
         table[:, column] = low + (high - low) * (0.5 + 0.5 * np.tanh(0.9 * band_noise(own, 0.3, rng)))
     for side in ("left", "right"):
         swing = [CHANNELS.index(f"{side}_side"), CHANNELS.index(f"{side}_front")]
@@ -169,9 +147,9 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
 
 
 def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
-    """Key postures (n, `CHANNELS`) with the arms moved outward and straightened where forearm or hand would enter trunk or head.
+    """Key postures (n, `CHANNELS`) with the arms moved outward and straightened if forearm or hand would enter trunk or head.
 
-    Judged on the mean body: trunk and head as round sticks; shared with the neighbouring keys, so that the motion stays smooth.
+    Tested on the mean body with trunk and head as round sticks; the change is spread over neighbouring keys to keep the motion smooth.
     """
     table, body = table.copy(), Mannequin()
     for _ in range(rounds):
@@ -181,9 +159,7 @@ def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
         for side in ("left", "right"):
             elbow, wrist, hand = (joint[f"{side}_{name}"] for name in ("elbow", "wrist", "hand"))
             points = [elbow + 0.5 * (wrist - elbow), wrist, wrist + 4.0 * (hand - wrist)]
-            inside = [
-                np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points
-            ]
+            inside = [np.maximum(0.21 - _off(p, joint["pelvis"], joint["neck"]), 0.15 - _off(p, joint["head"], crown)) for p in points]
             excess = np.maximum(np.max(inside, 0), 0)
             push = np.maximum(excess, np.convolve(np.pad(excess, 2, "edge"), [0.1, 0.25, 0.3, 0.25, 0.1], "valid"))
             table[:, CHANNELS.index(f"{side}_side")] += 1.0 * push
@@ -193,37 +169,37 @@ def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
 
 
 def _off(points: Array, start: Array, end: Array) -> Array:
-    """Distances (n,) of points (n, 3) from the sticks between `start` and `end`, (n, 3) each."""
+    """Distances (n,) of points (n, 3) from the line segments between `start` and `end`, (n, 3) each."""
     along = end - start
     t = np.clip(((points - start) * along).sum(1) / (along**2).sum(1), 0, 1)
     return np.linalg.norm(points - start - t[:, None] * along, axis=1)
 
 
-MOTIONS: dict[str, Callable[[float, np.random.Generator], Keys]] = {
+GESTURES: dict[str, Callable[[float, np.random.Generator], Keys]] = {
     f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)
 }
 """All gestures by name."""
 
-def compose(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
+def gesture_postures(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
     """Postures (T, `CHANNELS`) at times `t` (s) of gestures `(name, seconds)` one after another.
 
-    Key postures are joined by shape-preserving cubics and rounded over 0.1 s; the first stands `LEAD` seconds, and the arms are
-    lowered `TAIL` seconds after the last. still: factor on the involuntary part (0: a robot).
+    Key postures are joined by shape-preserving cubics and smoothed. The person stands `LEAD_SECONDS` before the first gesture and lowers
+    the arms in the `TAIL_SECONDS` after the last. still: factor on involuntary motion.
     """
-    return settled(through(keys_of(gestures, rng), t) + still * involuntary(t, rng))
+    return clamp_joints(interpolate_keys(key_postures(gestures, rng), t) + still * involuntary_motion(t, rng))
 
 
-def keys_of(gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> Keys:
+def key_postures(gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> Keys:
     """Key postures of gestures `(name, seconds)` one after another, standing before and after."""
-    begin, keys = LEAD, [(0.0, {}), (0.5 * LEAD, {})]
+    begin, keys = LEAD_SECONDS, [(0.0, {}), (0.5 * LEAD_SECONDS, {})]
     for name, seconds in gestures:
-        keys += [(begin + when, posture) for when, posture in MOTIONS[name](seconds, rng)]
+        keys += [(begin + when, posture) for when, posture in GESTURES[name](seconds, rng)]
         begin += seconds
-    return [*keys, (begin + TAIL, {}), (begin + TAIL + 1, {})]
+    return [*keys, (begin + TAIL_SECONDS, {}), (begin + TAIL_SECONDS + 1, {})]
 
 
-def through(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
-    """Values (T, names) at times `t` (s) on the way through `keys`; what a key does not name stands, or is 0.
+def interpolate_keys(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
+    """Values (T, names) at times `t` (s) interpolated through `keys`; channels that a key does not name are as in standing, or 0.
 
     rounding: seconds before and after a time that are averaged.
     """
@@ -235,17 +211,17 @@ def through(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: flo
             if name in names:
                 row[names.index(name)] = value
     path = PchipInterpolator([when for when, _ in keys], table)
-    return rounded(lambda when: path(np.clip(when, 0, None)), t, rounding)
+    return time_average(lambda when: path(np.clip(when, 0, None)), t, rounding)
 
 
-def rounded(values: Callable[[Array], Array], t: Array, rounding: float) -> Array:
+def time_average(values: Callable[[Array], Array], t: Array, rounding: float) -> Array:
     """`values` about times `t` (T,), s, averaged over `rounding` seconds before and after."""
     window = np.linspace(-1, 1, 9)
     weight = np.exp(-2 * window**2) / np.exp(-2 * window**2).sum()
     return np.sum([w * values(t + rounding * x) for w, x in zip(weight, window)], 0)
 
 
-def settled(postures: Array) -> Array:
+def clamp_joints(postures: Array) -> Array:
     """Postures (T, `CHANNELS`) with elbows and fingers kept from bending backward."""
     postures = postures.copy()
     for side in ("left", "right"):
@@ -256,12 +232,12 @@ def settled(postures: Array) -> Array:
 
 
 def duration(gestures: Sequence[tuple[str, float]]) -> float:
-    """Seconds from the first to the last picture of gestures `(name, seconds)`."""
-    return LEAD + sum(seconds for _, seconds in gestures) + TAIL
+    """Seconds from the first to the last frame of gestures `(name, seconds)`."""
+    return LEAD_SECONDS + sum(seconds for _, seconds in gestures) + TAIL_SECONDS
 
 
 def posture(**named: float) -> Array:
-    """One posture (1, `CHANNELS`) of named channels, rad; all others 0: the reference postures hold still."""
+    """One posture (1, `CHANNELS`) of named channels, rad; all others 0, without involuntary motion."""
     q = np.zeros((1, len(CHANNELS)))
     for name, value in named.items():
         q[0, CHANNELS.index(name)] = value

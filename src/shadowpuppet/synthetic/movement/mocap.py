@@ -1,8 +1,7 @@
-"""Motion capture on the mannequin: each segment points where the measured one points, on the mannequin's own lengths.
+"""Retargets motion capture to the mannequin: directions of the measured segments, lengths of the mannequin.
 
-Limbs take directions from the measured joints, so the swing of a segment is exact; how it is turned about itself comes from the
-planes of elbow and knee, and from thumbs and toes. Trunk, head and feet take over how far they are turned from the capture's
-posture at rest.
+Limbs take their directions from the measured joints, so that their swing is exact; their axial rotation follows from the planes of elbow
+and knee, and from thumbs and toes. Trunk, head and feet take their rotation from the capture's rest posture.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.synthetic.person.kinematics import SIDES, Figure, assembled, fingers, turns
+from shadowpuppet.synthetic.person.kinematics import SIDES, Figure, assemble_figure, fingers, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 if TYPE_CHECKING:
@@ -25,10 +24,10 @@ if TYPE_CHECKING:
 Points = dict[str, Array]
 
 
-def play(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
-    """The figure of `body` at times `t` (T,), s, moving as in the one file of `gestures`; at first it faces -Y turned by `turn`.
+def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
+    """The figure of `body` at times `t` (T,), s, moving as in the file of `gestures`; it begins facing -Y rotated by `turn`.
 
-    The middle of the area it covers lies at the origin. Raises `FormatError` where a file cannot be used.
+    The middle of the area it covers lies at the origin. Raises `FormatError` if the file cannot be used.
     """
     gesture, capture = _one(gestures)
     table = capture.joints(gesture.file_rate)
@@ -36,14 +35,14 @@ def play(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0
     figure = retarget(body, shown, capture.at_rest.joints())
     pelvis = figure.rotation[:, 0]
     heading = turn - float(np.arctan2(-pelvis[0, 0, 1], pelvis[0, 1, 1]))
-    R = turns(*np.zeros((2, 1)), np.array([heading]))[0]
+    R = rotations(*np.zeros((2, 1)), np.array([heading]))[0]
     joints, origin = figure.joints @ R.T, figure.origin @ R.T
     middle = np.append((joints[:, 0, :2].max(0) + joints[:, 0, :2].min(0)) / 2, 0.0)
     return Figure(joints - middle, R @ figure.rotation, origin - middle, figure.curl)
 
 
-def seconds_of(gestures: Sequence[Gesture]) -> float:
-    """How long the file of `gestures` plays."""
+def mocap_seconds(gestures: Sequence[Gesture]) -> float:
+    """Seconds of the file of `gestures`."""
     gesture, capture = _one(gestures)
     there = (len(capture.root) - 1) / gesture.file_rate - gesture.start
     if there <= 0:
@@ -60,7 +59,7 @@ def _one(gestures: Sequence[Gesture]) -> tuple[Gesture, Capture]:
 
 
 def _at(table: JointTable, t: Array) -> JointTable:
-    """The table at other times, by cubics."""
+    """The table at other times, interpolated by cubics."""
     from scipy.interpolate import CubicSpline
 
     t = np.clip(t, table.times[0], table.times[-1])
@@ -70,10 +69,10 @@ def _at(table: JointTable, t: Array) -> JointTable:
 
 
 def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
-    """`body` in the postures of `table`, one a row; `rest` has one row: the same skeleton upright, arms level, facing -Y.
+    """`body` in the postures of `table`, one per row; rest: one row, the same skeleton upright, arms level, facing -Y.
 
-    Both have the joints of `io.amc.ENDS`, `pelvis` and `face`. Where the body stands follows the measured pelvis in proportion to
-    the legs; its soles are brought to the floor where they are lowest.
+    Both have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. The pelvis follows the measured one, scaled by the length of the
+    legs; the lowest soles are brought to the floor.
     """
     p: Points = dict(zip(table.names, table.positions.swapaxes(0, 1)))
     calm: Points = dict(zip(rest.names, rest.positions.swapaxes(0, 1)))
@@ -82,7 +81,7 @@ def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
     frame: dict[str, tuple[Array, Array]] = {}
     legs = _length(calm, "hip", "knee") + _length(calm, "knee", "ankle")
     joint["pelvis"] = p["pelvis"] * (body.length("thigh") + body.length("shank")) / legs
-    trunk = {name: _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for name, axes in TRUNK.items()}
+    trunk = {name: _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for name, axes in TRUNK_AXES.items()}
     pelvis, thorax, head = trunk["pelvis"], trunk["thorax"], trunk["head"]
     abdomen, neck = _between(pelvis, thorax), _between(thorax, head)
     lumbar = joint["pelvis"] + pelvis @ (bones["lumbar"] - bones["pelvis"])
@@ -94,19 +93,16 @@ def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
     for side in SIDES:
         _arm(bones, p, calm, side, thorax, thoracic, joint, frame)
         _leg(body, bones, p, calm, side, pelvis, joint, frame)
-    return _on_the_floor(body, assembled(joint, frame, np.full((len(table.times), 2), 0.35)))
+    return _on_the_floor(body, assemble_figure(joint, frame, np.full((len(table.times), 2), 0.35)))
 
 
-TRUNK = {
-    "pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"),
-    "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
-    "head": ("head", "crown", "crown", "face"),
-}
-"""How a segment of the trunk is turned: up from the first joint to the second; from the third to the fourth, left or ahead."""
+TRUNK_AXES = {"pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"), "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
+              "head": ("head", "crown", "crown", "face")}
+"""Axes of the trunk's segments: up from the first joint to the second; left or ahead from the third to the fourth."""
 
 
 def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
-    """Frames (T, 3, 3) whose z points from joint to joint, and whose x, or any fixed direction, is as near as can be to another."""
+    """Frames (T, 3, 3) with z from `low` to `high` and x as near as possible to the direction from `start` to `end`."""
     z = _unit(p[high] - p[low])
     x = p[end] - p[start]
     x = _unit(x - (x * z).sum(1, keepdims=True) * z)
@@ -119,12 +115,12 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
     now = _unit(np.einsum("tji,tj->ti", thorax, p[f"{side}_shoulder"] - p["neck"]))
     clavicle = thorax @ _swing(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now)
     upper, fore = (_unit(p[f"{side}_{b}"] - p[f"{side}_{a}"]) for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
-    hinge = _steady(-sign * np.cross(upper, fore), thorax @ np.array([sign, 0, 0.3]))
+    hinge = _steady_normals(-sign * np.cross(upper, fore), thorax @ np.array([sign, 0, 0.3]))
     upper_arm, bare = (_along_x(sign * axis, hinge) for axis in (upper, fore))
     hand_axis = _unit(p[f"{side}_hand"] - p[f"{side}_wrist"])
     thumb = p[f"{side}_thumb"] - p[f"{side}_wrist"]
     hand = _along_x(sign * hand_axis, np.cross(sign * hand_axis, -thumb))
-    forearm = _between(bare, _swing(hand[..., 0], bare[..., 0]) @ hand)  # turned about itself by half of what the hand is
+    forearm = _between(bare, _swing(hand[..., 0], bare[..., 0]) @ hand)  # half of the hand's axial rotation
     at = {name: bones[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
     sternum = thoracic + thorax @ (at["clavicle"] - bones["thoracic"])
     shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
@@ -132,21 +128,14 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
     wrist = elbow + bare @ (at["wrist"] - at["elbow"])
     joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist}
     joint[f"{side}_hand"] = wrist + hand @ (at["hand"] - at["wrist"])
-    frame |= {
-        f"{side}_clavicle": (clavicle, sternum),
-        f"{side}_upper_arm": (upper_arm, shoulder),
-        f"{side}_forearm": (forearm, elbow),
-        f"{side}_hand": (hand, wrist),
-        f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], np.zeros(len(wrist))),
-    }
+    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper_arm, shoulder), f"{side}_forearm": (forearm, elbow),
+              f"{side}_hand": (hand, wrist), f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], np.zeros(len(wrist)))}
 
 
-def _leg(
-    body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict
-) -> None:
+def _leg(body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict) -> None:
     """Thigh, shank, foot, toes."""
     hip, knee, ankle = (p[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))
-    ahead = _steady(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
+    ahead = _steady_normals(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
     thigh, shank = (_along_z(_unit(a - b), -ahead) for a, b in ((hip, knee), (knee, ankle)))
     axes = (f"{side}_ankle", f"{side}_ball", f"{side}_ankle", f"{side}_knee")
     foot = _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2)
@@ -155,23 +144,19 @@ def _leg(
     joint[f"{side}_knee"] = joint[f"{side}_hip"] - thigh @ np.array([0, 0, body.length("thigh")])
     joint[f"{side}_ankle"] = joint[f"{side}_knee"] - shank @ np.array([0, 0, body.length("shank")])
     at = joint[f"{side}_ankle"]
-    frame |= {
-        f"{side}_thigh": (thigh, joint[f"{side}_hip"]),
-        f"{side}_shank": (shank, joint[f"{side}_knee"]),
-        f"{side}_foot": (foot, at),
-        f"{side}_toes": (foot @ turns(-bend, 0 * bend, 0 * bend), at + foot @ body.ball()),
-    }
+    frame |= {f"{side}_thigh": (thigh, joint[f"{side}_hip"]), f"{side}_shank": (shank, joint[f"{side}_knee"]), f"{side}_foot": (foot, at),
+              f"{side}_toes": (foot @ rotations(-bend, 0 * bend, 0 * bend), at + foot @ body.ball())}
 
 
 def _bend(p: Points, side: str) -> Array:
-    """How far the toes are bent up against the foot, rad, of shape (T,)."""
+    """Upward bend of the toes against the foot, rad, of shape (T,)."""
     foot, toes = _unit(p[f"{side}_ball"] - p[f"{side}_ankle"]), _unit(p[f"{side}_toes"] - p[f"{side}_ball"])
     across = np.cross(foot, _unit(p[f"{side}_knee"] - p[f"{side}_ankle"]))
     return np.arctan2((np.cross(foot, toes) * _unit(across)).sum(1), (foot * toes).sum(1))
 
 
 def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
-    """Raised or lowered as a whole so that the lowest ankle or ball is as high as in standing, save for the lowest 2 %."""
+    """The figure shifted vertically so that the lowest ankle or ball is as high as in standing (2nd percentile over time)."""
     from shadowpuppet.synthetic.person.kinematics import SEGMENTS
 
     lowest = []
@@ -182,8 +167,8 @@ def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
     return Figure(figure.joints + shift, figure.rotation, figure.origin + shift, figure.curl)
 
 
-def _steady(plane: Array, usual: Array) -> Array:
-    """Normals of planes (T, 3), long where they are sure; where they are short the neighbours and at last `usual` decide."""
+def _steady_normals(plane: Array, usual: Array) -> Array:
+    """Normals (T, 3) of elbow or knee planes; those of a nearly straight limb follow their neighbours in time, or else `usual`."""
     from scipy.ndimage import gaussian_filter1d
 
     size = np.linalg.norm(plane, axis=1).max(initial=1e-9)
@@ -192,13 +177,13 @@ def _steady(plane: Array, usual: Array) -> Array:
 
 
 def _along_x(x: Array, z: Array) -> Array:
-    """Frames (T, 3, 3) with x along unit vectors `x` and z as near to `z` as can be."""
+    """Frames (T, 3, 3) with x along unit vectors `x` and z as near to `z` as possible."""
     z = _unit(z - (z * x).sum(1, keepdims=True) * x)
     return np.stack([x, np.cross(z, x), z], -1)
 
 
 def _along_z(z: Array, y: Array) -> Array:
-    """Frames (T, 3, 3) with z along unit vectors `z` and y as near to `y` as can be."""
+    """Frames (T, 3, 3) with z along unit vectors `z` and y as near to `y` as possible."""
     y = _unit(y - (y * z).sum(1, keepdims=True) * z)
     return np.stack([np.cross(y, z), y, z], -1)
 

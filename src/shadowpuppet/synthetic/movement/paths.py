@@ -1,4 +1,4 @@
-"""Ways over the floor: place and heading along their length."""
+"""Paths over the floor: place and heading by length."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 PathName = Literal["line", "circle", "ellipse", "spot"]
-TURN = 0.42
-"""Radius, metres, of the turn at the ends of a line."""
-STEP = 0.01
-"""Distance of a path's samples, metres."""
+TURN_RADIUS = 0.42
+"""Radius of the turn at the ends of a line, metres."""
+PATH_STEP = 0.01
+"""Distance between a path's samples, metres."""
 
 
 class Path:
-    """A way that begins at the origin facing -Y; `circle`, `ellipse` and `line` go on for ever, `spot` stays (a treadmill)."""
+    """A path from the origin facing -Y; `circle`, `ellipse` and `line` repeat, `spot` stays in place (a treadmill)."""
 
     def __init__(self, name: PathName, size: float, length: float) -> None:
         """size: radius of the circle, half the longer axis of the ellipse (the other: 0.6 of it), length of the line; metres.
 
-        length: how much of it is needed, metres. Circle, ellipse and the turns of the line go left.
+        length: needed length, metres. Circle, ellipse and the turns of the line go left.
         """
         from scipy.interpolate import CubicSpline
 
-        s = np.arange(0.0, length + 2 * STEP + 1.0, STEP)
+        s = np.arange(0.0, length + 2 * PATH_STEP + 1.0, PATH_STEP)
         heading = {"line": _line, "circle": lambda s, r: s / r, "ellipse": _ellipse, "spot": lambda s, r: 0 * s}[name](s, size)
         middle = (heading[1:] + heading[:-1]) / 2
         place = np.zeros((len(s), 2))
-        place[1:] = np.cumsum(STEP * np.column_stack([np.sin(middle), -np.cos(middle)]), 0)
+        place[1:] = np.cumsum(PATH_STEP * np.column_stack([np.sin(middle), -np.cos(middle)]), 0)
         self.still = name == "spot"
-        self.samples, self.bend = s, np.gradient(heading, STEP)
+        self.samples, self.bend = s, np.gradient(heading, PATH_STEP)
         self._heading, self._place = CubicSpline(s, heading), CubicSpline(s, place)
 
     def heading(self, s: Array) -> Array:
@@ -48,9 +48,9 @@ class Path:
 
 def _line(s: Array, size: float) -> Array:
     """Headings along a line there and back, with half circles at its ends."""
-    around = np.pi * TURN
+    around = np.pi * TURN_RADIUS
     lap = size + around
-    sharp = np.floor(s / lap) * np.pi + np.clip((s % lap - size) / TURN, 0, np.pi)
+    sharp = np.floor(s / lap) * np.pi + np.clip((s % lap - size) / TURN_RADIUS, 0, np.pi)
     window = np.hanning(61)
     return np.convolve(np.pad(sharp, 30, "edge"), window / window.sum(), "valid").astype(float)
 

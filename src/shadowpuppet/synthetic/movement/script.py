@@ -1,4 +1,4 @@
-"""A made person's gestures, one after the other, as data."""
+"""Motions of a spec, as data."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.movement.paths import PathName
-from shadowpuppet.synthetic.viewpoint import STRICT
 
 MotionName = Literal[
     "stand", "wave_hands", "bend_aside", "bow_forward", "twist", "reach", "forearms_up", "overhead", "random",
@@ -18,27 +18,27 @@ MotionName = Literal[
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Gesture:
-    """A motion and how long it takes."""
+    """A motion and its length."""
 
     motion: MotionName
-    """Its name: a gesture of the arms and trunk, an act of the whole body, `walk`, `jog`, or `mocap` from a file."""
+    """Name: a gesture of arms and trunk, a whole-body action, `walk`, `jog`, or `mocap` from a file."""
     seconds: Annotated[float, Field(ge=2, le=3600)] = 4.0
-    """Its length; of a file no more than there is."""
+    """Length, seconds; at most that of the file."""
     speed: Annotated[float, Field(ge=0.4, le=5)] | None = None
-    """Of walk (0.4 to 2.0) and jog (1.6 to 5), m/s; without it a comfortable one."""
+    """Speed of walk (0.4 to 2.0) and jog (1.6 to 5), m/s; by default a comfortable one."""
     path: PathName = "circle"
-    """Where walk and jog go: a circle or ellipse to the left, a line there and back, or on the spot as on a treadmill."""
+    """Path of walk and jog: a circle or ellipse to the left, a line there and back, or on the spot as on a treadmill."""
     size: Annotated[float, Field(ge=0.5, le=20)] = 1.2
     """Radius of the circle, half the longer axis of the ellipse, length of the line, metres."""
     file: str | None = None
     """Motion capture to play (`mocap`): a .amc file; its skeleton, the .asf file, lies beside it."""
     start: Annotated[float, Field(ge=0)] = 0.0
-    """Seconds of the file to leave out."""
+    """Seconds of the file to skip."""
     file_rate: Annotated[float, Field(gt=0, le=1000)] = 120.0
-    """Frames a second of the file."""
+    """Frames per second of the file."""
 
     def __post_init__(self) -> None:
-        """A speed must fit the gait, and motion capture needs a file."""
+        """Check that the speed fits the gait, and that motion capture, and only that, has a file."""
         low, high = {"walk": (0.4, 2.0), "jog": (1.6, 5.0)}.get(self.motion, (0.0, 5.0))
         if self.speed is not None and not low <= self.speed <= high:
             raise ValueError(f"speed: found {self.speed:g}, expected {low:g} to {high:g} for {self.motion}")

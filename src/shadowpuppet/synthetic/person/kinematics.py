@@ -1,4 +1,4 @@
-"""From postures to joints and segment frames: the mannequin's own kinematics, ball joints turned by rotation vectors."""
+"""The mannequin's kinematics: from postures (rotation vectors of ball joints) to joints and segment frames."""
 
 from __future__ import annotations
 
@@ -10,26 +10,13 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.person.mannequin import HAND_POINT, JOINTS, KNUCKLES, Mannequin
 
 ARM = ("side", "front", "roll", "elbow", "supination", "wrist_flex", "wrist_side", "shrug", "protract", "curl")
-CHANNELS = (
-    "turn",
-    "sway_x",
-    "sway_y",
-    "pelvis_bow",
-    "pelvis_side",
-    "pelvis_twist",
-    "spine_bow",
-    "spine_side",
-    "spine_twist",
-    "head_nod",
-    "head_tilt",
-    "head_turn",
-    *(f"{side}_{name}" for side in ("left", "right") for name in ARM),
-)
+CHANNELS = ("turn", "sway_x", "sway_y", "pelvis_bow", "pelvis_side", "pelvis_twist", "spine_bow", "spine_side", "spine_twist", "head_nod",
+            "head_tilt", "head_turn", *(f"{side}_{name}" for side in ("left", "right") for name in ARM))
 """Columns of a posture array, rad (sway: m; curl: 0 open, 1 fist).
 
 `*_bow`, `*_side`, `*_twist` are components of a joint's rotation vector: forward, to the person's left, turning left. An upper
 arm starts hanging; (`front`, `side`) is its swing as a rotation vector, `roll` turns it about itself (positive outward),
-`elbow` bends it, `supination` turns the palm up. `turn` turns the whole figure to its left.
+`elbow` bends it, `supination` turns the palm up. `turn` rotates the whole figure to its left.
 """
 SEGMENTS = (
     "pelvis",
@@ -37,11 +24,7 @@ SEGMENTS = (
     "thorax",
     "neck",
     "head",
-    *(
-        f"{side}_{name}"
-        for side in ("left", "right")
-        for name in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-    ),
+    *(f"{side}_{name}" for side in ("left", "right") for name in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")),
     "left_toes",
     "right_toes",
     "left_fingers",
@@ -49,11 +32,11 @@ SEGMENTS = (
 )
 SIDES = ("left", "right")
 TOE_OUT = 0.12
-"""How far the feet of a standing person point outward, rad."""
-SPAN = 0.999
-"""Share of its length that a leg may stretch to: knees are never quite straight."""
-FIST = (1.0, 1.5)
-"""Curls, rad, between which the fingers close from open to a fist; less is left to the fingers' own slight bend."""
+"""Outward angle of a standing person's feet, rad."""
+MAX_LEG_SPAN = 0.999
+"""Greatest extension of a leg over its length: knees are never quite straight."""
+FIST_CURL = (1.0, 1.5)
+"""Curl (rad) at which fingers begin to close, and at which they form a fist."""
 MIRROR = np.array([1.0, -1.0, -1.0])
 HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
@@ -67,27 +50,27 @@ class Figure(NamedTuple):
     rotation: Array
     """Segment frames in the order of `SEGMENTS`, of shape (T, S, 3, 3), segment to world; identity in the T-pose."""
     origin: Array
-    """Where each segment's proximal joint lies, of shape (T, S, 3), metres, world."""
+    """Proximal joint of each segment, of shape (T, S, 3), metres, world."""
     curl: Array
-    """How far the fingers of the left and right hand are bent, of shape (T, 2), 0 to 1."""
+    """Curl of the left and right fingers, of shape (T, 2), 0 to 1."""
 
 
 class Stance(NamedTuple):
-    """Where pelvis and feet are in T postures; legs follow from it by two-bone inverse kinematics."""
+    """Pelvis and feet in T postures; the legs follow by two-bone inverse kinematics."""
 
     pelvis: Array
-    """The pelvis' centre, of shape (T, 3), metres, world; lowered where a leg would not reach its ankle."""
+    """Centre of the pelvis, of shape (T, 3), metres, world; lowered if a leg would not reach its ankle."""
     ankles: Array
     """Left and right ankle, of shape (T, 2, 3), metres, world."""
     feet: Array
     """Left and right foot to world, of shape (T, 2, 3, 3); identity stands flat, facing -Y."""
     toes: Array
-    """How far the left and right toes are bent up against the foot, of shape (T, 2), rad."""
+    """Upward bend of the left and right toes against the foot, of shape (T, 2), rad."""
     ahead: Array
-    """Where left and right knee look, of shape (T, 2, 3)."""
+    """Directions in which left and right knee point, of shape (T, 2, 3)."""
 
 
-def turns(*vector: Array) -> Array:
+def rotations(*vector: Array) -> Array:
     """Rotation matrices (T, 3, 3) of rotation vectors given by their components (T,)."""
     from scipy.spatial.transform import Rotation
 
@@ -97,26 +80,26 @@ def turns(*vector: Array) -> Array:
 def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     """The figure of `body` in `postures` (T, `CHANNELS`), its feet planted about the world's origin.
 
-    stance: half the distance between the ankles, as a fraction of the leg's length. Feet stay where they are: the pelvis sinks
-    as far as both legs need, and hips and knees follow from its place.
+    stance: half the distance between the ankles over the leg's length. The feet stay in place: the pelvis sinks as far as both legs
+    need, and hips and knees follow.
     """
-    return figure(body, postures, planted(body, postures, stance))
+    return pose_over(body, postures, planted_stance(body, postures, stance))
 
 
-def planted(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
-    """The `Stance` of `pose`: feet beside each other about the origin, the pelvis above them as high as the legs allow."""
+def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
+    """The `Stance` of `pose`: feet side by side about the origin, the pelvis as high as the legs allow."""
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
     yaw = _yaw(q)
     half, height = stance * (body.length("thigh") + body.length("shank")), body.rest()["left_ankle"][2]
     sway = (yaw @ np.stack([q["sway_x"], q["sway_y"], 0 * q["sway_x"]], -1)[..., None])[..., 0]
     ankles = np.stack([yaw @ np.array([sign * half, 0, height]) for sign in (1, -1)], 1)
-    feet = np.stack([yaw @ turns(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
+    feet = np.stack([yaw @ rotations(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
     ahead = np.repeat((yaw @ np.array([0.0, -1.0, 0.0]))[:, None], 2, 1)
     return Stance(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
 
 
-def figure(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
-    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`; its pelvis and feet count, not `sway` in the postures.
+def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
+    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`, whose pelvis and feet replace `sway` of the postures.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
     """
@@ -124,51 +107,45 @@ def figure(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) 
     rest = body.rest()
     joint: dict[str, Array] = {}
     frame: dict[str, tuple[Array, Array]] = {}
-    pelvis = _yaw(q) @ turns(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
+    pelvis = _yaw(q) @ rotations(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
     joint["pelvis"] = _legs(body, pelvis, stance, soft, joint, frame)
     frame["pelvis"] = pelvis, joint["pelvis"]
-    half = turns(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
+    half = rotations(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
     abdomen, thorax = pelvis @ half, pelvis @ half @ half
     lumbar = joint["pelvis"] + pelvis @ (rest["lumbar"] - rest["pelvis"])
     thoracic = lumbar + abdomen @ (rest["thoracic"] - rest["lumbar"])
     joint["neck"] = thoracic + thorax @ (rest["neck"] - rest["thoracic"])
-    nod = turns(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
+    nod = rotations(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
     neck, head = thorax @ nod, thorax @ nod @ nod
     joint["head"] = joint["neck"] + neck @ (rest["head"] - rest["neck"])
     frame |= {"abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
     frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
     for side in SIDES:
         _arm(rest, q, side, thorax, thoracic, joint, frame)
-    return assembled(joint, frame, np.stack([q["left_curl"], q["right_curl"]], 1))
+    return assemble_figure(joint, frame, np.stack([q["left_curl"], q["right_curl"]], 1))
 
 
-def assembled(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
-    """A `Figure` of joints (T, 3) by name and of segments' frames and origins by name; fingers bent by `curl` (T, 2)."""
-    return Figure(
-        np.stack([joint[name] for name in JOINTS], 1),
-        np.stack([frame[name][0] for name in SEGMENTS], 1),
-        np.stack([frame[name][1] for name in SEGMENTS], 1),
-        curl,
-    )
+def assemble_figure(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
+    """A `Figure` from joints (T, 3) and from segments' frames and origins, by name; fingers bent by `curl` (T, 2)."""
+    return Figure(np.stack([joint[name] for name in JOINTS], 1), np.stack([frame[name][0] for name in SEGMENTS], 1),
+                  np.stack([frame[name][1] for name in SEGMENTS], 1), curl)
 
 
 def _yaw(q: dict[str, Array]) -> Array:
     """The figure's heading, of shape (T, 3, 3)."""
-    return turns(0 * q["turn"], 0 * q["turn"], q["turn"])
+    return rotations(0 * q["turn"], 0 * q["turn"], q["turn"])
 
 
-def _arm(
-    rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict
-) -> None:
+def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
     """Clavicle, upper arm, forearm and hand of one side.
 
-    The clavicle rises by 0.13 of what the arm is raised beyond 25 degrees and protracts by 0.12 of its forward swing (after
-    Ludewig et al. 2009): shoulders are not fixed to the chest.
+    The clavicle rises by 0.13 of the arm's elevation beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig et al.
+    2009).
     """
     mirror = np.ones(3) if side == "left" else MIRROR
 
     def about(x: Array | float, y: Array | float, z: Array | float) -> Array:
-        return turns(*(m * np.asarray(v) + 0 * q["turn"] for m, v in zip(mirror, (x, y, z))))
+        return rotations(*(m * np.asarray(v) + 0 * q["turn"] for m, v in zip(mirror, (x, y, z))))
 
     arm = {name: q[f"{side}_{name}"] for name in ARM}
     at = {name: rest[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
@@ -184,51 +161,38 @@ def _arm(
     shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
     elbow = shoulder + upper @ (at["elbow"] - at["shoulder"])
     wrist = elbow + fore @ (at["wrist"] - at["elbow"])
-    joint |= {
-        f"{side}_shoulder": shoulder,
-        f"{side}_elbow": elbow,
-        f"{side}_wrist": wrist,
-        f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"]),
-    }
-    frame |= {
-        f"{side}_clavicle": (clavicle, sternum),
-        f"{side}_upper_arm": (upper, shoulder),
-        f"{side}_forearm": (half, elbow),
-        f"{side}_hand": (hand, wrist),
-        f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], arm["curl"]),
-    }
+    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist,
+              f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"])}
+    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (half, elbow),
+              f"{side}_hand": (hand, wrist), f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], arm["curl"])}
 
 
 def fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
-    """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: of the hand, from the wrist, in its frame."""
-    close = np.clip((curl - FIST[0]) / (FIST[1] - FIST[0]), 0, 1)
+    """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: the joint `hand` from the wrist in the hand's frame."""
+    close = np.clip((curl - FIST_CURL[0]) / (FIST_CURL[1] - FIST_CURL[0]), 0, 1)
     bend = np.radians(115) * np.sign(base[0]) * close
-    return hand @ turns(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
+    return hand @ rotations(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
 
 
 def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: dict, frame: dict) -> Array:
-    """The pelvis' centre (T, 3), no higher than both legs reach; fills in both legs."""
+    """Centre of the pelvis (T, 3), no higher than both legs reach; adds the legs to `joint` and `frame`."""
     thigh, shank = body.length("thigh"), body.length("shank")
     rest = body.rest()
     hips = [pelvis @ (rest[f"{side}_hip"] - rest["pelvis"]) for side in SIDES]
     ankles = [stance.ankles[:, n] for n in (0, 1)]
-    sway, span = np.where([True, True, False], stance.pelvis, 0.0), SPAN * (thigh + shank)
+    sway, span = np.where([True, True, False], stance.pelvis, 0.0), MAX_LEG_SPAN * (thigh + shank)
     heights = [
         ankle[:, 2] - hip[:, 2] + np.sqrt(np.maximum(span**2 - ((sway + hip - ankle)[:, :2] ** 2).sum(1), 0))
         for hip, ankle in zip(hips, ankles)
     ]
-    centre = sway + lesser(lesser(heights[0], heights[1], soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
+    centre = sway + soft_minimum(soft_minimum(heights[0], heights[1], soft), stance.pelvis[:, 2], soft)[:, None] * [0, 0, 1]
     for n, side in enumerate(SIDES):
         hip, ankle, ahead, foot = centre + hips[n], ankles[n], stance.ahead[:, n], stance.feet[:, n]
         knee, ahead = _bent(hip, ankle, ahead, thigh, shank)
-        toes = foot @ turns(-stance.toes[:, n], np.zeros(1), np.zeros(1))
+        toes = foot @ rotations(-stance.toes[:, n], np.zeros(1), np.zeros(1))
         joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
-        frame |= {
-            f"{side}_thigh": (_upright(hip - knee, ahead), hip),
-            f"{side}_shank": (_upright(knee - ankle, ahead), knee),
-            f"{side}_foot": (foot, ankle),
-            f"{side}_toes": (toes, ankle + foot @ body.ball()),
-        }
+        frame |= {f"{side}_thigh": (_upright(hip - knee, ahead), hip), f"{side}_shank": (_upright(knee - ankle, ahead), knee),
+                  f"{side}_foot": (foot, ankle), f"{side}_toes": (toes, ankle + foot @ body.ball())}
     return centre
 
 
@@ -243,15 +207,15 @@ def _bent(hip: Array, ankle: Array, ahead: Array, thigh: float, shank: float) ->
     return hip + thigh * (cosine * down + np.sqrt(1 - cosine**2) * ahead), ahead
 
 
-def lesser(a: Array, b: Array, soft: float) -> Array:
-    """The smaller of `a` and `b`, rounded off where they come closer than `soft`."""
+def soft_minimum(a: Array, b: Array, soft: float) -> Array:
+    """The smaller of `a` and `b`, smoothed if they are closer than `soft`."""
     if soft == 0:
         return np.minimum(a, b)
     return np.minimum(a, b) - np.maximum(soft - np.abs(np.where(np.isinf(b), a + soft, b) - a), 0) ** 2 / (4 * soft)
 
 
 def _upright(up: Array, ahead: Array) -> Array:
-    """Frames (T, 3, 3) whose z points along `up` and whose -y looks `ahead`, both (T, 3)."""
+    """Frames (T, 3, 3) with z along `up` and -y as near to `ahead` as possible, both (T, 3)."""
     z = up / np.linalg.norm(up, axis=1, keepdims=True)
     x = np.cross(-ahead, z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)

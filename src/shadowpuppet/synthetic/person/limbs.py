@@ -1,4 +1,4 @@
-"""Arms, hands and legs of the left side as lofts, after the measured girths; the right side is their mirror image."""
+"""Arm, hand and leg of the left side as lofts with the measured girths; the right side is mirrored."""
 
 from __future__ import annotations
 
@@ -32,16 +32,8 @@ def arm(body: Mannequin, clothes: Clothes) -> list[Loft]:
         (1, elbow, 0.92 * elbow),
     ]
     parts = [
-        Loft(
-            "left_upper_arm",
-            np.zeros(3),
-            ALONG_X,
-            _sleeved(stations_of(rows, upper), end, cloth),
-            (0.85 * biceps, 0.9 * elbow),
-            0.02,
-            change=end,
-            **sleeved,
-        )
+        Loft("left_upper_arm", np.zeros(3), ALONG_X, _sleeved(stations_of(rows, upper), end, cloth), (0.85 * biceps, 0.9 * elbow), 0.02,
+             change=end, **sleeved)
     ]
     rows = [
         (0, elbow, 0.94 * elbow),
@@ -51,16 +43,8 @@ def arm(body: Mannequin, clothes: Clothes) -> list[Loft]:
         (1, 1.14 * wrist, 0.84 * wrist),
     ]
     parts.append(
-        Loft(
-            "left_forearm",
-            np.zeros(3),
-            ALONG_X,
-            _sleeved(stations_of(rows, fore), end - upper, cloth),
-            (0.9 * elbow, 0.02),
-            0.025,
-            change=end - upper,
-            **sleeved,
-        )
+        Loft("left_forearm", np.zeros(3), ALONG_X, _sleeved(stations_of(rows, fore), end - upper, cloth), (0.9 * elbow, 0.02), 0.025,
+             change=end - upper, **sleeved)
     )
     return parts + _hand(hand, body.measure("hand_breadth") / 2, wrist)
 
@@ -95,15 +79,8 @@ def _hand(length: float, half: float, wrist: float) -> list[Loft]:
         reach, unit = extent * length, np.array(axis) / np.linalg.norm(axis)
         rows = [(0, 1.05 * r, r), (0.5, 0.92 * r, 0.86 * r, 0, 0.02 * reach), (1, 0.72 * r, 0.63 * r, 0, 0.10 * reach)]
         parts.append(
-            Loft(
-                "left_fingers" if finger else "left_hand",
-                np.array(root) - knuckle if finger else np.array(root),
-                frame_of(unit, np.array([0, 0, -1.0])),
-                stations_of(rows, reach),
-                (0.3 * r, 0.63 * r),
-                0.008,
-                group=group,
-            )
+            Loft("left_fingers" if finger else "left_hand", np.array(root) - knuckle if finger else np.array(root),
+                 frame_of(unit, np.array([0, 0, -1.0])), stations_of(rows, reach), (0.3 * r, 0.63 * r), 0.008, group=group)
         )
     return parts
 
@@ -121,9 +98,7 @@ def leg(body: Mannequin, clothes: Clothes) -> list[Loft]:
         (1, 0.93 * knee, 0.97 * knee),
     ]
     trousers: dict[str, Any] = {"materials": ("trousers", "trousers"), "group": "left_leg"}
-    parts = [
-        Loft("left_thigh", np.array([0, 0, 0.06 * upper]), DOWN, stations_of(rows, upper) + cloth, (0.06, 0.05), 0.03, **trousers)
-    ]
+    parts = [Loft("left_thigh", np.array([0, 0, 0.06 * upper]), DOWN, stations_of(rows, upper) + cloth, (0.06, 0.05), 0.03, **trousers)]
     rows = [
         (0, 0.93 * knee, 0.97 * knee),
         (0.10, 0.97 * knee, knee, 0, 0.006),

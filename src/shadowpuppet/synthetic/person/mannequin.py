@@ -1,7 +1,7 @@
-"""The person in a made recording: body measures from published surveys, and where the joints lie.
+"""The person in a synthetic recording: body measures from published surveys, and joint centres.
 
-Nothing here is shared with the bodies that trackers fit: joints, lengths and shapes come from anthropometry, the surface
-(`surface.py`) is lofted and blended, and postures turn ball joints by rotation vectors (`kinematics.py`).
+Nothing is shared with the bodies that trackers fit: joints, lengths and shapes come from anthropometry, the surface (`surface.py`) is
+made of blended lofts, and postures are rotation vectors of ball joints (`kinematics.py`).
 """
 
 from __future__ import annotations
@@ -10,89 +10,58 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
+from shadowpuppet.settings import STRICT
 
 Kind = Literal["woman", "man", "child"]
 
-JOINTS = (
-    "pelvis",
-    "neck",
-    "head",
-    *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand")),
-    *(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")),
-)
+JOINTS = ("pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand")),
+          *(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")))
 """The 17 joints of a truth file, in its order."""
 
 STATURE = (1.629, 1.756)
 """Mean stature (m) of the women and men measured by `MEASURES`."""
 
-MEASURES = {
-    "biacromial_breadth": (0.365, 0.416),
-    "chest_breadth": (0.272, 0.290),
-    "chest_depth": (0.248, 0.254),
-    "waist_breadth": (0.300, 0.326),
-    "waist_depth": (0.220, 0.236),
-    "hip_breadth": (0.348, 0.343),
-    "buttock_depth": (0.235, 0.249),
-    "neck": (0.330, 0.398),
-    "biceps": (0.292, 0.338),
-    "forearm": (0.254, 0.296),
-    "wrist": (0.155, 0.176),
-    "hand_breadth": (0.079, 0.0885),
-    "thigh": (0.617, 0.626),
-    "knee": (0.370, 0.388),
-    "calf": (0.373, 0.392),
-    "ankle": (0.216, 0.229),
-    "foot_length": (0.246, 0.271),
-    "foot_breadth": (0.093, 0.102),
-    "head_breadth": (0.148, 0.154),
-    "head_length": (0.190, 0.199),
-    "head_height": (0.218, 0.232),
-}
+MEASURES = {"biacromial_breadth": (0.365, 0.416), "chest_breadth": (0.272, 0.290), "chest_depth": (0.248, 0.254),
+            "waist_breadth": (0.300, 0.326), "waist_depth": (0.220, 0.236), "hip_breadth": (0.348, 0.343), "buttock_depth": (0.235, 0.249),
+            "neck": (0.330, 0.398), "biceps": (0.292, 0.338), "forearm": (0.254, 0.296), "wrist": (0.155, 0.176),
+            "hand_breadth": (0.079, 0.0885), "thigh": (0.617, 0.626), "knee": (0.370, 0.388), "calf": (0.373, 0.392),
+            "ankle": (0.216, 0.229), "foot_length": (0.246, 0.271), "foot_breadth": (0.093, 0.102), "head_breadth": (0.148, 0.154),
+            "head_length": (0.190, 0.199), "head_height": (0.218, 0.232)}
 """Breadths, depths and girths (m) of the mean woman and man: rounded means of ANSUR II (Gordon et al. 2014, NATICK/TR-15/007;
 biceps and forearm some 5 % less than its flexed girths, knee its lower thigh, head height from vertex to chin)."""
 
-FRACTIONS = {
-    "upper_arm": (0.1586, 0.1618),
-    "forearm": (0.1523, 0.1545),
-    "hand": (0.108, 0.108),
-    "thigh": (0.245, 0.245),
-    "shank": (0.246, 0.246),
-    "ankle": (0.039, 0.039),
-}
+FRACTIONS = {"upper_arm": (0.1586, 0.1618), "forearm": (0.1523, 0.1545), "hand": (0.108, 0.108), "thigh": (0.245, 0.245),
+             "shank": (0.246, 0.246), "ankle": (0.039, 0.039)}
 """Lengths between joint centres as fractions of stature, women and men: the arm's by de Leva (1996, table 4: SJC-EJC, EJC-WJC),
 hand and leg by Drillis & Contini (1966) as given by Winter (2009, fig. 4.1)."""
 
 HAND_POINT = 0.18
-"""Where `*_hand` lies, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
-recordings (0.019 of stature beyond the wrist). The knuckles lie at 0.46."""
+"""Place of the joint `*_hand`, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
+recordings (0.019 of stature beyond the wrist)."""
 KNUCKLES = 0.46
-"""Where the fingers bend, likewise."""
+"""Place of the knuckles, where the fingers bend, likewise."""
 
 BODY_MASS = (25.6, 27.8)
 """Mean body mass index (kg/m2) of the same women and men."""
 HEAD_MASS = 5.0
 """Mass of an adult's head, kg."""
 
-GROWTH = {
-    "age": (4, 6, 8, 10, 12, 14),
-    "stature": (1.02, 1.15, 1.275, 1.385, 1.505, 1.62),
-    "body_mass": (15.5, 15.3, 15.9, 16.7, 17.9, 19.2),
-    "legs": (0.906, 0.933, 0.952, 0.973, 0.99, 1.0),
-}
+GROWTH = {"age": (4, 6, 8, 10, 12, 14), "stature": (1.02, 1.15, 1.275, 1.385, 1.505, 1.62),
+          "body_mass": (15.5, 15.3, 15.9, 16.7, 17.9, 19.2), "legs": (0.906, 0.933, 0.952, 0.973, 0.99, 1.0)}
 """Children by years, means of girls and boys: stature (m) and body mass index (kg/m2), medians of the CDC charts (Kuczmarski et al.
 2000); legs' share of stature against adults', from sitting heights (Fredriks et al. 2005)."""
 
 Factor = Annotated[float, Field(ge=0.7, le=1.4)]
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=STRICT)
 class Mannequin:
-    """A person: stature, build, and factors on what the mean person of that stature and build measures."""
+    """A person: stature, build, and factors on the mean measures of that stature and build."""
 
     stature: Annotated[float, Field(ge=0.9, le=2.2)] = 1.75
     """Height of the crown over the floor, metres."""
@@ -109,24 +78,17 @@ class Mannequin:
     head_size: Annotated[float, Field(ge=0.85, le=1.15)] = 1.0
     """Factor on the head."""
     leg_length: Annotated[float, Field(ge=0.88, le=1.08)] = 1.0
-    """Factor on thigh and shank; the trunk makes up for it."""
+    """Factor on thigh and shank; the trunk compensates for it."""
 
     @classmethod
-    def draw(
-        cls,
-        rng: np.random.Generator,
-        kind: Kind | None = None,
-        *,
-        stature: float | None = None,
-        bmi: float | None = None,
-        age: float | None = None,
-    ) -> Mannequin:
-        """A plausible person; `kind` is drawn too where it is not given (children every sixth).
+    def draw(cls, rng: np.random.Generator, kind: Kind | None = None, *, stature: float | None = None, bmi: float | None = None,
+             age: float | None = None) -> Mannequin:
+        """A random plausible person; by default of a random kind (every sixth a child).
 
-        stature: metres; bmi: body mass index, kg/m2, told by girths; age: years, 4 to 14, of a child. What is not given is drawn: standard
-        deviations follow ANSUR II (stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %), children are 6 to 12 years old
-        (Snyder et al. 1977). A child whose age or stature is given has a child's legs and girths (`GROWTH`).
-        Raises `SettingsError` where there is no such person.
+        stature: metres; bmi: body mass index, kg/m2, which sets the girths; age: of a child, 4 to 14 years. What is not given is drawn:
+        standard deviations follow ANSUR II (stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %), children are 6 to 12 years
+        old (Snyder et al. 1977). A child of given age or stature has a child's legs and girths (`GROWTH`).
+        Raises `SettingsError` if there is no such person.
         """
         kind = kind or ("woman", "man", "child")[rng.choice(3, p=[5 / 12, 5 / 12, 1 / 6])]
         mean, spread, build = {"woman": (1.629, 0.064, 0.0), "man": (1.756, 0.069, 1.0), "child": (1.34, 0.11, 0.5)}[kind]
@@ -136,15 +98,10 @@ class Mannequin:
             if kind != "child" or not 4 <= age <= 14:
                 raise SettingsError(f"age: found {age:g} for a {kind}, expected 4 to 14 for a child")
             mean, spread = float(np.interp(age, GROWTH["age"], GROWTH["stature"])), 0.05
-        person = cls(
-            stature=_within("stature", mean + spread * z[0] if stature is None else stature, 0.9, 2.2),
-            build=float(np.clip(build + 0.15 * z[1], 0, 1)),
-            girth=float((0.9 if kind == "child" else 1.0) * (1 + 0.08 * z[2])),
-            shoulder_width=float(1 + 0.045 * z[3]),
-            hip_width=float(1 + 0.05 * z[4]),
-            arm_length=float(1 + 0.025 * z[5]),
-            head_size=float(1 + 0.02 * z[6]),
-        )
+        person = cls(stature=_within("stature", mean + spread * z[0] if stature is None else stature, 0.9, 2.2),
+                     build=float(np.clip(build + 0.15 * z[1], 0, 1)), girth=float((0.9 if kind == "child" else 1.0) * (1 + 0.08 * z[2])),
+                     shoulder_width=float(1 + 0.045 * z[3]), hip_width=float(1 + 0.05 * z[4]), arm_length=float(1 + 0.025 * z[5]),
+                     head_size=float(1 + 0.02 * z[6]))
         if known:
             age = float(np.interp(person.stature, GROWTH["stature"], GROWTH["age"])) if age is None else age
             person = replace(person, leg_length=float(np.interp(age, GROWTH["age"], GROWTH["legs"])))
@@ -153,7 +110,7 @@ class Mannequin:
         return person if bmi is None else replace(person, girth=person.girth_of(bmi))
 
     def girth_of(self, bmi: float) -> float:
-        """The factor on girths that makes up a body mass index (kg/m2). Raises `SettingsError` beyond the possible factors.
+        """The factor on girths that gives a body mass index (kg/m2). Raises `SettingsError` beyond the possible factors.
 
         Mass goes as stature and the square of girths, but for the head, whose mass goes as the stature alone.
         """
@@ -194,17 +151,10 @@ class Mannequin:
         H, up = self.stature, self.stature / 1.75
         leg = self.length("thigh") + self.length("shank") + self.length("ankle")
         half = self.measure("biacromial_breadth") / 2 - 0.018 * up
-        points = {
-            "pelvis": (0, 0, leg),
-            "lumbar": (0, 0.010 * H, leg + 0.055 * H),
-            "thoracic": (0, 0.014 * H, 0.665 * H),
-            "neck": (0, 0.014 * H, 0.838 * H),
-            "head": (0, -0.008 * H, H - 0.63 * self.measure("head_height")),
-            "clavicle": (0.014 * H, -0.014 * H, 0.812 * H),
-            "shoulder": (half, 0.004 * H, 0.793 * H),
-            "hip": (0.052 * H * self.hip_width, 0, leg),
-            "knee": (0.052 * H * self.hip_width, 0, leg - self.length("thigh")),
-        }
+        points = {"pelvis": (0, 0, leg), "lumbar": (0, 0.010 * H, leg + 0.055 * H), "thoracic": (0, 0.014 * H, 0.665 * H),
+                  "neck": (0, 0.014 * H, 0.838 * H), "head": (0, -0.008 * H, H - 0.63 * self.measure("head_height")),
+                  "clavicle": (0.014 * H, -0.014 * H, 0.812 * H), "shoulder": (half, 0.004 * H, 0.793 * H),
+                  "hip": (0.052 * H * self.hip_width, 0, leg), "knee": (0.052 * H * self.hip_width, 0, leg - self.length("thigh"))}
         reach = np.cumsum([self.length("upper_arm"), self.length("forearm"), HAND_POINT * self.length("hand")])
         for name, along in zip(("elbow", "wrist", "hand"), reach):
             points[name] = (half + along, 0.004 * H, 0.793 * H)
@@ -217,7 +167,7 @@ class Mannequin:
 
 
 def _within(name: str, value: float, low: float, high: float) -> float:
-    """The value. Raises `SettingsError` where it is not between `low` and `high`."""
+    """The value. Raises `SettingsError` if it is not between `low` and `high`."""
     if not low <= value <= high:
         raise SettingsError(f"{name}: found {value:g}, expected {low:.3g} to {high:.3g}")
     return float(value)

@@ -18,8 +18,8 @@ MATERIALS = ("skin", "shirt", "trousers", "hair", "shoes", "eyes", "lips")
 GROUPS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Parts blend within a group, and limbs with the trunk only close to shoulder or hip: a hanging arm does not melt into it."""
 Rows = list[tuple[float, ...]]
-"""Cross-sections as they are written down: (place along the axis, half width, half depth[, centre's width, centre's depth])."""
-SAMPLES = 33
+"""Cross-sections: (place along the axis, half width, half depth[, centre's width, centre's depth])."""
+LOFT_SAMPLES = 33
 """Cross-sections of a loft."""
 
 
@@ -30,34 +30,34 @@ class Loft:
     segment: str
     """The segment that carries it, of `SEGMENTS`."""
     start: Array
-    """Where the axis starts, of shape (3,), metres, in the segment's frame, from its joint."""
+    """Start of the axis, of shape (3,), metres, in the segment's frame, from its joint."""
     frame: Array
     """Columns width, depth, axis, of shape (3, 3), in the segment's frame."""
     stations: Array
     """Rows of (along, half width, half depth, centre's width, centre's depth), of shape (n, 5), metres."""
     caps: tuple[float, float]
-    """How far the rounded ends stand out, metres."""
+    """Height of the rounded ends, metres."""
     blend: float
-    """Width of the smooth union with what came before it in its group, metres."""
+    """Width of the smooth union with the parts before it in its group, metres."""
     materials: tuple[str, str] = ("skin", "skin")
-    """Before and after `change`."""
+    """Materials before and after `change`."""
     change: float = 9.0
-    """Where along the axis the second material begins, metres."""
+    """Place along the axis where the second material begins, metres."""
     group: str = "trunk"
     """Of `GROUPS`."""
 
     def mirrored(self) -> Loft:
-        """The same part on the right: everything with its x reversed."""
+        """The mirrored part on the right."""
         flip = np.array([-1.0, 1.0, 1.0])
         segment, group = (name.replace("left", "right") for name in (self.segment, self.group))
         return replace(self, segment=segment, group=group, start=self.start * flip, frame=self.frame * flip[:, None])
 
     def sampled(self) -> Array:
-        """Half width, half depth and centre at `SAMPLES` places evenly along the axis, of shape (SAMPLES, 4), metres."""
+        """Half width, half depth and centre at `LOFT_SAMPLES` places evenly along the axis, of shape (SAMPLES, 4), metres."""
         from scipy.interpolate import PchipInterpolator
 
         along = self.stations[:, 0]
-        return PchipInterpolator(along, self.stations[:, 1:])(np.linspace(along[0], along[-1], SAMPLES))
+        return PchipInterpolator(along, self.stations[:, 1:])(np.linspace(along[0], along[-1], LOFT_SAMPLES))
 
 
 class Surface(NamedTuple):
@@ -86,25 +86,19 @@ class Surface(NamedTuple):
     def of(cls, lofts: list[Loft]) -> Surface:
         """The arrays of `lofts`."""
         lofts = sorted(lofts, key=lambda loft: GROUPS.index(loft.group))
-        return cls(
-            segment=np.array([SEGMENTS.index(p.segment) for p in lofts]),
-            start=np.stack([p.start for p in lofts]),
-            frame=np.stack([p.frame for p in lofts]),
-            table=np.stack([p.sampled() for p in lofts]),
-            length=np.array([np.ptp(p.stations[:, 0]) for p in lofts]),
-            caps=np.array([p.caps for p in lofts]),
-            blend=np.array([p.blend for p in lofts]),
-            change=np.array([p.change for p in lofts]),
-            code=np.array([(GROUPS.index(p.group), *map(MATERIALS.index, p.materials)) for p in lofts]),
-        )
+        return cls(segment=np.array([SEGMENTS.index(p.segment) for p in lofts]), start=np.stack([p.start for p in lofts]),
+                   frame=np.stack([p.frame for p in lofts]), table=np.stack([p.sampled() for p in lofts]),
+                   length=np.array([np.ptp(p.stations[:, 0]) for p in lofts]), caps=np.array([p.caps for p in lofts]),
+                   blend=np.array([p.blend for p in lofts]), change=np.array([p.change for p in lofts]),
+                   code=np.array([(GROUPS.index(p.group), *map(MATERIALS.index, p.materials)) for p in lofts]))
 
     @property
     def radius(self) -> Array:
-        """How far each part reaches from its axis at most, of shape (P,), metres."""
+        """Greatest reach of each part from its axis, of shape (P,), metres."""
         return (np.maximum(self.table[..., 0], self.table[..., 1]) + np.hypot(self.table[..., 2], self.table[..., 3])).max(1)
 
 
-def between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **more: Any) -> Loft:
+def loft_between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **more: Any) -> Loft:
     """A loft from `start` to `end` (world of the T-pose) on the segment whose joint is `joint`; rows by fraction of length."""
     axis = end - start
     length = float(np.linalg.norm(axis))
@@ -114,7 +108,7 @@ def between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **
 
 
 def frame_of(axis: Array, depth: Array) -> Array:
-    """Columns width, depth, axis, (3, 3), with the depth as near to `depth` as it can be."""
+    """Columns width, depth, axis, (3, 3), with the depth as near to `depth` as possible."""
     depth = depth - (depth @ axis) * axis
     depth = depth / np.sqrt(depth @ depth)
     return np.stack([np.cross(depth, axis), depth, axis], 1)
@@ -127,8 +121,8 @@ def stations_of(rows: Rows, scale: float = 1.0) -> Array:
     return table
 
 
-def ball(segment: str, joint: Array, middle: Array, radii: tuple[float, float, float], **more: Any) -> Loft:
+def ellipsoid(segment: str, joint: Array, middle: Array, radii: tuple[float, float, float], **more: Any) -> Loft:
     """An ellipsoid of half `radii` (x, y, z): a short loft with long caps."""
     half, cap = np.array([0, 0, 0.02 * radii[2]]), 0.98 * radii[2]
     rows: Rows = [(0, radii[0], radii[1]), (1, radii[0], radii[1])]
-    return between(segment, joint, middle - half, middle + half, rows, caps=(cap, cap), **more)
+    return loft_between(segment, joint, middle - half, middle + half, rows, caps=(cap, cap), **more)

@@ -1,4 +1,4 @@
-"""The trunk as lofts: the measured breadths and depths at the heights where they are taken, and what lies between by eye."""
+"""The trunk as lofts: breadths and depths at the heights where they are measured; sections between are set by eye."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person.surface import Loft, Rows, between, stations_of
+from shadowpuppet.synthetic.person.surface import Loft, Rows, loft_between, stations_of
 
 
 def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
@@ -45,16 +45,8 @@ def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
     for segment, joint in (("pelvis", "pelvis"), ("abdomen", "lumbar"), ("thorax", "thoracic")):
         start = np.array([0, 0, rows[segment][0][0] * H]) - joints[joint]
         parts.append(
-            Loft(
-                segment,
-                start,
-                np.eye(3),
-                stations_of(rows[segment], H),
-                (0.04, 0.03),
-                0.03,
-                ("trousers" if segment == "pelvis" else "shirt", "shirt"),
-                (0.545 - crotch) * H,
-            )
+            Loft(segment, start, np.eye(3), stations_of(rows[segment], H), (0.04, 0.03), 0.03,
+                 ("trousers" if segment == "pelvis" else "shirt", "shirt"), (0.545 - crotch) * H)
         )
     return parts
 
@@ -71,21 +63,13 @@ def shoulders(body: Mannequin, clothes: Clothes) -> list[Loft]:
         (0.5, 0.048 * unit, 0.033 * unit),
         (1, 0.048 * unit * body.girth, 0.038 * unit * body.girth),
     ]
-    left = [between("left_clavicle", joints["left_clavicle"], inner, outer, rows, caps=(0.03, 0.03), blend=0.05, **shirt)]
+    left = [loft_between("left_clavicle", joints["left_clavicle"], inner, outer, rows, caps=(0.03, 0.03), blend=0.05, **shirt)]
     size = max(0.0, 1 - 2.5 * body.build) ** 0.5 * unit * body.girth
     if size > 0.3:
         inside = np.array([0.046 * H, -0.56 * breast, 0.715 * H])
         rows = [(0, 0.070 * size, 0.068 * size), (1, 0.051 * size, 0.049 * size)]
         left.append(
-            between(
-                "thorax",
-                joints["thoracic"],
-                inside,
-                inside + np.array([0.008, -0.024, -0.006]),
-                rows,
-                caps=(0.03, 0.026),
-                blend=0.06,
-                **shirt,
-            )
+            loft_between("thorax", joints["thoracic"], inside, inside + np.array([0.008, -0.024, -0.006]), rows, caps=(0.03, 0.026),
+                         blend=0.06, **shirt)
         )
     return [*left, *(loft.mirrored() for loft in left)]

@@ -1,4 +1,4 @@
-"""Specs from a few words: what is often wanted, each a flag of the command line."""
+"""Frequent changes to a spec, each a flag of the command line."""
 
 from __future__ import annotations
 
@@ -11,42 +11,38 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
-from shadowpuppet.synthetic.viewpoint import STRICT
-from shadowpuppet.synthetic.walls import Background
+from shadowpuppet.synthetic.walls import WallStyle
 
-OBSTACLES: dict[str, dict[str, float]] = {
-    "table": {"ahead": 0.75},
-    "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
-    "pillar": {"ahead": 0.9, "left": 0.2},
-    "cabinet": {"ahead": 0.7, "left": 0.35},
-}
-"""Where `occluder` puts things."""
-COMPANY: dict[str, dict[str, Any]] = {
+OCCLUDERS: dict[str, dict[str, float]] = {"table": {"ahead": 0.75}, "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
+                                          "pillar": {"ahead": 0.9, "left": 0.2}, "cabinet": {"ahead": 0.7, "left": 0.35}}
+"""Places of `occluder`."""
+SECOND_PERSONS: dict[str, dict[str, Any]] = {
     "behind": {"ahead": -1.0, "left": -0.6},
     "aside": {"ahead": 0.0, "left": 1.0},
     "passing": {"ahead": -1.3, "left": 0.0, "turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 3.0}},
 }
-"""What `second_person` means."""
+"""Bystanders of `second_person`."""
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
-class Shorthand:
-    """What is often wanted of a made recording; None leaves the spec as it is."""
+class SpecChanges:
+    """Frequent changes to a spec; None leaves the spec as it is."""
 
     motion: str | None = None
-    """Gestures in turn with their seconds, such as "wave_hands 4, reach 5"; those without share --seconds, or take 4 each. Or a file of
+    """Gestures and their seconds, such as "wave_hands 4, reach 5"; those without seconds share --seconds, or take 4 each. Or a file of
     motion capture (.amc)."""
     seconds: Annotated[float, Field(ge=2, le=3600)] | None = None
     """Length of the motion; the film has 0.8 s of standing before and after it."""
     body: Literal["woman", "man", "child", "random"] | None = None
-    """Who it is: woman, man, child or random; drawn by the seed from published proportions."""
+    """Kind of person: woman, man, child or random; drawn by the seed from published proportions."""
     height: float | None = None
     """Height of the person, metres."""
     cameras: Annotated[int, Field(ge=1, le=64)] | None = None
-    """How many; several stand in a ring around the person."""
+    """Number of cameras; several stand in a ring around the person."""
     ring_radius: float | None = None
     """Distance of the ring's cameras from the person's place, metres."""
     distance: float | None = None
@@ -60,61 +56,61 @@ class Shorthand:
     size: str | None = None
     """Width and height of the pictures, such as 640x480."""
     rate: float | None = None
-    """Pictures a second."""
-    background: Background | None = None
-    """What is behind: room, plain, cluttered or textured."""
+    """Frames per second."""
+    background: WallStyle | None = None
+    """Walls and floor: room, plain, cluttered or textured."""
     room: int | None = None
     """Seed of wall, floor and lamps."""
     clothing: int | None = None
     """Seed of clothes, hair and skin."""
     camouflage: float | None = None
-    """How near the clothes' colour is to the wall's, 0 to 1."""
+    """Similarity of the clothes' colour to the wall's, 0 to 1."""
     shadow: float | None = None
-    """How dark the person's shadow is on floor and wall, 0 to 1."""
+    """Darkness of the person's shadow on floor and wall, 0 to 1."""
     noise: float | None = None
     """Sensor noise: standard deviation in grey levels."""
     flicker: float | None = None
-    """Share by which the lamps' brightness wobbles, such as 0.03."""
+    """Relative amplitude of the lamps' flicker, such as 0.03."""
     drift: float | None = None
-    """By which share the light has grown, or with a minus faded, at the end."""
+    """Relative change of the light by the end of the film; negative: it fades."""
     crf: int | None = None
     """Compression of the films, H.264's crf: 0 the best, 18 as usual, 51 the worst."""
     occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
-    """What stands between the person and the first camera: table, chair, pillar or cabinet."""
+    """Obstacle between the person and the first camera: table, chair, pillar or cabinet."""
     second_person: Literal["behind", "aside", "passing"] | None = None
-    """Somebody else: standing behind or aside, or passing to and fro behind."""
+    """A second person: standing behind or aside, or passing to and fro behind."""
 
 
-PLAIN = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
-"""Words that are settings of the scene."""
-LENSES = {"fov": "fov_deg", "camera_height": "height", "fisheye": "fisheye"}
-"""Words that are settings of every camera."""
+SCENE_CHANGES = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
+"""Changes that are settings of the scene."""
+CAMERA_CHANGES = {"fov": "fov_deg", "camera_height": "height", "fisheye": "fisheye"}
+"""Changes that are settings of every camera, and their names there."""
 
 
-def expanded(words: Shorthand, spec: Spec, source: str = "flags") -> Spec:
-    """A spec with what the words say in place of its own. Raises `SettingsError`: one sentence on what cannot be."""
-    said = {field.name: value for field in fields(Shorthand) if (value := getattr(words, field.name)) is not None}
+def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Spec:
+    """A spec with `changes` applied. Raises `SettingsError` for an impossible one."""
+    said = {field.name: value for field in fields(SpecChanges) if (value := getattr(changes, field.name)) is not None}
     values = spec_values(spec)
-    values["scene"] |= {name: said[name] for name in PLAIN if name in said}
+    values["scene"] |= {name: said[name] for name in SCENE_CHANGES if name in said}
     values |= {name: said[name] for name in ("rate",) if name in said}
     if {"motion", "seconds"} & set(said):
         values["motion"] = _motion(said.get("motion"), said.get("seconds"), spec, source)
     if "height" in said:
         values["body"]["stature"] = said["height"]
-        spec_from(values, source)  # an impossible height is told with what is possible
+        spec_from(values, source)  # the message for an impossible height states what is possible
     if "body" in said:
         kind = None if said["body"] == "random" else said["body"]
         values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))
     _place_cameras(values, said, source)
     if "occluder" in said:
-        values["scene"]["obstacles"] = [{"kind": said["occluder"], **OBSTACLES[said["occluder"]]}]
+        values["scene"]["obstacles"] = [{"kind": said["occluder"], **OCCLUDERS[said["occluder"]]}]
     if "second_person" in said:
-        values["scene"]["bystanders"] = [COMPANY[said["second_person"]]]
+        values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
     return spec_from(values, source)
 
 
-def gestures_from(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:
-    """Gestures from `name seconds, name seconds`; those without seconds share what is left of `seconds`, or take 4 each."""
+def parse_gestures(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:
+    """Gestures from the text `name seconds, name seconds`; those without seconds share the rest of `seconds`, or take 4 each."""
     items = [item.split() for item in text.split(",")]
     for item in items:
         if not 1 <= len(item) <= 2 or (len(item) == 2 and not re.fullmatch(r"\d+(\.\d*)?", item[1])):
@@ -130,21 +126,21 @@ def gestures_from(text: str, seconds: float | None = None, source: str = "motion
 
 
 def _named(motion: str) -> dict[str, Any]:
-    """A gesture by its name, or motion capture by its file's."""
+    """A gesture by name, or motion capture by file name."""
     return {"motion": "mocap", "file": motion} if motion.lower().endswith(".amc") else {"motion": motion}
 
 
 def _motion(text: str | None, seconds: float | None, spec: Spec, source: str) -> list[dict[str, Any]]:
-    """Plain gestures: those of the text, or the spec's own at other lengths."""
+    """Gestures as plain values: those of the text, or the spec's own scaled to another length."""
     if text is not None:
-        return [asdict(gesture) for gesture in gestures_from(text, seconds, f"{source}: motion")]
+        return [asdict(gesture) for gesture in parse_gestures(text, seconds, f"{source}: motion")]
     assert seconds is not None
     scale = seconds / sum(gesture.seconds for gesture in spec.motion)
     return [asdict(gesture) | {"seconds": gesture.seconds * scale} for gesture in spec.motion]
 
 
 def _place_cameras(values: dict[str, Any], said: dict[str, Any], source: str) -> None:
-    """Change the cameras of a spec's plain values: all of them, or from one to a ring and back."""
+    """Change the cameras in a spec's plain values: their settings, or from one to a ring and back."""
     placed = values.get("cameras") or [spec_values(Spec())["cameras"][0]]
     single, count = placed[0], len(placed)
     lens = {key: single[key] for key in ("size", "fov_deg", "distortion", "fisheye", "height")}
@@ -164,7 +160,7 @@ def _place_cameras(values: dict[str, Any], said: dict[str, Any], source: str) ->
     if "ring" in values:
         values.pop("cameras", None)
     for camera in [values["ring"]] if "ring" in values else values["cameras"]:
-        camera |= {key: said[word] for word, key in LENSES.items() if word in said}
+        camera |= {key: said[word] for word, key in CAMERA_CHANGES.items() if word in said}
         camera |= {"distance": said["distance"]} if "distance" in said else {}
         camera |= {"size": _size(said["size"], source)} if "size" in said else {}
 

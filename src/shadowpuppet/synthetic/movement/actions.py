@@ -1,4 +1,4 @@
-"""Acts of the whole body: boxing, lifting, squatting, jumping and others, each some seconds long."""
+"""Whole-body actions: boxing, lifting, squatting, jumping and others, each some seconds long."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shadowpuppet.synthetic.movement.acts import STANCE, Act, Hop, Step
 from shadowpuppet.synthetic.movement.gestures import Keys, Posture, band_noise, both, left, right, trunk
 from shadowpuppet.synthetic.movement.gestures import random as random_keys
+from shadowpuppet.synthetic.movement.keyframes import HALF_STANCE, Hop, KeyframeMotion, Step
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GUARD = both(front=38, side=12, roll=6, elbow=122, supination=10, curl=85, wrist_flex=0)
 """Fists before the chin, elbows in."""
 
 
-def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
-    """Guard with the left foot before the right, then jabs, crosses, hooks and uppercuts, weight shifting, a few steps."""
+def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
+    """Boxing: guard with the left foot forward, then jabs, crosses, hooks and uppercuts, weight shifts and a few steps."""
     begin, end = 0.9, seconds - 0.9
     stand: Posture = GUARD | trunk(turn=-22, spine_twist=-8, pelvis_bow=4, spine_bow=8, head_turn=24, head_nod=4)
     stand |= {"drop": 0.045, "right_heel": np.radians(12), "ahead": 0.03}
@@ -36,8 +36,8 @@ def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
         reach = rng.uniform(0.14, 0.2)
         keys += [(t + reach, strike), (t + 2.1 * reach, stand | {"aside": shift[0], "ahead": 0.03 + shift[1]})]
         t += 2.1 * reach + rng.uniform(0.08, 0.45)
-    steps += [Step(1, end, 0.36, -STANCE, 0.0), Step(0, end + 0.38, 0.36, STANCE, 0.0)]
-    return Act(body, seconds, [*keys, (end, keys[-1][1])], steps, rounding=0.06)
+    steps += [Step(1, end, 0.36, -HALF_STANCE, 0.0), Step(0, end + 0.38, 0.36, HALF_STANCE, 0.0)]
+    return KeyframeMotion(body, seconds, [*keys, (end, keys[-1][1])], steps, rounding=0.06)
 
 
 PUNCHES: dict[str, Posture] = {
@@ -52,23 +52,23 @@ PUNCHES: dict[str, Posture] = {
     "uppercut": right(front=48, side=6, roll=0, elbow=96, supination=60, curl=85)
     | trunk(spine_twist=22, pelvis_twist=14, spine_bow=-2, head_turn=-14) | {"right_heel": np.radians(28), "drop": 0.02, "ahead": 0.07},
 }  # fmt: skip
-"""What each punch changes of the guard at its far end."""
+"""Changes of the guard at the far end of each punch."""
 
 
-def lift(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
-    """Bending the knees and the back, lifting something from the floor before the feet, holding it, and putting it back."""
+def lift(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
+    """Lifting something from the floor with bent knees and back, holding it, and putting it back."""
     deep, bow = rng.uniform(0.3, 0.42), rng.uniform(-6, 6)
     down = both(front=74, side=6, roll=-8, elbow=12, supination=20, curl=30) | trunk(pelvis_bow=46 + bow, spine_bow=36, head_nod=-20)
     down |= {"drop": deep, "ahead": -0.10}
     hold = both(front=28, side=8, roll=-18, elbow=72, supination=50, curl=30) | trunk(spine_bow=-4)
     touch = down | {name: down[name] - np.radians(6) for name in ("left_front", "right_front")}
     share = seconds / 6.0
-    return Act(body, seconds, [(0.25 * seconds, down), (0.25 * seconds + 0.3 * share, touch), (0.46 * seconds, hold),
+    return KeyframeMotion(body, seconds, [(0.25 * seconds, down), (0.25 * seconds + 0.3 * share, touch), (0.46 * seconds, hold),
                                (0.58 * seconds, hold | trunk(spine_twist=rng.uniform(-15, 15))), (0.78 * seconds, down),
                                (0.78 * seconds + 0.25 * share, touch)])  # fmt: skip
 
 
-def squat(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
+def squat(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
     """Knee bends with the arms forward, about 2.4 s each."""
     count = max(1, round((seconds - 0.6) / 2.4))
     each, keys = (seconds - 0.6) / count, []
@@ -76,37 +76,37 @@ def squat(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
         low = both(front=82, side=4, elbow=10, curl=10) | trunk(pelvis_bow=26, spine_bow=14, head_nod=-16)
         low |= {"drop": rng.uniform(0.3, 0.46), "ahead": -0.09}
         keys += [(0.3 + (n + 0.45) * each, low), (0.3 + (n + 0.52) * each, low), (0.3 + (n + 0.98) * each, {})]
-    return Act(body, seconds, keys)
+    return KeyframeMotion(body, seconds, keys)
 
 
-def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
-    """Sitting down on something that is not shown, the hands on the thighs, and standing up again."""
+def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
+    """Sitting down on an invisible seat, the hands on the thighs, and standing up again."""
     lean = both(front=22, side=10, elbow=45, curl=15, supination=-10) | trunk(pelvis_bow=40, spine_bow=16, head_nod=-14)
     seat = both(front=20, side=10, elbow=62, curl=15, supination=-20) | trunk(pelvis_bow=-4, spine_bow=8)
     deep = rng.uniform(0.40, 0.46)
     low: Posture = {"drop": deep, "ahead": -0.42}
     half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
     pace = min(seconds / 4.0, 1.0)
-    return Act(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
+    return KeyframeMotion(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
                                (seconds - 1.0 * pace, lean | half)])  # fmt: skip
 
 
-def march(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
+def march(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
     """Stepping on the spot, knees raised, arms swinging against the legs."""
     period = rng.uniform(0.95, 1.15)
     high, keys, steps = rng.uniform(0.24, 0.42), [], []
     for n in range(int((seconds - 0.8) / (period / 2))):
         foot, begin = n % 2, 0.35 + n * period / 2
         sign = 1 - 2 * foot
-        steps.append(Step(foot, begin, 0.46 * period, sign * STANCE, 0.0, 0.0, high))
+        steps.append(Step(foot, begin, 0.46 * period, sign * HALF_STANCE, 0.0, 0.0, high))
         fore, back = (right, left) if foot == 0 else (left, right)
         swing = fore(front=30, elbow=62, side=9) | back(front=-16, elbow=30, side=9)
         keys.append((begin + 0.23 * period, swing | trunk(spine_twist=5 * sign, pelvis_side=-3 * sign, spine_side=3 * sign)
                      | {"aside": -0.05 * sign, "drop": 0.01}))  # fmt: skip
-    return Act(body, seconds, keys, steps)
+    return KeyframeMotion(body, seconds, keys, steps)
 
 
-def jump(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
+def jump(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
     """Jumps on the spot from bent knees, the arms swinging up, about 2.2 s each."""
     count = max(1, int((seconds - 0.2) / 2.1))
     each, keys, hops = seconds / count, [], []
@@ -120,10 +120,10 @@ def jump(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
                  (leaves + 0.6 * air, up | heels), (leaves + air, land | {"drop": 0.02} | {k: v / 2 for k, v in heels.items()}),
                  (leaves + air + 0.18, land | {"drop": 0.2}), (n * each + 0.97 * each, {})]  # fmt: skip
         hops.append(Hop(leaves, air))
-    return Act(body, seconds, keys, hops=hops, rounding=0.1)
+    return KeyframeMotion(body, seconds, keys, hops=hops, rounding=0.1)
 
 
-def turn_around(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
+def turn_around(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
     """Turning round on the spot in small steps, by about half a turn to one side."""
     count = max(2, int((seconds - 0.8) / 0.55))
     whole = float(rng.choice([-1, 1]) * np.pi * rng.uniform(0.9, 1.1))
@@ -132,29 +132,25 @@ def turn_around(body: Mannequin, seconds: float, rng: np.random.Generator) -> Ac
         # the foot on the inside of the turn goes first
         foot = (n + (whole < 0)) % 2
         to, sign = whole * min(n + 1, count) / count, 1 - 2 * foot
-        aside, ahead = STANCE * sign * np.cos(to), -STANCE * sign * np.sin(to)
+        aside, ahead = HALF_STANCE * sign * np.cos(to), -HALF_STANCE * sign * np.sin(to)
         begin = 0.25 + n * (seconds - 0.8) / (count + 1)
         steps.append(Step(foot, begin, 0.75 * each, aside, ahead, to, 0.05))
         keys.append((begin + 0.5 * each, {"turn": to - 0.3 * whole / count, "head_turn": 0.15 * np.sign(whole)}))
-    return Act(body, seconds, keys, steps)
+    return KeyframeMotion(body, seconds, keys, steps)
 
 
-def random_body(body: Mannequin, seconds: float, rng: np.random.Generator) -> Act:
+def random_body(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
     """Smooth random motion of the whole body over planted feet: arms and trunk as in `random`, knees bending, weight shifting."""
     keys = random_keys(seconds, rng)
     t = np.array([when for when, _ in keys])
     drop, aside, ahead, turn = (band_noise(t, highest, rng) for highest in (0.35, 0.3, 0.3, 0.25))
-    own = {
-        "drop": 0.11 * (1 + np.tanh(drop)),
-        "aside": 0.10 * np.tanh(aside),
-        "ahead": 0.05 * np.tanh(ahead),
-        "turn": np.radians(18) * np.tanh(turn),
-    }
-    return Act(body, seconds, [(when, posture | {name: float(values[n]) for name, values in own.items()})
+    own = {"drop": 0.11 * (1 + np.tanh(drop)), "aside": 0.10 * np.tanh(aside), "ahead": 0.05 * np.tanh(ahead),
+           "turn": np.radians(18) * np.tanh(turn)}
+    return KeyframeMotion(body, seconds, [(when, posture | {name: float(values[n]) for name, values in own.items()})
                                for n, (when, posture) in enumerate(keys)])  # fmt: skip
 
 
-ACTS: dict[str, Callable[[Mannequin, float, np.random.Generator], Act]] = {
+ACTIONS: dict[str, Callable[[Mannequin, float, np.random.Generator], KeyframeMotion]] = {
     f.__name__: f for f in (box, lift, squat, sit, march, jump, turn_around, random_body)
 }
-"""All acts by name."""
+"""All actions by name."""

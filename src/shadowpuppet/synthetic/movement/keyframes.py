@@ -1,7 +1,7 @@
-"""Motions of the whole body as data: key postures, and steps of the feet.
+"""Whole-body motion from key postures and steps of the feet.
 
-An act begins and ends standing, in its own frame: the person's place is the origin, they face -Y. Lengths are in leg lengths, so
-that children do the same as adults.
+A motion begins and ends standing, in its own frame: the person stands at the origin facing -Y. Lengths are in leg lengths, so that
+motions fit children and adults.
 """
 
 from __future__ import annotations
@@ -12,59 +12,52 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, Sole, smooth
-from shadowpuppet.synthetic.movement.gestures import Keys, rounded, through
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, turns
+from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, Sole, smoothstep
+from shadowpuppet.synthetic.movement.gestures import Keys, interpolate_keys, time_average
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
-STANCE = 0.13
-"""Half the distance of a standing person's ankles."""
-GROUND = ("drop", "aside", "ahead", "left_heel", "right_heel")
-"""What keys may name besides `CHANNELS`: how far the pelvis is lowered from standing, and moved to the left and forward, in leg
-lengths; how far the heels are raised, rad. A leg that would not reach lowers the pelvis further."""
+HALF_STANCE = 0.13
+"""Half the distance between a standing person's ankles, leg lengths."""
+GROUND_CHANNELS = ("drop", "aside", "ahead", "left_heel", "right_heel")
+"""Channels of key postures besides `CHANNELS`: lowering of the pelvis, its shift to the left and forward, leg lengths; raising of the
+heels, rad. A leg that would not reach its foot lowers the pelvis further."""
 
 
 class Step(NamedTuple):
-    """A foot goes elsewhere."""
+    """A step of one foot."""
 
     foot: int
     """0 left, 1 right."""
     begin: float
-    """Seconds."""
+    """Start, seconds."""
     seconds: float
-    """How long it is in the air."""
+    """Time in the air."""
     aside: float
-    """Where it goes to: to the left, leg lengths."""
+    """Its goal to the left, leg lengths."""
     ahead: float
-    """Forward, leg lengths."""
+    """Its goal forward, leg lengths."""
     turn: float = 0.0
-    """Heading, rad to the left; toes point outward of it."""
+    """Heading, rad to the left; the toes point outward from it."""
     height: float = 0.08
-    """How high it is lifted, leg lengths."""
+    """Greatest height, leg lengths."""
 
 
 class Hop(NamedTuple):
-    """Both feet leave the floor and fall freely."""
+    """A jump: both feet leave the floor."""
 
     begin: float
-    """Seconds."""
+    """Start, seconds."""
     seconds: float
-    """How long they are in the air."""
+    """Time in the air."""
 
 
-class Act:
-    """Key postures over stepping feet."""
+class KeyframeMotion:
+    """A motion through key postures over stepping feet."""
 
-    def __init__(
-        self,
-        body: Mannequin,
-        seconds: float,
-        keys: Keys,
-        steps: Sequence[Step] = (),
-        hops: Sequence[Hop] = (),
-        rounding: float = 0.16,
-    ) -> None:
-        """keys: of `CHANNELS` and `GROUND`, between 0 and `seconds`; what they do not name stands; `rounding`: see `through`."""
+    def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
+                 rounding: float = 0.16) -> None:
+        """keys: of `CHANNELS` and `GROUND_CHANNELS`, between 0 and `seconds`; others stand; `rounding`: see `interpolate_keys`."""
         self.body, self.seconds, self.hops, self.rounding = body, seconds, tuple(hops), rounding
         self.leg, self.sole = body.length("thigh") + body.length("shank"), Sole.of(body)
         last = {"turn": max((s.begin, s.turn) for s in steps)[1]} if steps else {}
@@ -75,9 +68,9 @@ class Act:
 
     def at(self, t: Array) -> tuple[Array, Stance]:
         """Postures (T, `CHANNELS`) and stance at times `t` (T,), s."""
-        values = through(self.keys, np.clip(t, 0, self.seconds), (*CHANNELS, *GROUND), self.rounding)
+        values = interpolate_keys(self.keys, np.clip(t, 0, self.seconds), (*CHANNELS, *GROUND_CHANNELS), self.rounding)
         postures, (drop, aside, ahead, *heels) = values[:, : len(CHANNELS)], values[:, len(CHANNELS) :].T
-        lift = rounded(self._flight, t, 0.1)
+        lift = time_average(self._flight, t, 0.1)
         feet = [self._foot(n, t, heels[n]) for n in (0, 1)]
         ankles, frames, toes, looks = (np.stack(part, 1) for part in zip(*feet))
         ankles = ankles + (lift[:, None] * [0, 0, 1])[:, None]
@@ -88,31 +81,31 @@ class Act:
         return postures, Stance(pelvis, ankles, frames, toes, looks)
 
     def _flight(self, t: Array) -> Array:
-        """How high the hops have brought both feet, metres."""
+        """Height of both feet by hops, metres."""
         spans = [(np.clip(t - h.begin, 0, h.seconds), h.seconds) for h in self.hops]
         return sum((0.5 * GRAVITY * past * (whole - past) for past, whole in spans), 0.0 * t)
 
     def _foot(self, n: int, t: Array, heel: Array) -> tuple[Array, Array, Array, Array]:
-        """Ankle (T, 3), frame (T, 3, 3), bent toes (T,) and where the foot points (T, 3), at times `t` (T,)."""
+        """Ankle (T, 3), frame (T, 3, 3), bend of the toes (T,) and direction of the foot (T, 3) at times `t` (T,)."""
         out = TOE_OUT * (1 - 2 * n)
-        place = np.array([STANCE * (1 - 2 * n), 0.0, 0.0])
+        place = np.array([HALF_STANCE * (1 - 2 * n), 0.0, 0.0])
         values, up = np.repeat(place[None], len(t), 0), 0 * t
         for step in self.steps[n]:
             share, goal = np.clip((t - step.begin) / step.seconds, 0, 1), np.array([step.aside, step.ahead, step.turn])
-            values = values + smooth(share)[:, None] * (goal - place)
+            values = values + smoothstep(share)[:, None] * (goal - place)
             up, place = up + step.height * 16 * (share * (1 - share)) ** 2, goal
         turn, pitch = values[:, 2] + out, -np.maximum(heel, 0) - 2.5 * up
         forward, rise = self.sole.rolled(pitch)
         heading = np.column_stack([np.sin(turn), -np.cos(turn)])
         floor = self.leg * values[:, :2] * [1, -1] + forward[:, None] * heading
-        frame = turns(0 * turn, 0 * turn, turn) @ turns(-pitch, 0 * pitch, 0 * pitch)
+        frame = rotations(0 * turn, 0 * turn, turn) @ rotations(-pitch, 0 * pitch, 0 * pitch)
         ankle = np.column_stack([floor, rise + self.leg * up])
         return ankle, frame, np.clip(-pitch, 0, 0.9), np.column_stack([heading, 0 * turn])
 
 
 def _last(steps: Sequence[Step], what: str) -> float:
-    """Where the pelvis ends up: between the places of both feet."""
-    places = [(STANCE if n == 0 else -STANCE) if what == "aside" else 0.0 for n in (0, 1)]
+    """Final place of the pelvis: midway between the feet."""
+    places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):
         places[step.foot] = getattr(step, what)
     return sum(places) / 2

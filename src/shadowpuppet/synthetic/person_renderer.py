@@ -1,40 +1,26 @@
-"""Pictures of the mannequin: exact silhouettes and shaded, anti-aliased images by sphere tracing."""
+"""Images of the mannequin: exact silhouettes and shaded, anti-aliased pictures by sphere tracing."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.synthetic.compositing import Layer
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import GROUPS, MATERIALS, Surface
 
-OFFSETS = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
-"""Where a pixel at an edge is sampled: a rotated grid, pixels from its centre."""
+EDGE_SAMPLES = np.array([(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)])
+"""Sample positions in a pixel at an edge, a rotated grid, pixels from its centre."""
 
 
-class Shot(NamedTuple):
-    """What the camera sees of the person alone."""
-
-    mask: np.ndarray
-    """Exact silhouette at pixel centres, of shape (H, W), uint8, 0 or 255."""
-    picture: Array
-    """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
-    alpha: Array
-    """Share of each pixel that the person covers, of shape (H, W)."""
-    depth: Array
-    """Distance along the rays of pixel centres, of shape (H, W), metres; `layers.FAR` where the person is missed."""
-
-
-class Renderer:
-    """Draws one person with one camera: rays and tiles are prepared once."""
+class PersonRenderer:
+    """Draws one person with one camera; rays and tiles are prepared once."""
 
     def __init__(self, camera: Camera, surface: Surface, clothes: Clothes, lights: Array) -> None:
-        """lights: (3, 4), unit directions toward the two lamps and their strength; the third row's is the ambient light."""
+        """lights: (3, 4), unit directions toward the two lamps and their strengths; the third row holds the ambient light's."""
         from shadowpuppet.synthetic._ray_marching import TILE
 
         width, height = camera.size
@@ -46,7 +32,7 @@ class Renderer:
         self.rays = _unit(camera.rays(np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)) @ R.T)
         self.across, down = -(-width // TILE), -(-height // TILE)
         corner = np.stack(np.meshgrid(np.arange(self.across + 1), np.arange(down + 1)), -1) * float(TILE) - 0.5
-        if camera.fisheye:  # beyond the border of its picture it may see nothing
+        if camera.fisheye:  # beyond the border of its picture there may be no rays
             corner = np.minimum(corner, np.array([width, height]) - 0.5)
         corners = _unit(camera.rays(corner) @ R.T)
         corners = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]])
@@ -55,12 +41,12 @@ class Renderer:
         self.sine, self.cosine = np.sin(angle), np.cos(angle)
 
     def fine_rays(self) -> Array:
-        """Unit rays (2H, 2W, 3), world, four to a pixel: for what is drawn once."""
+        """Unit rays (2H, 2W, 3), world, four per pixel: for what is drawn once."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         return _unit(self.camera.rays(grid) @ inverse(self.camera.T_camera_world)[:3, :3].T)
 
-    def draw(self, figure: Figure, index: int) -> Shot:
+    def draw(self, figure: Figure, index: int) -> Layer:
         """The figure's posture `index`."""
         from shadowpuppet.synthetic import _ray_marching
 
@@ -77,11 +63,11 @@ class Renderer:
         depth, near = np.empty((height, width)), np.empty((height, width), np.int64)
         _ray_marching.find_surface(*traced, depth, near)
         alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
-        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, OFFSETS, picture, alpha)
-        return Shot(np.where(near >= 0, 255, 0).astype(np.uint8), picture, alpha, depth)
+        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, EDGE_SAMPLES, picture, alpha)
+        return Layer(picture, alpha, depth)
 
     def _joins(self, figure: Figure, index: int) -> Array:
-        """Where each of `GROUPS` melts into the trunk, and how far around, (5, 4) metres."""
+        """Where each of `GROUPS` blends into the trunk, and the radius, of shape (5, 4), metres."""
         names = [JOINTS.index(name) for name in ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")]
         assert len(names) == len(GROUPS)
         elbow, wrist = (figure.joints[index, JOINTS.index(name)] for name in ("left_elbow", "left_wrist"))

@@ -1,4 +1,4 @@
-"""One camera of a recording, with everything that it sees: takes pictures."""
+"""Frames of one camera of a recording: the person, bystanders, obstacles and the room."""
 
 from __future__ import annotations
 
@@ -12,41 +12,38 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
+from shadowpuppet.synthetic.compositing import composite, composite_people, visible
 from shadowpuppet.synthetic.furniture import Furniture
-from shadowpuppet.synthetic.layers import Layer, composed, in_front, pictured
 from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person.parts import dressed
-from shadowpuppet.synthetic.renderer import Renderer
-from shadowpuppet.synthetic.room import Room, brightness, exposed
+from shadowpuppet.synthetic.person_renderer import PersonRenderer
+from shadowpuppet.synthetic.room import Room, expose, lamp_brightness
 from shadowpuppet.synthetic.spec import Bystander, Spec
 
-CLEAR = 0.4
-"""Metres that the wall keeps from the joints of whoever comes nearest."""
 
-
-class Picture(NamedTuple):
-    """A picture with what is exactly known of it."""
+class RenderedFrame(NamedTuple):
+    """A frame with its exact masks."""
 
     image: np.ndarray
     """Of shape (H, W, 3), blue green red, uint8."""
     mask: np.ndarray
-    """The visible part of the person who is tracked, of shape (H, W), uint8, 0 or 255."""
+    """Visible part of the tracked person, of shape (H, W), uint8, 0 or 255."""
     people: np.ndarray
-    """The visible parts of everybody, of shape (H, W), uint8, 0 or 255; the mask itself where nobody else is."""
+    """Visible parts of all people, of shape (H, W), uint8, 0 or 255; `mask` itself if there are no bystanders."""
     hidden: int
-    """How many pixels of the person obstacles and other people hide."""
+    """Number of the person's pixels hidden by obstacles and bystanders."""
 
 
-class Studio:
-    """One camera with the person, their clothes and the room; others, and things, where the spec has them."""
+class SceneRenderer:
+    """Renders the scene of a spec as one camera sees it."""
 
     def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator, others: Sequence[Figure] = (), least: float = 0.0) -> None:
-        """rng: of the noise; clothes and room have their own seeds in the spec.
+        """rng: for the noise; clothes and room have their own seeds in the spec.
 
-        others: figures of `spec.scene.bystanders`, at the same times as the person's; least: how far behind the person (m)
-        the wall must be.
+        others: figures of `spec.scene.bystanders`, at the same times as the person's; least: least distance (m) of the wall behind the
+        person.
         """
         scene = spec.scene
         least = max([least, *(view.distance + 1 for view in spec.views() if abs(view.azimuth_deg) > 60)])
@@ -55,7 +52,7 @@ class Studio:
         clothes = Clothes.draw(np.random.default_rng(scene.clothing))
         if scene.camouflage:
             clothes = _camouflaged(clothes, self.room.wall_colour, scene.camouflage)
-        self.renderer = Renderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
+        self.renderer = PersonRenderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
         self.spec, self.rng = spec, rng
         self.others = [(figure, self._of(bystander, camera)) for figure, bystander in zip(others, scene.bystanders, strict=True)]
         self.things = []
@@ -64,25 +61,25 @@ class Studio:
             self.things = [furniture.layer(camera.centre, self.renderer.rays, fine, self.room.lights)]
         self._length = 0.0
 
-    def _of(self, bystander: Bystander, camera: Camera) -> Renderer:
+    def _of(self, bystander: Bystander, camera: Camera) -> PersonRenderer:
         clothes = Clothes.draw(np.random.default_rng([bystander.seed, 1]))
-        return Renderer(camera, dressed(body_of(bystander), clothes), clothes, self.room.lights)
+        return PersonRenderer(camera, dressed(bystander_body(bystander), clothes), clothes, self.room.lights)
 
     def empty(self, index: int = 0, count: int = 1) -> np.ndarray:
-        """Picture `index` of `count` without anybody, (H, W, 3) BGR, before the film begins."""
-        return self._exposed(composed(self.room.picture, self.things), (index - count) / self.spec.rate)
+        """Frame `index` of `count` of the empty scene, (H, W, 3) BGR, before the film begins."""
+        return self._exposed(composite(self.room.picture, self.things), (index - count) / self.spec.rate)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A picture (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255; nobody else is there."""
+        """A frame (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255, without bystanders."""
         light, mask, *_ = self._lit(figure, index)
         return self._exposed(light, 0.0), mask
 
     def hides(self, figure: Figure) -> bool:
-        """Whether things hide anything of the figure in its first posture."""
+        """Whether obstacles hide a part of the figure in its first posture."""
         return bool(self.things) and self._lit(figure, 0)[3] > 0
 
-    def film(self, figure: Figure, workers: int | None = None) -> Iterator[Picture]:
-        """Pictures of all postures, one after another; `workers` threads draw ahead (2 to 8 by the processor), noise is drawn in order."""
+    def film(self, figure: Figure, workers: int | None = None) -> Iterator[RenderedFrame]:
+        """Frames of all postures in order; `workers` threads (by default 2 to 8) draw ahead, the noise is drawn in order."""
         from concurrent.futures import ThreadPoolExecutor
 
         workers = workers or min(max(os.cpu_count() or 2, 2), 8)
@@ -94,38 +91,38 @@ class Studio:
                 light, mask, people, hidden = ahead.popleft().result()
                 if index + 2 * workers < count:
                     ahead.append(pool.submit(self._lit, figure, index + 2 * workers, True))
-                yield Picture(self._exposed(light, index / self.spec.rate), mask, people, hidden)
+                yield RenderedFrame(self._exposed(light, index / self.spec.rate), mask, people, hidden)
 
     def _lit(self, figure: Figure, index: int, company: bool = False) -> tuple[Array, np.ndarray, np.ndarray, int]:
-        """Light, mask, everybody's mask and how much is hidden; `company`: with the bystanders."""
-        shot = self.renderer.draw(figure, index)
+        """Light, mask, mask of all people and number of hidden pixels; company: whether to include the bystanders."""
+        person = self.renderer.draw(figure, index)
         others = self.others if company else []
         room = self.room.shaded(figure, index, *(other for other, _ in others))
         if not (others or self.things):
-            return shot.picture + (1 - shot.alpha[..., None]) * room, shot.mask, shot.mask, 0
-        person = Layer(shot.picture, shot.alpha, shot.depth)
-        drawn = [renderer.draw(other, index) for other, renderer in others]
-        company_layers = [Layer(other.picture, other.alpha, other.depth) for other in drawn]
-        rest = [*company_layers, *self.things]
-        seen = in_front(person, rest)
+            mask = _mask(person.mask)
+            return person.over(room), mask, mask, 0
+        bystanders = [renderer.draw(other, index) for other, renderer in others]
+        rest = [*bystanders, *self.things]
+        seen = visible(person, rest)
         people = seen.copy()
-        for n, layer in enumerate(company_layers):
-            people |= in_front(layer, [person, *rest[:n], *rest[n + 1 :]])
-        return pictured(room, [person, *company_layers], self.things), _mask(seen), _mask(people), int(((shot.mask > 0) & ~seen).sum())
+        for n, layer in enumerate(bystanders):
+            people |= visible(layer, [person, *rest[:n], *rest[n + 1 :]])
+        hidden = int((person.mask & ~seen).sum())
+        return composite_people(room, [person, *bystanders], self.things), _mask(seen), _mask(people), hidden
 
     def _exposed(self, light: Array, seconds: float) -> np.ndarray:
         scene = self.spec.scene
-        return exposed(light, scene.noise, self.rng, brightness(scene, seconds, self._length))[..., ::-1]
+        return expose(light, scene.noise, self.rng, lamp_brightness(scene, seconds, self._length))[..., ::-1]
 
 
-def body_of(bystander: Bystander) -> Mannequin:
-    """The body that a bystander's seed draws."""
+def bystander_body(bystander: Bystander) -> Mannequin:
+    """The body drawn by a bystander's seed."""
     kind = None if bystander.kind == "random" else bystander.kind
     return Mannequin.draw(np.random.default_rng([bystander.seed, 0]), kind)
 
 
 def _camouflaged(clothes: Clothes, wall: Array, share: float) -> Clothes:
-    """Clothes whose shirt and trousers are by `share` of the wall's colour."""
+    """Clothes with shirt and trousers blended by `share` with the wall's colour."""
     near = {name: tuple((1 - share) * np.array(clothes.colours[name]) + share * wall) for name in ("shirt", "trousers")}
     return replace(clothes, colours=clothes.colours | near, stripes=(1 - share) * clothes.stripes)
 

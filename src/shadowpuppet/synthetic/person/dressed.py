@@ -13,6 +13,4 @@ from shadowpuppet.synthetic.person.trunk import shoulders, trunk
 def dressed(body: Mannequin, clothes: Clothes) -> Surface:
     """The surface of `body` in `clothes`."""
     left = [*arm(body, clothes), *leg(body, clothes)]
-    return Surface.of(
-        [*trunk(body, clothes), *shoulders(body, clothes), *head(body, clothes), *left, *(loft.mirrored() for loft in left)]
-    )
+    return Surface.of([*trunk(body, clothes), *shoulders(body, clothes), *head(body, clothes), *left, *(loft.mirrored() for loft in left)])

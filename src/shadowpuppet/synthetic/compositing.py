@@ -1,4 +1,4 @@
-"""What a camera sees of one thing alone, and several of them put together by depth."""
+"""Layers, each what a camera sees of one object alone, and their composition by depth."""
 
 from __future__ import annotations
 
@@ -10,50 +10,55 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 FAR = 1e9
-"""Depth where nothing is, metres."""
+"""Depth of pixels that meet nothing, metres."""
 
 
 class Layer(NamedTuple):
-    """One thing as a camera sees it."""
+    """One object (a person, the furniture) as a camera sees it."""
 
     picture: Array
     """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
     alpha: Array
-    """Share of each pixel that the thing covers, of shape (H, W)."""
+    """Share of each pixel that the object covers, of shape (H, W)."""
     depth: Array
-    """Distance from the camera along the ray of each pixel's centre, of shape (H, W), metres; `FAR` where it is missed."""
+    """Distance from the camera along the rays of pixel centres, of shape (H, W), metres; `FAR` where it is missed."""
+
+    @property
+    def mask(self) -> np.ndarray:
+        """Exact silhouette at pixel centres, of shape (H, W), true or false."""
+        return self.depth < FAR
 
     @property
     def reach(self) -> Array:
-        """The depth, (H, W), also where a thing covers a part of the pixel but not its centre: that of the nearest neighbour."""
+        """The depth (H, W); for pixels covered in part but not at their centre that of the nearest neighbour."""
         import cv2
 
         around = cv2.erode(self.depth, np.ones((3, 3)))
         return np.where((self.depth >= FAR) & (self.alpha > 0), around, self.depth)
 
     def part(self, box: tuple[slice, slice]) -> Layer:
-        """What is in rows and columns of the picture."""
+        """A window of rows and columns."""
         return Layer(self.picture[box], self.alpha[box], self.depth[box])
 
     def over(self, below: Array) -> Array:
-        """This layer over a picture (H, W, 3)."""
+        """This layer drawn over a picture (H, W, 3)."""
         return self.picture + (1 - self.alpha)[..., None] * below
 
 
-def pictured(room: Array, people: Sequence[Layer], things: Sequence[Layer]) -> Array:
-    """People among things over the room's picture (H, W, 3): `composed`, but people are sorted in only where they are."""
-    picture = composed(room, things)
+def composite_people(room: Array, people: Sequence[Layer], things: Sequence[Layer]) -> Array:
+    """`composite` of people and things over the room's picture (H, W, 3), restricted to where people are for speed."""
+    picture = composite(room, things)
     covered = np.any([layer.alpha > 0 for layer in people], axis=0)
     rows, columns = (np.flatnonzero(covered.any(axis)) for axis in (1, 0))
     if len(rows):
         box = slice(max(rows[0] - 1, 0), rows[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
         picture = picture.copy()
-        picture[box] = composed(room[box], [layer.part(box) for layer in (*people, *things)])
+        picture[box] = composite(room[box], [layer.part(box) for layer in (*people, *things)])
     return picture
 
 
-def composed(room: Array, layers: Sequence[Layer]) -> Array:
-    """Layers over the room's picture (H, W, 3), at each pixel the farthest first."""
+def composite(room: Array, layers: Sequence[Layer]) -> Array:
+    """Layers drawn over the room's picture (H, W, 3), at each pixel the farthest first."""
     if len(layers) < 2:
         return layers[0].over(room) if layers else room
     depth = np.stack([layer.reach for layer in layers])
@@ -70,8 +75,8 @@ def composed(room: Array, layers: Sequence[Layer]) -> Array:
     return picture
 
 
-def in_front(layer: Layer, others: Sequence[Layer]) -> np.ndarray:
-    """Where (H, W) a layer is nearer than all others, at pixel centres."""
+def visible(layer: Layer, others: Sequence[Layer]) -> np.ndarray:
+    """Where a layer is nearer than all others at pixel centres, of shape (H, W)."""
     shown = layer.depth < FAR
     for other in others:
         shown &= layer.depth < other.depth

@@ -1,0 +1,47 @@
+"""Time offsets of films: what is wrong in one pair, or in some silhouettes, does not reach the others."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from shadowpuppet.calibration.time_offset import _compared, _Pair, _solved
+
+LATE = (0.0, 4.0, -2.0, 1.0)
+
+
+def pairs(**wrong: float) -> list[_Pair]:
+    """All pairs of four films that are `LATE`; some, such as p01, are off by so many sets."""
+    return [_Pair(i, j, LATE[j] - LATE[i] + wrong.get(f"p{i}{j}", 0.0), 10.0) for i, j in combinations(range(4), 2)]
+
+
+def signals(rng, late: int, sets: int = 90) -> np.ndarray:
+    """Tangent angles (2, 2, F) in pixels of two films, the second `late` sets late."""
+    t = np.arange(sets)
+    first = np.stack([30 * np.sin(0.21 * t) + 8 * np.sin(0.63 * t), 25 * np.cos(0.17 * t) + 6 * np.sin(0.5 * t)])
+    t = t - late
+    second = np.stack([30 * np.sin(0.21 * t) + 8 * np.sin(0.63 * t), 25 * np.cos(0.17 * t) + 6 * np.sin(0.5 * t)])
+    return np.stack([first, second]) + rng.normal(0, 0.5, (2, 2, sets))
+
+
+def test_offsets_of_pairs_that_fit():
+    late, known = _solved(4, pairs())
+    assert known.all()
+    np.testing.assert_allclose(late - late[0], LATE, atol=1e-3)
+
+
+@pytest.mark.parametrize("bad", ["p01", "p13", "p23"])
+def test_one_bad_pair_moves_no_film(bad):
+    late, _ = _solved(4, pairs(**{bad: 9.0}))
+    np.testing.assert_allclose(late - late[0], LATE, atol=0.1)
+
+
+def test_a_limb_that_is_missing_at_times_hides_no_offset():
+    rng = np.random.default_rng(3)
+    both = signals(rng, 5)
+    both[1, :, rng.choice(90, 14, replace=False)] += 400  # the tangent jumps to another limb
+    found = _compared(0, 1, both, 30)
+    assert found is not None
+    assert found.shift == pytest.approx(5, abs=0.2)
