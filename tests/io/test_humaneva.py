@@ -5,6 +5,7 @@ from __future__ import annotations
 import av
 import numpy as np
 import pytest
+from vicon import c3d
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli.app import run
@@ -15,7 +16,6 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.metrics import GROUPS
 from shadowpuppet.video import open_frames
-from vicon import c3d
 
 MARKERS = {"PELO": "pelvis", "TRXO": "neck", "HEDO": "head",
            **{f"{side[0].upper()}{marker}": f"{side}_{joint}" for side in ("left", "right") for marker, joint in

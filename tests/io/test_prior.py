@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
 from motions import gait, prior
+
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion.prior.settings import PriorSettings

@@ -90,7 +90,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
 @app.command
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
          quiet: Quiet = False, flags: ForSession = None, settings: ForLive = None, outlets: ForOutlets = None) -> None:
-    """Track a person before a camera as it happens, shown in a window or on a page for a browser; Ctrl-C ends it.
+    """Track a person before a camera as it happens, shown on a page for a browser; Ctrl-C ends it.
 
     Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
     No picture is kept unless --record is given. Joints go to no other program unless --osc, --websocket or --lsl is.

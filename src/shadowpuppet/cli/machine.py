@@ -9,7 +9,7 @@ from shadowpuppet.errors import BROKEN
 
 
 def doctor(*, as_json: AsJson = False) -> int:
-    """Say what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, window, cameras.
+    """Say what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, browser, cameras.
 
     Exit code 1: something that tracking needs does not work.
     """

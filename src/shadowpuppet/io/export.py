@@ -12,10 +12,10 @@ import numpy as np
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.npz import write_npz
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.bvh_writer import write_bvh
 from shadowpuppet.io.motion.c3d_writer import write_c3d
 from shadowpuppet.io.motion.glb import write_glb

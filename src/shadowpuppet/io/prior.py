@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.io.files.npz import BROKEN
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.prior.local_pca import Subspaces
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 

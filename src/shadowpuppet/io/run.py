@@ -24,12 +24,12 @@ from typing import Any, Self, TextIO
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.io.files.npz import BROKEN
 from shadowpuppet.io.files.plain import for_json, for_toml, plain
 from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.table import joint_columns, joint_names
 from shadowpuppet.motion.motion import STATUSES, Motion, MotionBuilder, MotionFrame
 

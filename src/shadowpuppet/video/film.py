@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, reason
 from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, reason, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
 if TYPE_CHECKING:
     from av import VideoFrame

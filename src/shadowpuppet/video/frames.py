@@ -59,8 +59,3 @@ def check_size(name: object, n: int, time: float, image: Image, size: Size) -> N
     if found != size:
         raise VideoError(f"{name}: frame {n} ({time:.3f} s) is {found[0]} x {found[1]} pixels, those before it "
                          f"{size[0]} x {size[1]}; all frames must have one size")
-
-
-def reason(error: BaseException) -> str:
-    """What an error of the system or a codec says, without its numbers and paths."""
-    return (getattr(error, "strerror", None) or str(error)).lower()

@@ -9,9 +9,9 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from shadowpuppet.errors import VideoError
+from shadowpuppet.errors import VideoError, reason
 from shadowpuppet.video.film import converter
-from shadowpuppet.video.frames import Image, Size, reason, size_of
+from shadowpuppet.video.frames import Image, Size, size_of
 
 if TYPE_CHECKING:
     from av.container import InputContainer

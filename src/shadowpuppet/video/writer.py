@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from shadowpuppet.errors import VideoError
-from shadowpuppet.video.frames import Image, Size, reason, size_of
+from shadowpuppet.errors import VideoError, reason
+from shadowpuppet.video.frames import Image, Size, size_of
 from shadowpuppet.video.images import check_image
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.errors import ShadowPuppetError, reason
+from shadowpuppet.io.files.text import write_whole
 
 PICTURES = (".pdf", ".png", ".svg")
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices
+from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices, reason
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration.bouguet import read_bouguet
 from shadowpuppet.io.calibration.draft import Draft, Found
@@ -18,7 +18,7 @@ from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts, files_
 from shadowpuppet.io.calibration.pose2sim import check_name, read_tables, tables_text
 from shadowpuppet.io.calibration.qualisys import read_qualisys
 from shadowpuppet.io.calibration.vicon import read_vicon
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.files.toml import FILE_LIMIT as FILE_LIMIT
 from shadowpuppet.io.files.toml import read_toml as read_toml
 

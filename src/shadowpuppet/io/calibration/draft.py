@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.errors import CalibrationError
+from shadowpuppet.errors import CalibrationError, reason
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.files.text import reason
 from shadowpuppet.io.files.toml import FILE_LIMIT
 
 

@@ -6,13 +6,7 @@ import contextlib
 import os
 from pathlib import Path
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
-
-
-def reason(error: OSError) -> str:
-    """What the system says, without numbers and paths."""
-    return (error.strerror or str(error) or "unknown reason").lower()
-
+from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 
 TEXT_LIMIT = 1_000_000_000
 """Bytes; no table or motion that fits into memory as numbers is longer."""

@@ -15,10 +15,9 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
-from shadowpuppet.io.files.text import reason
 from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.motion import JointTable
 
