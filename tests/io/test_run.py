@@ -148,7 +148,7 @@ def test_a_frame_that_does_not_fit_ends_the_run_but_keeps_it(tmp_path):
 CHILD = """
 import importlib.util, os, signal, sys
 spec = importlib.util.spec_from_file_location("run_tests", {tests!r})
-run_tests = importlib.util.module_from_spec(spec)
+run_tests = sys.modules["run_tests"] = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(run_tests)
 a_frame, writer = run_tests.a_frame, run_tests.writer
 {before}

@@ -8,13 +8,14 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from shadowpuppet.cli.flags import OutletFlags, PriorFlags, Quiet, given, output
+from shadowpuppet.errors import choices
+from shadowpuppet.io.motion import EXPORTS, READABLE
 
 ForOutlets = Annotated[OutletFlags | None, Parameter(name="*")]
 ForPrior = Annotated[PriorFlags | None, Parameter(name="*")]
 
 
-def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, .npz, .parquet, or .amc "
-                                                                             "beside its .asf.")], /, *,
+def fit_prior(motions: Annotated[list[Path], Parameter(help=f"Files of motion: {choices(READABLE)}; .amc with its .asf beside it.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
               rate: float = 60.0, body: Literal["anatomical", "cylinders"] = "anatomical", seed: int = 0,
               quiet: Quiet = False, flags: ForPrior = None) -> None:  # fmt: skip
@@ -81,21 +82,20 @@ def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, w
         show(trial_table(found, folder))
 
 
-def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, to: str = "bvh,c3d,trc,mot,csv,glb,npz",
+def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *,
+           to: Annotated[str, Parameter(help=f"Formats, separated by commas: {choices(EXPORTS)}; or all.")] = "bvh,c3d,trc,mot,csv,glb,npz",
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
            unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
 
     Parameters
     ----------
-    to
-        Formats, separated by commas: bvh, c3d, csv, glb, mot, npz, parquet, trc; or all.
     unit
         Of BVH files, which do not tell it; Blender takes m.
     """
     from shadowpuppet.cli.tables import pairs
     from shadowpuppet.cli.terminal import show, terminal
-    from shadowpuppet.io.export import EXPORTS, export_run
+    from shadowpuppet.io.export import export_run
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as shown:
@@ -105,8 +105,8 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         show(pairs([("made", "\n".join(map(str, written)))]))
 
 
-def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, .csv, .npz, .parquet, .trc, or .amc beside its .asf.")],
-            target: Annotated[Path, Parameter(help="File to be written: .bvh, .c3d, .csv, .glb, .mot, .npz, .parquet or .trc.")], /, *,
+def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(READABLE)}; .amc with its .asf beside it.")],
+            target: Annotated[Path, Parameter(help=f"File to be written: {choices(f'.{name}' for name in EXPORTS)}.")], /, *,
             all: Annotated[bool, Parameter(negative=(), show_default=False)] = False, rate: float | None = None,
             source_unit: Literal["m", "cm", "mm", "in"] | None = None, unit: Literal["m", "cm", "mm"] = "m",
             quiet: Quiet = False) -> None:  # fmt: skip
@@ -128,13 +128,13 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
     from shadowpuppet.cli.tables import pairs
     from shadowpuppet.cli.terminal import show, terminal
     from shadowpuppet.errors import SettingsError
-    from shadowpuppet.io.export import UNITS, convert_motion
+    from shadowpuppet.io.export import BVH_UNITS, convert_motion
 
     if rate is not None and not 0 < rate < 1e6:
         raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
     with terminal(quiet) as shown:
         shown.begin("converting")
-        told = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
+        told = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and BVH_UNITS[source_unit], target_unit=unit)
     if not quiet:
         show(pairs([("made", str(target)), ("of", told)]))
 

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, WHOLE, expected_metres
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.io.calibration.calibration_files import read_toml
+from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import checked, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings

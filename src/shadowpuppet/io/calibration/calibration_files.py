@@ -19,8 +19,6 @@ from shadowpuppet.io.calibration.pose2sim import check_name, read_tables, tables
 from shadowpuppet.io.calibration.qualisys import read_qualisys
 from shadowpuppet.io.calibration.vicon import read_vicon
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.files.toml import FILE_LIMIT as FILE_LIMIT
-from shadowpuppet.io.files.toml import read_toml as read_toml
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres of what lengths may be in."""

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.errors import CalibrationError, reason
+from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.files.toml import FILE_LIMIT
+from shadowpuppet.io.files.text import TOML_LIMIT, read_limited
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,7 @@ class Found(NamedTuple):
 
 def text_of(path: Path) -> str:
     """A calibration file's text. Raises `CalibrationError` where it cannot be read, is too long or no text."""
-    try:
-        if path.stat().st_size > FILE_LIMIT:
-            raise CalibrationError(f"{path}: found {path.stat().st_size} bytes, expected a calibration of at most {FILE_LIMIT}")
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be read ({reason(error)})") from None
-    except UnicodeDecodeError as error:
-        raise CalibrationError(f"{path}: found bytes that are no text at position {error.start}, expected a calibration file") from None
+    text = read_limited(path, TOML_LIMIT, CalibrationError, "a calibration file", "a calibration")
     if "\0" in text:
         raise CalibrationError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
     return text

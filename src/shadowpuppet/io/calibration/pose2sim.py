@@ -19,7 +19,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 from shadowpuppet.io.calibration.draft import Draft, Found
-from shadowpuppet.io.files.toml import read_toml
+from shadowpuppet.io.files.text import read_toml
 
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 """What a camera's section must have; `name` is the section's own where it is missing, `fisheye` false."""

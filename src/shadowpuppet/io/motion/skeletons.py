@@ -11,7 +11,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.amc import Z_UP, Capture, read_mocap
 from shadowpuppet.io.motion.bvh import END, Bvh, different, read_bvh
 from shadowpuppet.io.motion.joint_names import columns_of
-from shadowpuppet.io.motion.motion_files import AMC_RATE, turn_of, unit_of
+from shadowpuppet.io.motion.motion_files import AMC_RATE, rotation_to_z_up, unit_of
 from shadowpuppet.motion.animation import Y_UP, Animation
 
 ENDINGS = (".amc", ".bvh")
@@ -43,7 +43,7 @@ def read_animation(path: str | Path, rate: float | None = None, unit: float | No
 
 def _of_bvh(bvh: Bvh, unit: float | None) -> Animation:
     table = bvh.joints()
-    scale, up = unit_of(bvh.path, table) if unit is None else unit, turn_of(bvh.path, table)
+    scale, up = unit_of(bvh.path, table) if unit is None else unit, rotation_to_z_up(bvh.path, table)
     if not columns_of(table.names) and not _stands(bvh):
         up = Z_UP
     turns, shifts = bvh.turned()
