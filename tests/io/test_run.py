@@ -317,3 +317,9 @@ def test_measures_can_be_added_later(tmp_path):
     found = read_run(run.folder).metrics
     assert found["errors"] == {"mean_mm": 41.5}
     assert found["timings"] == run.metrics["timings"]
+
+
+def test_a_path_that_is_no_text_does_not_end_a_run(tmp_path):
+    with writer(tmp_path / "run", recording=Path("film\udcff.mp4")) as run:
+        run.write(a_frame(0))
+    assert read_run(tmp_path / "run").info["recording"] == "film?.mp4"

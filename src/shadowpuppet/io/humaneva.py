@@ -46,7 +46,7 @@ Part = Literal["validation", "training", "all"]
 
 
 class Sync(NamedTuple):
-    """An .ofs file: image `image` of a film matches frame `mocap` of the motion capture (both from 1), with `scale` such frames an image."""
+    """An .ofs file: image `image` of a film matches frame `mocap` of the motion capture (from 1); `scale`: such frames per image."""
 
     image: float
     mocap: float

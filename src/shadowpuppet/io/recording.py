@@ -11,7 +11,7 @@ from warnings import warn
 
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices, reason
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, find_calibration, read_calibration
 from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
@@ -88,7 +88,11 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     `CalibrationError` or `VideoError`, naming file and field, where something is missing or does not fit.
     """
     folder = Path(str(path))
-    if camera_number(path) is None and not folder.exists():
+    try:
+        exists = folder.exists()
+    except OSError as error:  # as for a name that is too long
+        raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
+    if camera_number(path) is None and not exists:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
     if folder.is_dir() and any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml")):
         return _read_folder(folder, fov, calibration)
