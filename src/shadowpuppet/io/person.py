@@ -8,7 +8,7 @@ from typing import Any
 
 from shadowpuppet.body.sizes import HEIGHTS, KINDS, CardboxSizes, Sizes, expected_metres, is_within, kind_of, sizes_kind
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
-from shadowpuppet.io.files.text import read_toml, write_whole
+from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
 
 KEYS = ("body", "height", "source", "notes", "sizes")
 DEFAULT_BODY = "rounded"
@@ -53,10 +53,8 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
     kind = sizes_kind(body)
     if not isinstance(sizes, dict):
         raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")
-    try:
+    with errors_named(path):
         person = Person(kind.from_mapping(sizes), **data)
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
     if wanted is not None and kind is not sizes_kind(wanted):
         raise FormatError(f"{path}: sizes: found those of the body {body!r}, expected those of {wanted!r}: choose that body, or measure "
                           "the person again")

@@ -26,7 +26,7 @@ import numpy as np
 from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.io.files.plain import for_json, for_toml, plain
 from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import read_toml, write_whole
+from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
 from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
@@ -202,12 +202,8 @@ def _read_tables(folder: Path, body_name: str, cut: bool) -> Motion:
     if cut and not (folder / "joints.csv").exists():
         raise FormatError(f"{folder}: the run ended before its first frame, so that there is nothing to read")
     joints, angles = (read_table(folder / name, cut) for name in FILES[:2])
-    try:
+    with errors_named(f"{folder}: joints.csv and angles.csv"):
         return read_run_tables(joints, angles, _common_frames(joints, angles, cut), body_name)
-    except FormatError:
-        raise
-    except ShadowPuppetError as error:
-        raise FormatError(f"{folder}: joints.csv and angles.csv: {error}") from None
 
 
 def _common_frames(joints: Table, angles: Table, cut: bool) -> int:

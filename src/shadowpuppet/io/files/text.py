@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,17 @@ def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: s
         raise error(f"{path}: cannot be read ({reason(problem)})") from None
     except UnicodeDecodeError as problem:
         raise error(f"{path}: found bytes that are no text at position {problem.start}, expected {kind}") from None
+
+
+@contextlib.contextmanager
+def errors_named(where: object) -> Iterator[None]:
+    """Raises `ShadowPuppetError` as `FormatError` that begins with the file."""
+    try:
+        yield
+    except FormatError:
+        raise
+    except ShadowPuppetError as error:
+        raise FormatError(f"{where}: {error}") from None
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

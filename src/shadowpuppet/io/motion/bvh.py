@@ -9,10 +9,10 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.io.files.table import shorten
-from shadowpuppet.io.files.text import read_text
+from shadowpuppet.io.files.text import errors_named, read_text
 from shadowpuppet.motion.motion import JointTable
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
@@ -55,10 +55,8 @@ class Bvh:
         added = [self._is_added(n) for n in range(len(self.nodes))]
         for start in range(0, len(self.values), BLOCK):
             places[start : start + BLOCK] = self._placed(*self._local(self.values[start : start + BLOCK], added))
-        try:
+        with errors_named(self.path):
             return JointTable(np.arange(len(places), dtype=float) * self.step, unique_names([node.name for node in self.nodes]), places)
-        except ShadowPuppetError as error:
-            raise FormatError(f"{self.path}: {error}") from None
 
     def local_transforms(self) -> tuple[Array, Array]:
         """Rotations (T, J, 3, 3) and positions (T, J, 3) of the nodes relative to their parents, in the file's unit and axes."""

@@ -15,9 +15,10 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices, reason
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning, choices, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import errors_named
 from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.motion import JointTable
 
@@ -88,10 +89,8 @@ def read_c3d(path: str | Path) -> JointTable:
     positions, measured = _points(header, chosen)
     positions *= _metres(header)
     positions[~measured | ~(np.abs(positions) < MAX_COORDINATE).all(2)] = np.nan
-    try:
+    with errors_named(path):
         return JointTable(np.arange(len(positions)) / header.rate, tuple(names[n] for n in chosen), positions)
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def read_header(path: Path) -> C3d:

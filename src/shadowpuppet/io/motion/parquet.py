@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.files.table import shorten
-from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.motion.table import Columns, column_joints, joint_columns
 from shadowpuppet.motion.motion import JointTable
 
@@ -56,10 +56,8 @@ def read_parquet(path: str | Path) -> JointTable:
     except (OSError, arrow.ArrowException, ValueError, KeyError) as error:
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FormatError(f"{path}: no Parquet table of joints ({shorten([first])})") from None
-    try:
+    with errors_named(path):
         return JointTable(values[:, 0], names, values[:, 1:].reshape(len(values), len(names), 3))
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _arrow(path: str | Path) -> tuple[ModuleType, ModuleType]:

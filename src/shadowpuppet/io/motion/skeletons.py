@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
+from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.files.text import errors_named
 from shadowpuppet.io.motion.amc import Z_UP, Capture, read_mocap
 from shadowpuppet.io.motion.bvh import END, Bvh, read_bvh, unique_names
 from shadowpuppet.io.motion.joint_names import columns_of
@@ -31,14 +32,10 @@ def read_animation(path: str | Path, rate: float | None = None, unit: float | No
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:
         raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(ENDINGS)}")
-    try:
+    with errors_named(path):
         if path.suffix.lower() == ".amc":
             return _of_capture(read_mocap(path), rate or AMC_RATE)
         return _of_bvh(read_bvh(path), unit)
-    except FormatError:
-        raise
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _of_bvh(bvh: Bvh, unit: float | None) -> Animation:

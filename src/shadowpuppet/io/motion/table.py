@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
+from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
 
@@ -66,12 +66,8 @@ def write_joints(path: str | Path, table: JointTable) -> None:
 def _read_csv(path: Path) -> JointTable:
     table = read_table(path)
     names, times = column_joints(path, table.columns), table.times()
-    try:
+    with errors_named(path):
         return JointTable(times, names, _joints(table, names))
-    except FormatError:
-        raise
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _joints(table: Table, names: tuple[str, ...], suffix: str = "") -> Array:

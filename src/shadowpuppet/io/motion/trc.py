@@ -10,7 +10,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.io.files.table import cells, check_times, number, shorten
-from shadowpuppet.io.files.text import read_text, write_whole
+from shadowpuppet.io.files.text import errors_named, read_text, write_whole
 from shadowpuppet.motion.motion import JointTable
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -35,7 +35,8 @@ def read_trc(path: str | Path) -> JointTable:
     values = np.array([_row(path, i, columns, row) for i, row in numbered]).reshape(len(numbered), len(columns) - 1)
     check_times(path, values[:, 0], [i for i, _ in numbered])
     _check_count(path, header, len(numbered))
-    return _table(path, values[:, 0], names, values[:, 1:].reshape(-1, len(names), 3) * scale)
+    with errors_named(path):
+        return JointTable(values[:, 0], names, values[:, 1:].reshape(-1, len(names), 3) * scale)
 
 
 def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
@@ -93,13 +94,6 @@ def _check_count(path: Path, header: dict[str, str], count: int) -> None:
     if said != str(count):
         warn(f"{path}: line 3, NumFrames: found {said!r}, but the file has {count} frames; those are used", ShadowPuppetWarning,
              stacklevel=3)
-
-
-def _table(path: Path, times: np.ndarray, names: tuple[str, ...], positions: np.ndarray) -> JointTable:
-    try:
-        return JointTable(times, names, positions)
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _rate(table: JointTable) -> str:
