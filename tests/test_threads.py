@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 import cv2
+import made
 import pytest
 
-import made
 from shadowpuppet.threads import LIMIT, limit_threads, thread_limit, usable_cores
 
 
