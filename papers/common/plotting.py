@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.files.text import reason
+from shadowpuppet.errors import ShadowPuppetError, reason
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,7 @@ from pathlib import Path
 
 from papers.common.experiment import Experiment, Outcome, Request
 from papers.common.writing import claims_table, markdown, write_outcome
-from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.files.text import reason
+from shadowpuppet.errors import ShadowPuppetError, reason
 
 
 def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequence[str] | None = None,

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
     from shadowpuppet.io.export import convert_motion, export_run
     from shadowpuppet.io.humaneva import read_humaneva
-    from shadowpuppet.io.motion.motion_files import read_motion
+    from shadowpuppet.io.motion.motion_files import read_motion, read_truth
     from shadowpuppet.io.motion.table import read_joints, write_joints
-    from shadowpuppet.io.motion.truth import read_truth
     from shadowpuppet.io.person import Person, read_person, write_person
     from shadowpuppet.io.prior import read_prior, write_prior
     from shadowpuppet.io.recording import Recording, read_recording
@@ -66,7 +65,7 @@ _HOMES = {
     "read_humaneva": "io.humaneva", "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
     "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation.evaluation",
-    "Evaluation": "evaluation.evaluation", "measure_run": "evaluation.evaluation", "read_truth": "io.motion.truth",
+    "Evaluation": "evaluation.evaluation", "measure_run": "evaluation.evaluation", "read_truth": "io.motion.motion_files",
     "write_report": "evaluation.report.page", "open_footage": "pipeline.footage", "read_masks": "pipeline.footage",
 }  # fmt: skip
 """Where each public name lives."""

@@ -55,5 +55,10 @@ def shown(value: object) -> str:
     return repr(plain() if callable(plain) else value)
 
 
+def reason(error: BaseException) -> str:
+    """What the system or a codec says of an error, without its number and path."""
+    return (getattr(error, "strerror", None) or str(error) or "unknown reason").lower()
+
+
 class ShadowPuppetWarning(UserWarning):
     """A problem that does not stop the work."""

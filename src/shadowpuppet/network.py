@@ -1,19 +1,25 @@
-"""Addresses of machines: which are this one's own, which a browser may mean, and how they are written."""
+"""Network addresses, and what all servers here share: ports tried, requests accepted, headers of answers, opening the browser."""
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
+import os
 import socket
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, reason
 
 LOCAL = "127.0.0.1"
-"""This machine, for itself alone."""
+"""The loopback address."""
+Server = TypeVar("Server")
 
 
 def host_and_port(text: str, field: str) -> tuple[str, int]:
-    """Host and port of `[HOST:]PORT`, with this machine where no host is given; an IPv6 address stands in brackets.
+    """Host and port of `[HOST:]PORT`; the host is `LOCAL` if left out, and an IPv6 address stands in brackets.
 
     Raises `SettingsError` naming the field.
     """
@@ -26,15 +32,79 @@ def host_and_port(text: str, field: str) -> tuple[str, int]:
 
 
 def is_loopback(listen: str) -> bool:
-    """Whether an address is reached from this machine alone."""
+    """Whether only this machine can reach an address."""
     address = address_of(listen)
     return listen == "localhost" or (address is not None and address.is_loopback)
 
 
-def known_host(header: str, loopback: bool) -> bool:
-    """Whether a request's Host is an address, or this machine's name; on the loopback, whether it is that.
+def address_of(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """The IP address that a text is; None for a name."""
+    try:
+        return ipaddress.ip_address(text)
+    except ValueError:
+        return None
 
-    Other sites can have their names lead here, but not an address.
+
+def shown_host(listen: str) -> str:
+    """The host to put into a URL of a server that listens at an address."""
+    address = address_of(listen)
+    if address is not None and address.is_unspecified:
+        return socket.gethostname()
+    return f"[{listen}]" if ":" in listen else listen
+
+
+def address_family(listen: str) -> socket.AddressFamily:
+    """IPv6 or IPv4, by how an address is written."""
+    return socket.AF_INET6 if ":" in listen else socket.AF_INET
+
+
+# Ports
+
+
+def open_page(open_at: Callable[[int], Server], listen: str, port: int | None, usual: int) -> Server:
+    """What `open_at` returns for the first port that is free: `port`, or if it is None `usual`, else any.
+
+    Raises `SettingsError` where `open_at` raises `OSError` or `OverflowError` for all of them.
+    """
+    why = ""
+    for tried in (usual, 0) if port is None else (port,):
+        try:
+            return open_at(tried)
+        except (OSError, OverflowError) as error:
+            why = reason(error)
+    of = f"listen: {listen}" if port is None else f"listen: {listen}, port: {port}"
+    raise SettingsError(f"{of}: the page cannot be served there ({why}); --listen takes an address of this machine, --port a free port")
+
+
+def open_browser(address: str) -> None:
+    """Open a page in this machine's browser; does nothing without a screen."""
+    if has_screen():
+        import webbrowser
+
+        with contextlib.suppress(webbrowser.Error):
+            webbrowser.open(address)
+
+
+def has_screen() -> bool:
+    """Whether there is probably a screen: on Windows and macOS unless logged in by SSH, elsewhere if a display is set."""
+    if sys.platform in ("win32", "darwin"):
+        return "SSH_CONNECTION" not in os.environ
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+# Requests. `headers` are a request's: an `email.message.Message`, or the `Headers` of websockets.
+
+
+def is_own_host(headers: Any, loopback: bool) -> bool:
+    """Whether a request has one Host header, and that means this machine (`known_host`)."""
+    hosts = headers.get_all("Host") or []
+    return len(hosts) == 1 and known_host(hosts[0], loopback)
+
+
+def known_host(header: str, loopback: bool) -> bool:
+    """Whether a Host header is an IP address or this machine's name; for a server on the loopback, whether it is a loopback one.
+
+    Another site can let its own name resolve to this machine (DNS rebinding), but not an address.
     """
     name = host_of(f"//{header}")
     if name == "localhost":
@@ -45,25 +115,27 @@ def known_host(header: str, loopback: bool) -> bool:
     return address.is_loopback or not loopback
 
 
+def is_same_origin(headers: Any) -> bool:
+    """Whether a request comes from a page of the same server, or from no page."""
+    host = (headers.get_all("Host") or [""])[0].lower()
+    return all(origin.lower().partition("://")[2] == host for origin in headers.get_all("Origin") or [])
+
+
+def are_origins_allowed(headers: Any, allowed: frozenset[str]) -> bool:
+    """Whether a request comes from a page of this machine, of an origin in `allowed` (* for any), or from no page."""
+    return all(is_loopback(host_of(origin)) or origin in allowed or "*" in allowed for origin in headers.get_all("Origin") or [])
+
+
 def host_of(url: str) -> str:
-    """The host that an address of the web names; empty where it names none."""
+    """The host in a URL; empty where it has none."""
     try:
         return urlsplit(url).hostname or ""
     except ValueError:
         return ""
 
 
-def address_of(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """An address, where a text is one."""
-    try:
-        return ipaddress.ip_address(text)
-    except ValueError:
-        return None
-
-
-def shown_host(listen: str) -> str:
-    """How a browser, or another program, is told to find what listens at an address."""
-    address = address_of(listen)
-    if address is not None and address.is_unspecified:
-        return socket.gethostname()
-    return f"[{listen}]" if ":" in listen else listen
+def page_headers(policy: str) -> dict[str, str]:
+    """Headers of every answer, so that pages of other sites can neither embed nor read it; `policy`: Content-Security-Policy."""
+    return {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Content-Security-Policy": f"{policy}; frame-ancestors 'none'"}

@@ -14,7 +14,7 @@ import pytest
 from shadowpuppet.calibration.overview import MAP_COLUMNS, look_at_calibration, map_cells, meeting_point
 from shadowpuppet.cli.app import run
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.io.calibration.calibration_files import read_calibration, stood_up, write_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration, rotated_up, write_calibration
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_the_map_counts_who_sees_a_person_whole(path, rig):
 @pytest.mark.parametrize(("up", "told"), [("y", "y"), ("-y", "-y"), ("x", "x")])
 def test_a_world_that_is_not_upright_is_doubted_with_the_way_up(tmp_path, rig, up, told):
     back = {"y": "-y", "-y": "y", "x": "-x", "-x": "x"}[up]
-    write_calibration(tmp_path / "c.toml", stood_up(tuple(rig), back))
+    write_calibration(tmp_path / "c.toml", rotated_up(tuple(rig), back))
     (doubt, *_) = look_at_calibration(tmp_path / "c.toml")[0].doubts
     assert f"its direction {told} is" in doubt
     assert f"--up {told}" in doubt

@@ -46,7 +46,7 @@ def test_json_has_everything(told):
     read = json.loads(out)
     assert (code, read["works"]) == (0, True)
     names = [finding["name"] for finding in read["findings"]]
-    assert {"Python", "libraries", "kernels", "films", "codecs", "processor", "window", "browser", "cameras"} <= set(names)
+    assert {"Python", "libraries", "kernels", "films", "codecs", "processor", "browser", "cameras"} <= set(names)
     assert {f"extra {extra}" for extra in doctor.EXTRAS} <= set(names)
     assert all(finding["remedy"] for finding in read["findings"] if finding["state"] == "missing")
 
@@ -110,16 +110,6 @@ def test_what_is_not_there_is_told_with_what_would_bring_it(monkeypatch):
     assert named(found)["extra view"].remedy == "pip install 'shadowpuppet[view]'"
     assert named(found)["codecs"].told == "H.264 can be read; not Nonsense"
     assert "NUMBA_CACHE_DIR" in named(found)["compiled code"].remedy
-
-
-def test_a_window_that_cannot_be_opened_is_told(monkeypatch):
-    from shadowpuppet.live.display import choice, window
-
-    monkeypatch.setattr(choice, "has_screen", lambda: True)
-    monkeypatch.setattr(window, "no_window", lambda: "Python's tkinter is not installed")
-    (found,) = doctor._window()
-    assert (found.state, found.needed) == ("missing", False)
-    assert "apt install python3-tk" in found.remedy
 
 
 def test_an_old_python_breaks_the_core(monkeypatch):

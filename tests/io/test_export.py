@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
+from pathlib import Path
 
 import acclaim
 import biovision
@@ -12,11 +14,12 @@ import pytest
 import runs
 
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.io.export import CONVERSIONS, EXPORTS, export_run
+from shadowpuppet.io.export import FORMATS, export_run
+from shadowpuppet.io.motion import EXPORTS
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.c3d import read_c3d, read_header
-from shadowpuppet.io.motion.mot import read_mot
 from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.opensim import read_mot
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Y_UP
@@ -139,8 +142,14 @@ def test_a_person_measured_anew_is_said(tmp_path, whole):
         export_run(folder, ["bvh"])
 
 
+def test_every_format_is_written_and_in_the_manual():
+    manual = (Path(__file__).parents[2] / "docs" / "formats.md").read_text("utf-8").partition("## Motion for other programs")[2]
+    assert tuple(FORMATS) == EXPORTS
+    assert set(re.findall(r"^\| `(\w+)` \|", manual.partition("- **Axes.**")[0], re.MULTILINE)) == set(EXPORTS)
+
+
 @pytest.mark.filterwarnings("ignore:.*Y points up:shadowpuppet.errors.ShadowPuppetWarning")
-@pytest.mark.parametrize("target", CONVERSIONS)
+@pytest.mark.parametrize("target", [f".{name}" for name in EXPORTS])
 def test_joints_become_any_other_file(shell, whole, tmp_path, target):
     code, out, err = shell("convert", whole / "joints.csv", tmp_path / f"made{target}")
     assert code == 0, err

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from motions import gait, prior
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.io.motion.npz import read_npz
 from shadowpuppet.io.prior import read_prior, write_prior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
@@ -138,3 +139,13 @@ def test_an_array_that_claims_to_be_larger_than_memory_is_said(tmp_path):
 def test_a_folder_that_is_missing_is_said(tmp_path):
     with pytest.raises(ShadowPuppetError, match=r"prior.npz: cannot be written \(no such file"):
         write_prior(tmp_path / "no" / "prior.npz", prior(np.random.default_rng(0)))
+
+
+@pytest.mark.parametrize(("name", "content"), [("format.npy", b"\x93NUMPY\x01\x00\x0a\x00{'descr':(\n"), ("format", b"no array")])
+def test_members_that_are_no_arrays_are_said(tmp_path, name, content):
+    with zipfile.ZipFile(tmp_path / "prior.npz", "w") as archive:
+        archive.writestr(name, content)
+    with pytest.raises(FormatError, match=r"prior\.npz: cannot be read as a motion prior"):
+        read_prior(tmp_path / "prior.npz")
+    with pytest.raises(FormatError, match=r"prior\.npz: no joints"):
+        read_npz(tmp_path / "prior.npz")

@@ -258,3 +258,8 @@ def test_shared_recordings_are_read(shared):
         height = found.subject.height
         assert len(found.references) == (3 if (folder / "references").exists() else 0)
         assert height is None or math.isclose(height, 1.83)
+
+
+def test_a_name_that_is_too_long_is_said():
+    with pytest.raises(RecordingError, match=r"cannot be read \(file name too long\)|no such recording"):
+        read_recording("a" * 300)

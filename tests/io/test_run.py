@@ -148,7 +148,7 @@ def test_a_frame_that_does_not_fit_ends_the_run_but_keeps_it(tmp_path):
 CHILD = """
 import importlib.util, os, signal, sys
 spec = importlib.util.spec_from_file_location("run_tests", {tests!r})
-run_tests = importlib.util.module_from_spec(spec)
+run_tests = sys.modules["run_tests"] = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(run_tests)
 a_frame, writer = run_tests.a_frame, run_tests.writer
 {before}
@@ -317,3 +317,9 @@ def test_measures_can_be_added_later(tmp_path):
     found = read_run(run.folder).metrics
     assert found["errors"] == {"mean_mm": 41.5}
     assert found["timings"] == run.metrics["timings"]
+
+
+def test_a_path_that_is_no_text_does_not_end_a_run(tmp_path):
+    with writer(tmp_path / "run", recording=Path("film\udcff.mp4")) as run:
+        run.write(a_frame(0))
+    assert read_run(tmp_path / "run").info["recording"] == "film?.mp4"

@@ -1,10 +1,9 @@
-"""What a session shows: drawn pictures, the page and who may see it, the window."""
+"""What a session shows: drawn pictures, the page and who may see it."""
 
 from __future__ import annotations
 
 import http.client
 import json
-import os
 import shutil
 import socket
 import subprocess
@@ -17,13 +16,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shadowpuppet import network
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
-from shadowpuppet.live.display import choice, window
 from shadowpuppet.live.display.choice import open_display
 from shadowpuppet.live.display.drawing import drawn
 from shadowpuppet.live.display.view import Angle, Display, View
 from shadowpuppet.live.display.web import PORT, WebDisplay
-from shadowpuppet.live.display.window import WindowDisplay
 from shadowpuppet.network import is_loopback, known_host
 from shadowpuppet.video import read_image
 
@@ -171,17 +169,17 @@ def test_views_without_a_picture_do_not_blank_the_page(page):
     assert page.next(0, 0.0)[1].chip == "paused"
 
 
-def test_buttons_are_wishes_once(page):
-    for wish in ("learn", "measure", "stop"):
-        assert ask(page, f"/wish/{wish}", "POST", {"X-Shadowpuppet": "1"})[0].status == 200
-        assert (page.wish(), page.wish()) == (wish, "")
-    assert ask(page, "/wish/fly", "POST", {"X-Shadowpuppet": "1"})[0].status == 404
+def test_buttons_are_commands_once(page):
+    for command in ("learn", "measure", "stop"):
+        assert ask(page, f"/command/{command}", "POST", {"X-Shadowpuppet": "1"})[0].status == 200
+        assert (page.command(), page.command()) == (command, "")
+    assert ask(page, "/command/fly", "POST", {"X-Shadowpuppet": "1"})[0].status == 404
 
 
 def test_other_sites_cannot_press_buttons(page):
-    assert ask(page, "/wish/stop", "POST")[0].status == 403
-    assert ask(page, "/wish/stop", "POST", {"Host": "evil.example", "X-Shadowpuppet": "1"})[0].status == 421
-    assert page.wish() == ""
+    assert ask(page, "/command/stop", "POST")[0].status == 403
+    assert ask(page, "/command/stop", "POST", {"Host": "evil.example", "X-Shadowpuppet": "1"})[0].status == 421
+    assert page.command() == ""
 
 
 @pytest.mark.parametrize("path", ["/", "/picture.jpg", "/picture.mjpeg", "/events"])
@@ -190,6 +188,13 @@ def test_names_that_were_turned_to_this_machine_are_refused(page, path):
     answer, body = ask(page, path, headers={"Host": f"evil.example:{page.server.server_port}"})
     assert answer.status == 421
     assert b"\xff\xd8" not in body
+
+
+def test_two_hosts_are_refused(page):
+    with socket.create_connection(page.server.server_address) as raw:
+        raw.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: evil.example\r\n\r\n")
+        raw.settimeout(5)
+        assert raw.recv(100).split(b"\r\n")[0].split()[1] == b"421"
 
 
 @pytest.mark.parametrize(("host", "loopback", "good"), [
@@ -234,21 +239,27 @@ def test_a_taken_port_is_refused_and_without_one_another_is_found():
 def test_where_nothing_is_to_be_shown_nothing_is():
     display = open_display("none")
     assert type(display) is Display
-    assert (display.where, display.wish()) == ("", "")
+    assert (display.where, display.command()) == ("", "")
     with display:
         display.show(tracked())
 
 
-def test_without_a_screen_it_is_a_page(monkeypatch):
-    monkeypatch.setattr(choice, "has_screen", lambda: False)
-    display = open_display("auto", port=0)
+@pytest.mark.parametrize(("show", "screen", "opened"), [("auto", True, 1), ("auto", False, 0), ("browser", True, 0)])
+def test_the_page_is_opened_where_there_is_a_screen(show, screen, opened, monkeypatch):
+    addresses = []
+    monkeypatch.setattr(network, "has_screen", lambda: screen)
+    monkeypatch.setattr("webbrowser.open", addresses.append)
+    with open_display(show, port=0) as display:
+        assert isinstance(display, WebDisplay)
+        assert addresses == [display.address] * opened
+        assert "joints and angles alone are saved" in display.footer
+
+
+def test_what_is_recorded_is_said():
+    display = open_display("browser", port=0, record=True)
     assert isinstance(display, WebDisplay)
-    assert "joints and angles alone are saved" in display.footer
+    assert "recorded" in display.footer
     display.server.server_close()
-    recorded = open_display("browser", port=0, record=True)
-    assert isinstance(recorded, WebDisplay)
-    assert "recorded" in recorded.footer
-    recorded.server.server_close()
 
 
 def test_a_page_that_others_can_see_is_said():
@@ -258,62 +269,28 @@ def test_a_page_that_others_can_see_is_said():
     display.server.server_close()
 
 
-def test_a_window_that_cannot_be_opened_is_said(monkeypatch):
-    monkeypatch.setattr(window, "no_window", lambda: "no display name")
-    with pytest.raises(SettingsError, match=r"show: no window can be opened \(no display name\); --show browser"):
+def test_the_window_that_is_gone_names_its_successor():
+    with pytest.raises(SettingsError, match=r"show: found 'window', which is gone: --show browser shows the same on a page"):
         open_display("window")
-    monkeypatch.setattr(choice, "has_screen", lambda: True)
-    display = open_display("auto", port=0)
-    assert isinstance(display, WebDisplay)
-    display.server.server_close()
 
 
-@pytest.fixture
-def screen(monkeypatch):
-    """A screen; one in memory where there is none."""
-    if not window.no_window():
-        yield
-        return
-    server = shutil.which("Xvfb")
-    if server is None:
-        pytest.skip(f"no screen ({window.no_window()}) and no Xvfb")
-    read, write = os.pipe()
-    command = [server, "-displayfd", str(write), "-screen", "0", "1280x800x24"]
-    with subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL) as child:
-        os.close(write)
-        with os.fdopen(read) as told:
-            monkeypatch.setenv("DISPLAY", f":{told.readline().strip()}")
-        if window.no_window():
-            child.terminate()
-            pytest.skip(window.no_window())
-        yield
-        child.terminate()
-
-
-def test_the_window_shows_the_view_and_takes_keys(screen):
-    with WindowDisplay("nothing is kept") as display:
-        for n in range(3):
-            display.show(tracked(latency=0.01 * n))
-        texts = {display.canvas.itemcget(item, "text") for item in display.canvas.find_all() if display.canvas.type(item) == "text"}
-        assert {"shadowpuppet", "tracked", "20 ms", "15.0 frames/s", "0.91", "left bend", "20°", "nothing is kept"} <= texts
-        photo = display._photo
-        shown = drawn(tracked())
-        assert shown is not None
-        assert (photo.width(), photo.height()) == (640, 480)
-        assert photo.get(320, 100) == tuple(shown[100, 320, ::-1].tolist())
-        display.show(tracked(trouble="the camera is gone"))
-        assert any(display.canvas.itemcget(item, "text") == "the camera is gone" for item in display.canvas.find_withtag("drawn")
-                   if display.canvas.type(item) == "text")
-        for key, wish in (("q", "stop"), ("b", "learn"), ("m", "measure")):
-            display.root.focus_force()
-            display.root.event_generate(f"<KeyPress-{key}>")
-            display.root.update()
-            assert (display.wish(), display.wish()) == (wish, "")
-        display.root.tk.call(*display.root.tk.splitlist(display.root.protocol("WM_DELETE_WINDOW")))
-        assert display.wish() == "stop"
-        display.root.destroy()  # as where the screen is gone
-        display.show(tracked())
-        assert display.wish() == "stop"
+def test_keys_of_the_page_are_commands(page):
+    playwright = pytest.importorskip("playwright.sync_api")
+    program = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+    if program is None:
+        pytest.skip("no Chromium here")
+    with playwright.sync_playwright() as tool:
+        try:
+            browser = tool.chromium.launch(executable_path=program, args=["--no-sandbox", "--disable-dev-shm-usage"])
+        except playwright.Error as error:
+            pytest.skip(f"Chromium cannot be run here: {str(error)[:200]}")
+        opened = browser.new_page()
+        opened.goto(page.address, wait_until="domcontentloaded")  # the stream of pictures never ends
+        for key, command in (("q", "stop"), ("Escape", "stop"), ("b", "learn"), ("m", "measure"), ("x", ""), ("Control+b", "")):
+            opened.keyboard.press(key)
+            opened.wait_for_timeout(500)
+            assert (page.command(), page.command()) == (command, ""), key
+        browser.close()
 
 
 def test_a_browser_shows_the_page(page, tmp_path):

@@ -209,7 +209,7 @@ class Presses(Display):
     def __init__(self, heard, frames):
         self.heard, self.frames = heard, frames
 
-    def wish(self):
+    def command(self):
         return "stop" if self.heard.frames >= self.frames else ""
 
 
@@ -323,7 +323,7 @@ def test_a_camera_that_is_unplugged_is_said_once_and_taken_up_again(pictures, tm
         def show(self, view):
             views.append(view)
 
-        def wish(self):
+        def command(self):
             back = any(note.startswith("pictures come again") for note in heard.notes)
             return "stop" if back and views[-1].status == "tracked" else ""
 

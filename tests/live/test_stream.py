@@ -21,7 +21,7 @@ import runs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from listeners import OscEar, composed, osc_messages
-from pythonosc.osc_message import OscMessage
+from pythonosc.osc_message_builder import build_msg
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -35,10 +35,9 @@ from shadowpuppet.live.stream import websocket
 from shadowpuppet.live.stream.avatar import Avatar
 from shadowpuppet.live.stream.choice import open_outlets
 from shadowpuppet.live.stream.json_messages import beginning, framed
-from shadowpuppet.live.stream.osc import Message, Sender, bundles, encoded
 from shadowpuppet.live.stream.outlet import Outlet, Outlets, Subject
 from shadowpuppet.live.stream.settings import OutletSettings
-from shadowpuppet.live.stream.vmc import VmcOutlet, messages
+from shadowpuppet.live.stream.vmc import VmcOutlet, bundles, messages
 from shadowpuppet.live.stream.websocket import WebSocketOutlet
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.network import host_and_port
@@ -55,11 +54,11 @@ def subject(name: str = "rounded") -> Subject:
 
 
 def posed(who: Subject, **angles):
-    return who.told(MotionFrame(1.25, "tracked", who.body.skeleton.pose(**angles), overlap=0.9))
+    return who.stream_frame(MotionFrame(1.25, "tracked", who.body.skeleton.pose(**angles), overlap=0.9))
 
 
 def heard(who: Subject, told):
-    return osc_messages(bundles(messages(Avatar(who), told)))
+    return osc_messages(bundle.dgram for bundle in bundles(messages(Avatar(who), told)))
 
 
 def bones(who: Subject, told) -> dict[str, list[float]]:
@@ -76,38 +75,36 @@ def test_places_are_those_that_a_run_has(name, rng):
     names = [landmark for landmark in who.names if landmark in who.body.landmark_names]
     wanted = who.body.points(poses, who.T_world_base, names)
     for pose, places in zip(poses, wanted):
-        told = who.told(MotionFrame(0.0, "tracked", pose))
-        np.testing.assert_allclose(told.places[[who.names.index(n) for n in names]], places, atol=1e-12)
-        np.testing.assert_allclose(told.turns @ np.swapaxes(told.turns, 1, 2), np.broadcast_to(np.eye(3), told.turns.shape), atol=1e-12)
+        told = who.stream_frame(MotionFrame(0.0, "tracked", pose))
+        np.testing.assert_allclose(told.positions[[who.names.index(n) for n in names]], places, atol=1e-12)
+        R = told.rotations
+        np.testing.assert_allclose(R @ np.swapaxes(R, 1, 2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12)
 
 
 @pytest.mark.parametrize(("status", "pose"), [("lost", np.zeros(12)), ("absent", None), ("tracked", None),
                                               ("tracked", np.full(12, np.nan))])
 def test_a_frame_without_a_pose_tells_none(status, pose):
-    told = subject().told(MotionFrame(0.5, status, pose))
-    assert (told.time, told.status, told.pose, told.places, told.turns) == (0.5, status, None, None, None)
+    told = subject().stream_frame(MotionFrame(0.5, status, pose))
+    assert (told.time, told.status, told.pose, told.positions, told.rotations) == (0.5, status, None, None, None)
 
 
 # OSC
 
 
-arguments = st.integers(-(2**31), 2**31 - 1) | st.floats(width=32, allow_nan=False) | st.text(
-    st.characters(min_codepoint=32, max_codepoint=126), max_size=20)  # fmt: skip
-
-
-@given(st.text("/abcXYZ019_", min_size=1, max_size=30), st.lists(arguments, max_size=12))
-def test_messages_are_what_another_library_reads(address, values):
-    read = OscMessage(encoded(Message("/" + address, tuple(values))))
-    assert read.address == "/" + address
-    assert list(read.params) == values
+def test_a_message_is_the_bytes_of_the_specification():
+    (bundle,) = bundles([build_msg("/abc", ("Hips", 1, 0.5))])
+    assert bundle.dgram == (b"#bundle\0" b"\0\0\0\0\0\0\0\1" b"\0\0\0\x20" b"/abc\0\0\0\0" b",sif\0\0\0\0"
+                            b"Hips\0\0\0\0" b"\0\0\0\1" b"\x3f\0\0\0")  # fmt: skip
 
 
 @given(st.integers(0, 60), st.integers(100, 1400))
 def test_bundles_hold_every_message_once_in_order_and_are_no_longer_than_asked(number, largest):
-    sent = [Message("/a", (n, "bone", 0.5)) for n in range(number)]
-    data = list(bundles(sent, largest))
+    sent = [build_msg("/a", (n, "bone", 0.5)) for n in range(number)]
+    data = [bundle.dgram for bundle in bundles(sent, largest)]
     assert osc_messages(data) == [("/a", [n, "bone", 0.5]) for n in range(number)]
     assert all(len(each) <= largest for each in data)
+    assert sum(map(len, data)) == 16 * len(data) + sum(4 + message.size for message in sent)
+    assert all(len(one) + 4 + sent[0].size > largest for one in data[:-1])  # as few as possible
 
 
 # The avatar
@@ -118,8 +115,8 @@ def test_bones_put_together_as_unity_does_land_where_the_joints_are(name, rng):
     """Right, up, forward: of a person whom several cameras see in the world, of one before a camera in the frame that they stand in."""
     who = subject(name)
     for pose in runs.smooth_poses(who.body, 6, rng):
-        told = who.told(MotionFrame(0.0, "tracked", pose))
-        places = told.places
+        told = who.stream_frame(MotionFrame(0.0, "tracked", pose))
+        places = told.positions
         if who.floor is None:
             places = transform(inverse(who.T_world_base), places) + np.array([0, 0, who.pelvis_height])
         found = composed(heard(who, told))
@@ -172,7 +169,7 @@ def test_a_frame_ends_with_ok_and_its_time_and_is_lost_without_bones():
     told = heard(who, posed(who))
     assert told[0] == ("/VMC/Ext/Root/Pos", ["root", 0, 0, 0, 0, 0, 0, 1])
     assert told[-2:] == [("/VMC/Ext/OK", [1, 3, 0, 1]), ("/VMC/Ext/T", [1.25])]
-    assert heard(who, who.told(MotionFrame(2.0, "lost"))) == [("/VMC/Ext/OK", [1, 3, 0, 0]), ("/VMC/Ext/T", [2.0])]
+    assert heard(who, who.stream_frame(MotionFrame(2.0, "lost"))) == [("/VMC/Ext/OK", [1, 3, 0, 0]), ("/VMC/Ext/T", [2.0])]
 
 
 def test_datagrams_come_and_what_cannot_be_sent_is_counted_and_said_once():
@@ -195,12 +192,28 @@ def test_datagrams_come_and_what_cannot_be_sent_is_counted_and_said_once():
 def test_nobody_listening_is_no_trouble():
     with OscEar() as ear:
         port = ear.port
-    sender = Sender("127.0.0.1", port, "osc")
-    for _ in range(5):
-        sender.send(b"1234")
-        time.sleep(0.01)
-    assert (sender.sent, sender.failed) == (5, 0)
-    sender.close()
+    who = subject()
+    with VmcOutlet("127.0.0.1", port) as outlet:
+        outlet.begin(who)
+        for _ in range(5):
+            outlet.send(posed(who))
+            time.sleep(0.01)
+        assert (outlet.counts(), outlet.trouble()) == ({"sent": 5, "failed": 0}, "")
+
+
+def test_an_address_of_version_six_is_sent_to():
+    who = subject()
+    with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as ear:
+        try:
+            ear.bind(("::1", 0))
+        except OSError:
+            pytest.skip("no IPv6 here")
+        with VmcOutlet("::1", ear.getsockname()[1]) as outlet:
+            assert outlet.loopback
+            outlet.begin(who)
+            outlet.send(posed(who))
+            ear.settimeout(5)
+            assert ear.recv(65536).startswith(b"#bundle\0")
 
 
 # JSON
@@ -215,7 +228,7 @@ def schema() -> dict:
 def test_messages_are_as_the_manual_says(name):
     check, who = fastjsonschema.compile(schema()), subject(name)
     begin, frame = json.loads(beginning(who)), json.loads(framed(posed(who)))
-    for message in (begin, frame, json.loads(framed(who.told(MotionFrame(0.1, "absent"))))):
+    for message in (begin, frame, json.loads(framed(who.stream_frame(MotionFrame(0.1, "absent"))))):
         check(message)
     for spoilt in (begin | {"type": "frame"}, frame | {"joints": [[1, 2]]}, {**frame, "status": "well"}, begin | {"units": {}}):
         with pytest.raises(fastjsonschema.JsonSchemaValueException):
@@ -231,12 +244,12 @@ def test_rotations_carry_the_joints_below_them(rng):
     from scipy.spatial.transform import Rotation
 
     who = subject("anatomical")
-    zero, pose = who.told(MotionFrame(0, "tracked", np.zeros(32))), runs.smooth_poses(who.body, 3, rng)[2]
-    message = json.loads(framed(who.told(MotionFrame(0, "tracked", pose))))
+    zero, pose = who.stream_frame(MotionFrame(0, "tracked", np.zeros(32))), runs.smooth_poses(who.body, 3, rng)[2]
+    message = json.loads(framed(who.stream_frame(MotionFrame(0, "tracked", pose))))
     places, turns = np.array(message["joints"]), Rotation.from_quat(message["rotations"]).as_matrix()
     for n, parent in enumerate(who.parents):
         if parent >= 0:
-            offset = zero.places[n] - zero.places[parent]
+            offset = zero.positions[n] - zero.positions[parent]
             np.testing.assert_allclose(places[parent] + turns[parent] @ offset, places[n], atol=3e-5)
 
 
@@ -257,7 +270,7 @@ def test_a_program_gets_the_beginning_and_then_frames_and_is_told_goodbye():
         assert [json.loads(early.recv(5))["type"] for _ in range(2)] == ["begin", "frame"]
         with connect(url) as late:
             assert [json.loads(late.recv(5))["type"] for _ in range(2)] == ["begin", "frame"]  # what was newest when it came
-            outlet.send(who.told(MotionFrame(2.5, "lost")))
+            outlet.send(who.stream_frame(MotionFrame(2.5, "lost")))
             for each in (early, late):
                 message = json.loads(each.recv(5))
                 assert (message["time"], message["status"], message["joints"]) == (2.5, "lost", None)
@@ -293,11 +306,13 @@ def test_pages_of_other_sites_may_not_listen(origins, origin, good):
             assert outlet.counts() == {"served": 0, "refused": 1}
 
 
-def test_a_name_that_another_site_turned_to_this_machine_is_refused():
+@pytest.mark.parametrize("hosts", [["evil.example"], ["127.0.0.1", "evil.example"], ["127.0.0.1", "127.0.0.1"]])
+def test_a_name_that_another_site_turned_to_this_machine_and_two_hosts_are_refused(hosts):
+    named = "".join(f"Host: {host}\r\n" for host in hosts)
     with served() as (outlet, _):
         with socket.create_connection(("127.0.0.1", outlet.port)) as raw:
-            raw.sendall(b"GET / HTTP/1.1\r\nHost: evil.example\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-                        b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n")
+            raw.sendall(f"GET / HTTP/1.1\r\n{named}Upgrade: websocket\r\nConnection: Upgrade\r\n"
+                        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
             raw.settimeout(5)
             assert raw.recv(100).startswith(b"HTTP/1.1 403")
         assert outlet.counts()["refused"] == 1
@@ -369,10 +384,17 @@ def test_rubbish_from_elsewhere_is_no_trouble(rubbish):
             assert json.loads(connection.recv(5))["type"] == "begin"
 
 
-def test_no_more_than_so_many_listen(monkeypatch):
-    monkeypatch.setattr(websocket, "MOST", 2)
-    with served() as (_, url), connect(url), connect(url), pytest.raises(InvalidStatus):
-        connect(url)
+def test_no_more_than_so_many_listen_and_who_leaves_makes_room(monkeypatch):
+    monkeypatch.setattr(websocket, "MAX_CLIENTS", 2)
+    with served() as (outlet, url), connect(url):
+        with connect(url), pytest.raises(InvalidStatus):
+            connect(url)
+        end = time.monotonic() + 10
+        while outlet._clients > 1:
+            assert time.monotonic() < end, "a client that left is still counted"
+            time.sleep(0.01)
+        with connect(url):
+            assert outlet.counts() == {"served": 3, "refused": 1}
 
 
 # LSL
@@ -393,7 +415,7 @@ def test_the_lab_streaming_layer_carries_places_and_rotations(monkeypatch):
         inlet.open_stream(timeout=10)
         told, now = posed(who, torso_bow=0.3)._replace(age=0.25), pylsl.local_clock()
         outlets.send(told)
-        outlets.send(who.told(MotionFrame(2.0, "lost")))
+        outlets.send(who.stream_frame(MotionFrame(2.0, "lost")))
         samples = [inlet.pull_sample(timeout=10) for _ in range(2)]
         channels, channel = [], inlet.info().desc().child("channels").child("channel")
         while not channel.empty():
@@ -404,7 +426,7 @@ def test_the_lab_streaming_layer_carries_places_and_rotations(monkeypatch):
         "PositionX", "PositionY", "PositionZ", "OrientationX", "OrientationY", "OrientationZ", "OrientationW")]
     assert len(channels) == 7 * len(who.names)
     values = np.array(samples[0][0]).reshape(-1, 7)
-    np.testing.assert_allclose(values[:, :3], told.places, atol=1e-6)
+    np.testing.assert_allclose(values[:, :3], told.positions, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(values[:, 3:], axis=1), 1, atol=1e-6)
     assert samples[0][1] == pytest.approx(now - 0.25, abs=0.2)
     assert np.isnan(samples[1][0]).all()

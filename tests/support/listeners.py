@@ -1,24 +1,47 @@
-"""Programs that listen to a session, for tests: OSC by python-osc, and an avatar put together as Unity would."""
+"""Programs that listen to a session, for tests: OSC as its specification has it, and an avatar put together as Unity would."""
 
 from __future__ import annotations
 
 import socket
+import struct
 
 import numpy as np
-from pythonosc.osc_bundle import OscBundle
-from pythonosc.osc_message import OscMessage
 
 
 def osc_messages(datagrams) -> list[tuple[str, list]]:
-    """Addresses and arguments in datagrams, by a library that is not ours."""
+    """Addresses and arguments in datagrams, read independently of the library that writes them (OSC 1.0: Wright 2002)."""
     out = []
     for data in datagrams:
-        bundle = OscBundle(data)
         assert len(data) <= 1472
-        for part in bundle:
-            assert isinstance(part, OscMessage)
-            out.append((part.address, list(part.params)))
+        assert data[:16] == b"#bundle\0" + struct.pack(">Q", 1)  # 1: at once
+        at = 16
+        while at < len(data):
+            (size,) = struct.unpack_from(">i", data, at)
+            out.append(_message(data[at + 4 : at + 4 + size]))
+            at += 4 + size
+        assert at == len(data)
     return out
+
+
+def _message(data: bytes) -> tuple[str, list]:
+    def word(at: int) -> tuple[str, int]:
+        end = data.index(b"\0", at)
+        after = at + 4 * ((end - at) // 4 + 1)
+        assert not any(data[end:after])
+        return data[at:end].decode("ascii"), after
+
+    address, at = word(0)
+    tags, at = word(at)
+    values = []
+    for tag in tags.removeprefix(","):
+        if tag == "s":
+            value, at = word(at)
+        else:
+            (value,) = struct.unpack_from({"i": ">i", "f": ">f"}[tag], data, at)
+            at += 4
+        values.append(value)
+    assert at == len(data)
+    return address, values
 
 
 class OscEar:

@@ -191,7 +191,7 @@ def test_the_command_serves_until_it_is_interrupted(browser, run):
     assert (process.returncode, out, err) == (0, "", "")
 
 
-def test_a_live_session_is_shown_and_its_buttons_are_wishes(browser, run):
+def test_a_live_session_is_shown_and_its_buttons_are_commands(browser, run):
     from shadowpuppet.body.models import make_body
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.io.calibration.calibration_files import read_calibration
@@ -226,7 +226,7 @@ def test_a_live_session_is_shown_and_its_buttons_are_wishes(browser, run):
             page.page.wait_for_timeout(500)
             assert coloured(page.seen()) > 300
             assert "overlap 0.91" in page.page.inner_text("body")
-            assert display.wish() == ""
+            assert display.command() == ""
             page.page.get_by_role("button", name="Stop", exact=True).click()
-            page.wait(lambda: display.wish() == "stop", "a button is a wish")
+            page.wait(lambda: display.command() == "stop", "a button is a command")
             assert page.errors == []

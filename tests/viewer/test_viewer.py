@@ -366,7 +366,7 @@ def test_a_recording_that_is_gone_is_said_and_another_can_be_given(tracked, tmp_
 
 
 def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
-    from shadowpuppet.io.motion.truth import read_truth
+    from shadowpuppet.io.motion.motion_files import read_truth
     from shadowpuppet.motion.inverse_kinematics import fit_poses
     from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
     from shadowpuppet.pipeline.footage import opened

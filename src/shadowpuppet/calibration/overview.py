@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration.calibration_files import UPS, Calibration, look_into
+from shadowpuppet.io.calibration.calibration_files import UPS, Calibration, examine_calibration
 
 PERSON_HEIGHTS = (0.0, 0.9, 1.8)
 """Heights (metres) of a standing person that must lie in the picture for the person to be seen whole."""
@@ -83,12 +83,12 @@ class CalibrationLook:
 
 def look_at_calibration(path: str | Path, unit: str | None = None, up: str | None = None) -> tuple[CalibrationLook, Calibration]:
     """Overview of a calibration file, and its cameras. Raises `CalibrationError`."""
-    found = look_into(path, unit, up)
+    found = examine_calibration(path, unit, up)
     cameras, middle = found.cameras, meeting_point(found.cameras)
     gaps = [float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(cameras, 2)]
     corners = _corners(cameras, middle)
     look = CalibrationLook(
-        path=str(path), format=found.format, unit=found.unit, unit_told=found.told,
+        path=str(path), format=found.format, unit=found.unit, unit_told=found.unit_known,
         cameras=tuple(_placement(camera, middle) for camera in cameras), middle=_three(middle) if middle is not None else None,
         apart=(min(gaps), max(gaps)) if gaps else None, seen=tuple(map(tuple, _seen(cameras, corners).tolist())), corners=corners,
         notes=found.notes, doubts=tuple(_doubts(found, middle)),
@@ -176,7 +176,7 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
     if placed:
         yield from _up_doubts(placed)
     gaps = {(a.name, b.name): float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(placed, 2)}
-    if gaps and not found.told and not RIG_EXTENT[0] < max(gaps.values()) < RIG_EXTENT[1]:
+    if gaps and not found.unit_known and not RIG_EXTENT[0] < max(gaps.values()) < RIG_EXTENT[1]:
         yield (f"the cameras stand up to {max(gaps.values()):.3g} m apart: is that in metres? say what the file's lengths are in: "
                "--unit mm, or unit = \"mm\" in recording.toml")
     same = [pair for pair, gap in gaps.items() if gap < 1e-3]

@@ -56,7 +56,7 @@ class Finding:
 
 def doctor(*, as_json: Annotated[bool, Parameter(name="--json", group="Other", negative=(), show_default=False, help="Print JSON.")] = False
            ) -> int:  # fmt: skip
-    """Check what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, window, cameras.
+    """Check what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, browser, cameras.
 
     Exit code 1: something that tracking needs does not work.
     """
@@ -225,18 +225,6 @@ def _extras() -> Iterator[Finding]:
             yield Finding(f"extra {extra}", "works", f"{purpose}: {', '.join(f'{name} {metadata.version(name)}' for name in names)}")
 
 
-def _window() -> Iterator[Finding]:
-    from shadowpuppet.live.display.choice import has_screen
-    from shadowpuppet.live.display.window import no_window
-
-    why = no_window() if has_screen() else "no screen"
-    if why:
-        tk = "install tkinter (Debian: apt install python3-tk); " if "tkinter" in why else ""
-        yield Finding("window", "missing", f"none can be opened ({why})", f"{tk}`live --show browser` shows the same on a page")
-    else:
-        yield Finding("window", "works", "can be opened")
-
-
 def _browser() -> Iterator[Finding]:
     import shutil
 
@@ -282,6 +270,6 @@ def _writable(folder: Path) -> bool:
 CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
     ("Python", _python, True), ("libraries", _libraries, True), ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
-    ("window", _window, False), ("browser", _browser, False), ("cameras", _cameras, False),
+    ("browser", _browser, False), ("cameras", _cameras, False),
 )  # fmt: skip
 """Name, function, whether tracking needs it."""

@@ -11,7 +11,8 @@ from cyclopts import Parameter
 from shadowpuppet.body.models import WholeBodyName
 from shadowpuppet.cli.flags import LEARNING, Quiet, Switch, flags_of, given, output, unpacked
 from shadowpuppet.cli.tables import pairs, show, table
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import settings_of, validate
 
@@ -23,8 +24,7 @@ else:
     PriorFlags = unpacked(flags_of(PriorSettings, without=("regions",), groups={s.name: LEARNING for s in settings_of(PriorSettings)}))
 
 
-def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .csv, .trc, .bvh, .c3d, .npz, .parquet, or .amc "
-                                                            "beside its .asf.")], /, *,
+def fit_prior(motions: Annotated[list[Path], Parameter(help=f"Files of motion: {choices(READABLE)}; .amc with its .asf beside it.")], /, *,
               file: Annotated[Path, output("File that gets the prior.")] = Path("prior.npz"), regions: str = "20",
               rate: float = 60.0, body: WholeBodyName = "anatomical", seed: int = 0,
               quiet: Quiet = False, flags: PriorFlags = None) -> None:  # fmt: skip
@@ -55,20 +55,19 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help="Files of motion: .c
         show(*_prior_tables(trained, file))
 
 
-def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *, to: str = "bvh,c3d,trc,mot,csv,glb,npz",
+def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *,
+           to: Annotated[str, Parameter(help=f"Formats, separated by commas: {choices(EXPORTS)}; or all.")] = "bvh,c3d,trc,mot,csv,glb,npz",
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
            unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
 
     Parameters
     ----------
-    to
-        Formats, separated by commas: bvh, c3d, csv, glb, mot, npz, parquet, trc; or all.
     unit
         Unit of BVH files, which do not state it; Blender expects m.
     """
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.io.export import EXPORTS, export_run
+    from shadowpuppet.io.export import export_run
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
@@ -78,8 +77,8 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         show(pairs([("made", "\n".join(map(str, written)))]))
 
 
-def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, .csv, .npz, .parquet, .trc, or .amc beside its .asf.")],
-            target: Annotated[Path, Parameter(help="File to be written: .bvh, .c3d, .csv, .glb, .mot, .npz, .parquet or .trc.")], /, *,
+def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(READABLE)}; .amc with its .asf beside it.")],
+            target: Annotated[Path, Parameter(help=f"File to be written: {choices(f'.{name}' for name in EXPORTS)}.")], /, *,
             all: Switch = False, rate: float | None = None, source_unit: Literal["m", "cm", "mm", "in"] | None = None,
             unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
     """Convert a file of motion into another format: joints in metres, Z up, or as the other format requires.
@@ -98,13 +97,13 @@ def convert(source: Annotated[Path, Parameter(help="File of motion: .bvh, .c3d, 
         Unit of a .bvh file to be written.
     """
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.io.export import UNITS, convert_motion
+    from shadowpuppet.io.export import BVH_UNITS, convert_motion
 
     if rate is not None and not 0 < rate < 1e6:
         raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
     with terminal(quiet) as listener:
         listener.begin("converting")
-        content = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and UNITS[source_unit], target_unit=unit)
+        content = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and BVH_UNITS[source_unit], target_unit=unit)
     if not quiet:
         show(pairs([("made", str(target)), ("of", content)]))
 

@@ -64,7 +64,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
 
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
          quiet: Quiet = False, flags: SessionFlags = None, settings: LiveFlags = None, outlets: OutletFlags = None) -> None:
-    """Track a person in front of a camera as it happens, shown in a window or on a page for a browser; Ctrl-C ends it.
+    """Track a person in front of a camera as it happens, shown on a page for a browser; Ctrl-C ends it.
 
     Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
     Pictures are kept only with --record. Joints are sent to other programs only with --osc, --websocket or --lsl.

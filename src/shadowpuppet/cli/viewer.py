@@ -83,17 +83,15 @@ def _check(other: Path | None, beside: Path | None, html: Path | None, pictures:
 def _serve(scene: Scene, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
     """Serve the page until Ctrl-C."""
     import contextlib
-    import webbrowser
 
-    from shadowpuppet.live.display.choice import has_screen
+    from shadowpuppet.network import open_browser
     from shadowpuppet.viewer.web.serve import serve_scene
 
     def ready(address: str) -> None:
         if not quiet:
             print(f"{scene.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
-        if opening and has_screen():
-            with contextlib.suppress(webbrowser.Error):
-                webbrowser.open(address)
+        if opening:
+            open_browser(address)
 
     with contextlib.suppress(KeyboardInterrupt):
         serve_scene(scene, listen, port, ready=ready)

@@ -29,7 +29,7 @@ from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, tur
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.motion.truth import names_in, read_truth
+from shadowpuppet.io.motion.motion_files import names_in, read_truth
 from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
 from shadowpuppet.motion.motion import JointTable

@@ -1,8 +1,8 @@
-"""HumanEva-I and II as their owners lay them out: calibrations, films that do not begin together, motion capture.
+"""HumanEva-I and II: trials read as recordings, with calibration, synchronisation and motion capture.
 
 L. Sigal, A. O. Balan, M. J. Black: HumanEva, International Journal of Computer Vision 87, 2010. The data needs a licence.
 
-Frames of a trial are counted from 1 as the owners' own programs count them: the first that all cameras and the motion capture have.
+Frames of a trial are counted from 1, as in the owners' programs: the first that all cameras and the motion capture have.
 """
 
 from __future__ import annotations
@@ -29,25 +29,24 @@ from shadowpuppet.video import open_frames
 
 RATE = 60.0
 """Frames/s of all films."""
-FIRST = 6
-"""The first frame that counts: films are valid from it on."""
+FIRST_VALID = 6
+"""Films are valid from this frame on."""
 PARTS = {
     "S1": {"Walking": (590, 1203), "Jog": (367, 740), "ThrowCatch": (473, 945), "Gestures": (395, 801), "Box": (385, 789)},
     "S2": {"Walking": (438, 876), "Jog": (398, 795), "ThrowCatch": (550, 1128), "Gestures": (500, 901), "Box": (382, 734)},
     "S3": {"Walking": (448, 939), "Jog": (401, 842), "ThrowCatch": (493, 1027), "Gestures": (533, 1102), "Box": (512, 1021)},
 }
-"""Of the first trials of HumanEva-I: the last frame for validation, which begins with `FIRST`, and the last for training, which goes on
-from there (the owners' partition, as VideoPose3D has it). Ni 2008 tracks S2's validation frames: 433 of walking, 393 of jogging, 377
-of boxing."""
+"""First trials of HumanEva-I: the last frame of validation, which begins at `FIRST_VALID`, and of training, which follows it (the owners'
+partition, as in VideoPose3D). Ni 2008 tracks S2's validation frames: 433 of walking, 393 of jogging, 377 of boxing."""
 HEAD = "# A trial of HumanEva; made by `shadowpuppet humaneva`. The films stay where they are.\n"
-"""First line of the recording.toml that is written."""
+"""First line of recording.toml; marks folders that may be replaced."""
 WRITTEN = ("recording.toml", "calibration.toml", "truth.csv", "training.csv")
 
 Part = Literal["validation", "training", "all"]
 
 
 class Sync(NamedTuple):
-    """An .ofs file: image `image` of a film (from 1) was taken with motion capture's frame `mocap` (from 1), `scale` of these a film's."""
+    """An .ofs file: image `image` of a film matches frame `mocap` of the motion capture (from 1); `scale`: such frames per image."""
 
     image: float
     mocap: float
@@ -56,33 +55,40 @@ class Sync(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """What belongs to frame 1 of a trial."""
+    """Where frame 1 of a trial lies."""
 
     images: dict[str, int]
-    """The picture of each camera's film, from 1."""
+    """Image of each camera's film, from 1."""
     mocap: float
-    """The frame of motion capture, from 1."""
+    """Frame of the motion capture, from 1."""
     scale: float
-    """Frames of motion capture from one of the trial to the next."""
+    """Frames of the motion capture per frame of the trial."""
 
 
 class HumanEva(NamedTuple):
-    """A trial, ready to be written as a recording, or used as it is."""
+    """A trial."""
 
     recording: Recording
-    """Its `path` is the folder of the data; truth and training are here, not in files."""
+    """Its `path` is the data's folder; its truth and training are in the fields below."""
     truth: JointTable | None
-    """Joints at the recording's frames; None where the owners keep it to themselves (test trials, HumanEva-II)."""
+    """Joints at the recording's frames; None where they are not published (test trials, HumanEva-II)."""
     training: JointTable | None
-    """Joints of training frames of the same person and action, at `RATE`; None where there are none."""
+    """Joints in training frames of the same person and action, at `RATE`; None if there are none."""
 
 
 def read_humaneva(folder: str | Path, subject: str, action: str, trial: int = 1, part: Part = "validation",
                   training_frames: int = 100) -> HumanEva:
-    """A trial of HumanEva in `folder`, which holds S1, S2, ...; only films' first frames are read.
+    """Read a trial of HumanEva; of films only the first frame.
 
-    `part` of a first trial of HumanEva-I; other trials have one part, `all`. `training_frames`: how many in a row are taken, those with
-    the fewest gaps (Ni 2008: 100); 0 for all. Raises `RecordingError`, `CalibrationError` or `FormatError`, naming the file.
+    Raises `RecordingError`, `CalibrationError` or `FormatError`, naming the file.
+
+    Args:
+        folder: the data, with S1, S2, ...
+        subject: S1, ...
+        action: Walking, ...
+        trial: its number.
+        part: of a first trial of HumanEva-I; other trials have one part, `all`.
+        training_frames: number of consecutive training frames, those with the fewest gaps (Ni 2008: 100); 0 for all.
     """
     folder = Path(folder)
     films = _films(folder, subject, action, trial)
@@ -103,7 +109,7 @@ def read_humaneva(folder: str | Path, subject: str, action: str, trial: int = 1,
 
 
 def write_humaneva(found: HumanEva, folder: str | Path) -> None:
-    """Write a recording folder that refers to the films. Raises `RecordingError` where another thing lies in it."""
+    """Write a recording folder that refers to the films. Raises `RecordingError` where the folder holds something else."""
     import tomli_w
 
     folder, recording = Path(folder), found.recording
@@ -126,7 +132,7 @@ def write_humaneva(found: HumanEva, folder: str | Path) -> None:
 
 
 def read_sync(path: Path) -> Sync:
-    """An .ofs file: three numbers. Raises `RecordingError`."""
+    """Read an .ofs file: three numbers. Raises `RecordingError`."""
     try:
         values = np.array(read_text(path).split(), float)
     except ValueError:
@@ -137,16 +143,16 @@ def read_sync(path: Path) -> Sync:
 
 
 def timing_of(syncs: dict[str, Sync]) -> Timing:
-    """The trial's frame 1 from the cameras' own times: the first for which every film has a picture, and the motion capture a frame."""
+    """Frame 1 of a trial: the first for which every film has an image, and the motion capture a frame."""
     reference = next(iter(syncs.values()))
     scale = float(np.mean([sync.scale for sync in syncs.values()]))
     images = {name: sync.image + (reference.mocap - sync.mocap) / sync.scale for name, sync in syncs.items()}
-    back = min(min(images.values()) - 1, (reference.mocap - 1) / scale)  # frames that the common beginning lies before the reference's
+    back = min(min(images.values()) - 1, (reference.mocap - 1) / scale)  # frames from the common beginning to the reference's image
     return Timing({name: round(image - back) for name, image in images.items()}, reference.mocap - scale * back, scale)
 
 
 def _films(folder: Path, subject: str, action: str, trial: int) -> dict[str, Path]:
-    """Films, or folders of pictures, by camera, of those that are calibrated."""
+    """Films or folders of pictures by camera, for calibrated cameras."""
     person = folder / subject
     if not person.is_dir():
         there = [path.name for path in sorted(folder.glob("S[0-9]*"))] if folder.is_dir() else []
@@ -167,12 +173,12 @@ def _films(folder: Path, subject: str, action: str, trial: int) -> dict[str, Pat
 
 
 def _in_order(cameras: Iterable[str]) -> list[str]:
-    """C1, C2, C3, BW1, ...: the first one's clock counts, as in the owners' programs."""
+    """C1, C2, C3, BW1, ...; the first is the reference, as in the owners' programs."""
     return sorted(cameras, key=lambda name: (len(name), name))
 
 
 def _length(film: Path) -> int:
-    """Pictures of a film. Raises `RecordingError` where it does not tell."""
+    """Number of images of a film. Raises `RecordingError` where it is unknown."""
     source = open_frames(film, rate=RATE)
     count = source.count or source.duration * source.rate
     if not np.isfinite(count):
@@ -188,15 +194,15 @@ def _frames(folder: Path, subject: str, action: str, trial: int, part: Part) -> 
     """First and last frame of a part of a trial."""
     known = PARTS.get(subject, {}).get(action) if trial == 1 else None
     if part == "all":
-        return FIRST, 10**9
+        return FIRST_VALID, 10**9
     if known is None:
         raise RecordingError(f"{folder}: {subject} {action}_{trial} is not divided, expected part all; divided are the first trials of "
                              f"{', '.join(PARTS)}: {choices(PARTS['S1'])}")
-    return (FIRST, known[0]) if part == "validation" else (known[0] + 1, known[1])
+    return (FIRST_VALID, known[0]) if part == "validation" else (known[0] + 1, known[1])
 
 
 def _joints(folder: Path, subject: str, action: str, trial: int, timing: Timing, first: int, last: int) -> JointTable | None:
-    """Joints at frames `first` to `last` of a trial, times from 0; None where there is no motion capture of any of them."""
+    """Joints at frames `first` to `last` of a trial, times from 0; None without motion capture of them."""
     path = folder / subject / "Mocap_Data" / f"{action}_{trial}.c3d"
     if not path.exists():
         return None
@@ -206,7 +212,7 @@ def _joints(folder: Path, subject: str, action: str, trial: int, timing: Timing,
 
 
 def _between(places: Array, at: Array) -> Array:
-    """Places (K, J, 3) at fractions `at` (K,) of the rows of `places` (T, J, 3); not a number beyond them, or beside a gap."""
+    """`places` (T, J, 3) interpolated at fractional rows `at` (K,), (K, J, 3); NaN outside, or beside a gap."""
     low = np.floor(at).astype(int)
     share = (at - low)[:, None, None]
     padded = np.concatenate([places, np.full((1, *places.shape[1:]), np.nan)])
@@ -218,7 +224,7 @@ def _between(places: Array, at: Array) -> Array:
 
 
 def _training(folder: Path, subject: str, action: str, count: int) -> JointTable | None:
-    """Joints of the training frames of the first trial."""
+    """Joints in the training frames of the first trial."""
     person, known = folder / subject, PARTS.get(subject, {}).get(action)
     cameras = _in_order(path.stem.rpartition("(")[2].rstrip(")") for path in person.glob(f"Sync_Data/{action}_1_(*.ofs"))
     if known is None or not cameras:
@@ -232,7 +238,7 @@ def _training(folder: Path, subject: str, action: str, count: int) -> JointTable
 
 
 def _background(folder: Path, subject: str, camera: str) -> Path | None:
-    """A film of the empty scene, where one of such a name is there."""
+    """The camera's film of the empty scene; None if there is none."""
     found = [path for pattern in (f"{subject}/Image_Data/Background*_({camera})*", f"Background/Image_Data/*_({camera})*")
              for path in sorted(folder.glob(pattern))]
     return next(iter(found), None)

@@ -1,4 +1,4 @@
-"""A person's sizes as a file (person.toml), so that they are measured once."""
+"""A person's sizes as a file (person.toml)."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ from typing import Any
 from shadowpuppet.body.models import MODELS, kind_of, sizes_kind
 from shadowpuppet.body.sizes import HEIGHTS, CardboxSizes, Sizes, expected_metres, is_within
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, shown
-from shadowpuppet.io.calibration.calibration_files import read_toml
-from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
 
 KEYS = ("body", "height", "source", "notes", "sizes")
-UPPER = "rounded"
-"""The body that sizes are for where a file does not say: with it, all upper bodies, which have the same sizes."""
+DEFAULT_BODY = "rounded"
+"""Body of a file that names none; all upper bodies have the same sizes."""
 
 
 @dataclass(frozen=True)
 class Person:
-    """A person as the model has them. Raises `ShadowPuppetError` where the height cannot be one."""
+    """A person's sizes and height. Raises `ShadowPuppetError` for an impossible height."""
 
     sizes: Sizes
-    """Of an upper body or of one of the whole ones."""
+    """Sizes of an upper or a whole body."""
     height: float | None = None
-    """Metres, shoes on; None where it is not known."""
+    """Metres, with shoes; None if unknown."""
     source: str = ""
-    """What the sizes come from, such as `references` or `proportions`."""
+    """How the sizes were found, such as `references` or `proportions`."""
     notes: str = ""
-    """Anything that a person wants to remember."""
+    """Any text."""
 
     def __post_init__(self) -> None:
         """Check."""
@@ -40,25 +39,23 @@ class Person:
 
 
 def read_person(path: str | Path, body: str | None = None) -> Person:
-    """A person from a file, to be made into `body`, if one is named.
+    """Read a person.
 
-    Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible, or the sizes are another body's.
+    Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible, or the sizes do not fit `body`.
     """
     path, wanted = Path(path), body
     data = read_toml(path, FormatError)
     unknown = set(data) - set(KEYS)
     if unknown:
         raise FormatError(f"{path}: found the key {min(unknown)!r}; keys known: {choices(KEYS)}")
-    sizes, body = data.pop("sizes", None), data.pop("body", UPPER)
+    sizes, body = data.pop("sizes", None), data.pop("body", DEFAULT_BODY)
     if not isinstance(body, str) or body not in MODELS:
         raise FormatError(f"{path}: body: found {body!r}, expected one of {choices(MODELS)}")
     kind = sizes_kind(body)
     if not isinstance(sizes, dict):
         raise FormatError(f"{path}: sizes: found {sizes!r}, expected a table [sizes] with {choices(kind.names())}")
-    try:
+    with errors_named(path):
         person = Person(kind.from_mapping(sizes), **data)
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
     if wanted is not None and kind is not sizes_kind(wanted):
         raise FormatError(f"{path}: sizes: found those of the body {body!r}, expected those of {wanted!r}: choose that body, or measure "
                           "the person again")
@@ -66,7 +63,7 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
 
 
 def write_person(path: str | Path, person: Person) -> None:
-    """Write a person so that `read_person` gives them back. Raises `ShadowPuppetError` where that fails."""
+    """Write a person for `read_person`. Raises `ShadowPuppetError` where that fails."""
     import tomli_w
 
     upper = isinstance(person.sizes, CardboxSizes)

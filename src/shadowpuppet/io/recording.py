@@ -1,4 +1,4 @@
-"""Recording folders: cameras, films, empty scenes, ready masks, reference pictures, and what is known of the subject."""
+"""Recording folders: calibrated cameras, films, empty scenes, masks, reference pictures, and facts about the person."""
 
 from __future__ import annotations
 
@@ -11,45 +11,46 @@ from warnings import warn
 
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
-from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, find_calibration, read_calibration, read_toml
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices, reason
+from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, find_calibration, read_calibration
+from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
 
 FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",
                  ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".webm", ".wmv", ".y4m")
-"""Endings of the films that are looked for; one with another ending can be named in recording.toml."""
+"""Endings of films that are found in a folder; others can be named in recording.toml."""
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
 KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks")
 """Keys of recording.toml."""
 RATES = (0.1, 10_000.0)
-"""What can be true, frames/s."""
+"""Limits, frames/s."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
-"""What can be true, seconds."""
+"""Limits, seconds."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is known of the person; metres."""
+    """Known facts about the person; metres."""
 
     height: float | None = None
-    """Of the person, shoes on."""
+    """With shoes."""
     distance: float | None = None
-    """From the (single) camera to the middle of the body at the start."""
+    """From the only camera to the middle of the body at the start."""
 
 
 @dataclass(frozen=True)
 class View:
-    """One camera and what it saw; every source is one that `video.open_frames` opens."""
+    """A camera and its pictures; `video.open_frames` opens every source."""
 
     camera: Camera
     video: Path | int | str
     background: Path | None = None
     """The empty scene."""
     masks: Path | None = None
-    """Ready silhouettes."""
+    """Silhouettes made by another program."""
     start: float = 0.0
-    """Seconds of the film's own clock that are the recording's time 0; its frames before are left out."""
+    """Time of the film, seconds, at the recording's time 0; earlier frames are left out."""
 
 
 @dataclass(frozen=True)
@@ -64,30 +65,34 @@ class Reference:
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording as it lies on the disk; nothing of it is read but the films' first frames."""
+    """A recording on disk; of its films only the first frames have been read."""
 
     path: Path
     name: str
     views: tuple[View, ...]
     subject: Subject = Subject()
     references: tuple[Reference, ...] = ()
-    """In the order of `POSTURES`; those that are there."""
+    """Those that exist, in the order of `POSTURES`."""
     truth: Path | None = None
     training: Path | None = None
     rate: float | None = None
-    """Frames/s that replace the times of the films; None: theirs count."""
+    """Frames/s that replace the films' times; None to keep those."""
     duration: float | None = None
-    """Seconds that count, from time 0; None: to the films' ends."""
+    """Seconds used, from time 0; None for all."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
-    """A recording: a folder (video/, calibration.toml, ...), or one film, folder of pictures or live camera.
+    """Read a recording: a folder (video/, calibration.toml, ...), or one film, folder of pictures or live camera.
 
-    `calibration` replaces the folder's own; `fov` (horizontal, radians) is enough for one camera without any. Raises
-    `RecordingError`, `CalibrationError` or `VideoError`, naming file and field, where something is missing or does not fit.
+    `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera. Raises `RecordingError`,
+    `CalibrationError` or `VideoError`, naming file and field, where something is missing or does not fit.
     """
     folder = Path(str(path))
-    if camera_number(path) is None and not folder.exists():
+    try:
+        exists = folder.exists()
+    except OSError as error:  # as for a name that is too long
+        raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
+    if camera_number(path) is None and not exists:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
     if folder.is_dir() and any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml")):
         return _read_folder(folder, fov, calibration)
@@ -96,7 +101,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
                              "(video/<camera>.mp4 and calibration.toml) or a folder of pictures")
     source = folder if camera_number(path) is None else path
     if source is folder:
-        open_frames(folder)  # a file that is no film is said to be that, before its calibration is asked for
+        open_frames(folder)  # raises for a file that is no film, before a calibration is demanded
     cameras = _cameras(folder, {folder.stem: source}, fov, calibration)
     named = [c for c in cameras if c.name == folder.stem or len(cameras) == 1]
     if not named:
@@ -134,7 +139,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
 
 
 class _Notes:
-    """recording.toml, or nothing where there is none."""
+    """The content of recording.toml; empty if there is none."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.path = folder, folder / "recording.toml"
@@ -184,7 +189,7 @@ class _Notes:
 
 
 def _starts(notes: _Notes, cameras: Iterable[Camera]) -> dict[str, float]:
-    """Seconds by camera, those that recording.toml tells."""
+    """`View.start` by camera, from recording.toml."""
     _check_names(notes.path, notes.table("start"), cameras)
     found = {name: notes.number(name, STARTS, "seconds", "start") for name in notes.table("start")}
     return {name: start for name, start in found.items() if start is not None}
@@ -195,14 +200,14 @@ def _first(folder: Path, stem: str, endings: list[str]) -> Path | None:
 
 
 def _sources(folder: Path, kind: str, notes: _Notes) -> dict[str, Any]:
-    """Film, picture or folder of each camera: those that recording.toml names, else <kind>/<camera>.*."""
+    """Film, picture or folder by camera: those named in recording.toml, else <kind>/<camera>.*."""
     sources: dict[str, Any] = {camera: notes.source(kind, camera) for camera in notes.table(kind)}
     found = _films(folder / kind, FILM_SUFFIXES if kind == "video" else FILM_SUFFIXES + IMAGE_SUFFIXES)
     return {name: _only(paths) for name, paths in found.items() if name not in sources} | sources
 
 
 def _films(folder: Path, suffixes: tuple[str, ...]) -> dict[str, list[Path]]:
-    """Films and folders in a folder, by their names without endings, sorted."""
+    """Films and folders in a folder, by name without ending, sorted."""
     films: dict[str, list[Path]] = {}
     for path in sorted(folder.iterdir()) if folder.is_dir() else []:
         if path.name[0] != "." and (path.is_dir() or path.suffix.lower() in suffixes):
@@ -245,7 +250,7 @@ def _check_names(folder: Path, sources: Iterable[str], cameras: Iterable[Camera]
 
 
 def _check_sizes(views: Iterable[View]) -> None:
-    """Raise `RecordingError` where pictures are not of their camera's size; live cameras are not opened for that."""
+    """Raise `RecordingError` where pictures do not have their camera's size; live cameras are not opened."""
     for view in views:
         for source in (view.video, view.background, view.masks):
             if source is None or camera_number(source) is not None:

@@ -56,7 +56,7 @@ class _Nobody(Exception):
 def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
              listener: LiveListener | None = None, display: Display | None = None,
              clock: Callable[[], float] = time.monotonic, outlets: Outlets | None = None) -> dict[str, Any] | None:
-    """Track a camera until Ctrl-C, the display's wish or a film's end, into a run folder; what is in metrics.json, or None.
+    """Track a camera until Ctrl-C, the display's command or a film's end, into a run folder; what is in metrics.json, or None.
 
     Every frame is given to the `outlets`, too. The folder gets what `io.run` describes, person.toml, calibration.toml and, with
     `LiveSettings.record`, recording/. None, and no folder, where nobody was tracked. Raises a `ShadowPuppetError` where something
@@ -140,9 +140,9 @@ class _Live:
             self._keep(outcome)
             self._tell(outcome)
             self.display.show(outcome.view)
-            if (wish := self.display.wish()) == "stop":
+            if (command := self.display.command()) == "stop":
                 break
-            self.session.ask(wish)
+            self.session.ask(command)
         if self.capture.error is not None:
             raise self.capture.error
 

@@ -28,9 +28,9 @@ class LiveSettings:
     """Seconds of the empty scene that are learnt."""
     still: Annotated[float, Field(ge=0.1, le=60)] = 1.0
     """Seconds that a person must stand still to be measured."""
-    show: Literal["auto", "window", "browser", "viewer", "none"] = "auto"
-    """Where it is shown: in a window where there is a screen, else on a page for a browser; auto finds out. viewer: the puppet in space, on
-    the page of `shadowpuppet view`."""
+    show: Literal["auto", "browser", "viewer", "none", "window"] = "auto"
+    """Where it is shown. browser: on a page, whose address is printed; auto: the same, and opened where there is a screen; viewer: the
+    puppet in space, on the page of `shadowpuppet view`."""
     listen: str = "127.0.0.1"
     """Address at which the page is served; any but this machine's own lets others see the person."""
     port: Annotated[int, Field(ge=0, le=65535)] | None = None

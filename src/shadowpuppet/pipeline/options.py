@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 from shadowpuppet.body.models import WHOLE, BodyName
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.io.calibration.calibration_files import read_toml
+from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import checked, plain_values, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings

@@ -16,7 +16,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.files.plain import for_json, plain
-from shadowpuppet.io.motion.truth import read_truth
+from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion

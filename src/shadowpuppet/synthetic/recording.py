@@ -13,6 +13,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.motion.table import joint_columns
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
@@ -145,11 +146,10 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
 
 def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
-    """Write joints (T, 17, 3) at times (T,), seconds, to `<path>.csv` (metres) and `<path>.trc` (millimetres)."""
-    names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
+    """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds."""
     rows = joints.reshape(len(joints), -1)
     lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
-    _write(path.with_suffix(".csv"), [",".join(["time", *names]), *lines])
+    _write(path.with_suffix(".csv"), [",".join(["time", *joint_columns(JOINTS)]), *lines])
     count, trc = len(joints), path.with_suffix(".trc")
     head = [
         f"PathFileType\t4\t(X/Y/Z)\t{trc.name}",

@@ -19,8 +19,8 @@ UNSEEDED_HEADER = "# The generator that was given had no seed that could be kept
 
 
 def read_spec(path: str | Path) -> Spec:
-    """The spec in a TOML file; files that it names are relative to it. Raises `SettingsError` with file and field."""
-    from shadowpuppet.io.calibration.calibration_files import read_toml
+    """The spec in a TOML file; files that it names are relative to it. Raises `SettingsError`: one sentence with file and field."""
+    from shadowpuppet.io.files.text import read_toml
 
     values = read_toml(path, SettingsError)
     for gesture in _gestures(values):

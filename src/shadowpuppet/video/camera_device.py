@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def camera_number(source: str | Path | int) -> int | None:
-    """The number of a live camera, given as it is or as `camera:N`; None for anything else."""
+    """The number of a live camera, given as an int or as `camera:N`; None for anything else."""
     if isinstance(source, int):
         return source
     number = str(source).removeprefix("camera:")
@@ -28,26 +28,26 @@ def camera_number(source: str | Path | int) -> int | None:
 
 
 def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
-    """A camera's frames as they come, timed by a monotonic clock; `rate` is asked of the camera. Raises `VideoError`."""
+    """A camera's frames as they come, timed by a monotonic clock; `rate` is requested from the camera. Raises `VideoError`."""
     import cv2
 
     capture, first = open_device(number, rate)
-    told = capture.get(cv2.CAP_PROP_FPS)
-    ready, size = [capture], size_of(first)  # opening takes a second: the first reader takes over what learnt the size
+    stated_rate = capture.get(cv2.CAP_PROP_FPS)
+    ready, size = [capture], size_of(first)  # opening takes a second: the first reader continues with this capture
 
     def read() -> Iterator[Frame]:
         return _frames(ready.pop() if ready else open_device(number, rate)[0], number, grey, size)
 
-    return FrameSource(f"camera:{number}", size, told if told > 0 else math.nan, None, math.nan, read)
+    return FrameSource(f"camera:{number}", size, stated_rate if stated_rate > 0 else math.nan, None, math.nan, read)
 
 
 def open_device(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
-    """A camera, opened, and its first picture. Raises `VideoError`."""
+    """Open a camera; the capture and its first picture. Raises `VideoError`."""
     import cv2
 
     with _quiet():
         capture = cv2.VideoCapture(number)
-    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # pictures that waited would be stamped late
+    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # buffered pictures would get late times
     if rate:
         capture.set(cv2.CAP_PROP_FPS, rate)
     good, image = capture.read() if capture.isOpened() else (False, None)
@@ -59,10 +59,10 @@ def open_device(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keeps OpenCV's own words for a camera that is not there off the terminal: the error says it."""
+    """Silence OpenCV's messages on a missing camera; the error says it."""
     import cv2
 
-    log: Any = getattr(cv2.utils, "logging", cv2)  # OpenCV 5's place, and 4's
+    log: Any = getattr(cv2.utils, "logging", cv2)  # OpenCV 5, and 4
     level = log.getLogLevel()
     log.setLogLevel(0)
     try:
@@ -72,10 +72,10 @@ def _quiet() -> Iterator[None]:
 
 
 def pictures(capture: VideoCapture) -> Iterator[tuple[float, Image]]:
-    """What an opened camera shows, as long as it does, with the monotonic clock's seconds; the camera is released at the end."""
+    """Pictures of an opened camera until it ends, with seconds of the monotonic clock; releases the camera."""
     try:
         while capture.grab():
-            now = time.monotonic()  # before decoding, which takes its time
+            now = time.monotonic()  # before decoding, which takes time
             good, image = capture.retrieve()
             if not good:
                 break

@@ -1,4 +1,4 @@
-"""A camera read in a thread of its own: its newest picture is kept, older ones are dropped; where it breaks off, it is tried again."""
+"""A camera read in a thread: the newest picture is kept, older ones are dropped; a camera that breaks off is opened again."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from shadowpuppet.video.live_source import Feed, Snapshot
 
 Item = TypeVar("Item")
 FIRST_WAIT, LONGEST_WAIT = 0.5, 8.0
-"""Seconds before a camera that broke off is tried again; each time twice as long."""
+"""Seconds before a camera that broke off is opened again; the wait doubles each time."""
 
 
 class Newest(Generic[Item]):
-    """A place for one thing: what is put there replaces what nobody took."""
+    """A buffer for one item, shared by threads: a new item replaces one that was not taken."""
 
     def __init__(self) -> None:
         """Empty."""
@@ -25,7 +25,7 @@ class Newest(Generic[Item]):
         self._changed = threading.Condition()
 
     def put(self, item: Item) -> None:
-        """Put a thing there; one that was not taken is dropped, and counted."""
+        """Store an item; one that was not taken is dropped, and counted."""
         with self._changed:
             self.put_count += 1
             self.dropped += self._item is not None
@@ -33,7 +33,7 @@ class Newest(Generic[Item]):
             self._changed.notify_all()
 
     def take(self, timeout: float = 0.0) -> Item | None:
-        """What is there, waited for (seconds); None where nothing comes."""
+        """Remove and return the item, waiting up to `timeout` seconds; None if none comes."""
         with self._changed:
             if self._item is None and timeout > 0:
                 self._changed.wait(timeout)
@@ -42,42 +42,42 @@ class Newest(Generic[Item]):
 
     @property
     def waiting(self) -> bool:
-        """Whether something is there."""
+        """Whether an item is stored."""
         return self._item is not None
 
     def wake(self) -> None:
-        """End the waiting of whoever waits."""
+        """End all waits in `take`."""
         with self._changed:
             self._changed.notify_all()
 
 
 class Capture:
-    """Reads a feed from `with` to its end; `newest.take()` is the last picture that came."""
+    """Reads a feed within its `with` block; `newest.take()` is the latest picture."""
 
     def __init__(self, feed: Feed) -> None:
-        """Nothing is read yet."""
+        """Reading starts with the `with` block."""
         self.feed, self.newest = feed, Newest[Snapshot]()
         self.problem = ""
-        """Why no pictures come, in a sentence; empty while they do."""
+        """Why no pictures come, as a sentence; empty while they do."""
         self.ended = False
         """Whether a film is over."""
         self.error: BaseException | None = None
-        """What is not the camera's fault."""
+        """An error that ended reading, other than a camera's breaking off."""
         self._stop, self._again = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin to read."""
+        """Start the thread."""
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let the feed go; a driver that does not return is left to end with the program."""
+        """Stop reading; a driver that hangs is left to end with the program."""
         self._stop.set()
         self._thread.join(1.0)
 
     def again(self) -> None:
-        """Let go of the camera and open it once more, as for one whose picture stands still."""
+        """Close and reopen the camera, for one whose picture is frozen."""
         self._again.set()
 
     def _run(self) -> None:
@@ -89,7 +89,7 @@ class Capture:
         self.newest.wake()
 
     def _read_on(self, wait: Callable[[float], bool]) -> None:
-        """Read, and after a break try again after a while, until told to stop."""
+        """Read until stopped; reopen a camera that breaks off after a wait."""
         pause = FIRST_WAIT
         while not self._stop.is_set():
             try:
@@ -110,7 +110,7 @@ class Capture:
             pause = min(2 * pause, LONGEST_WAIT)
 
     def _read_once(self) -> bool:
-        """Read until it ends; whether anything came."""
+        """Read until the feed ends; whether a picture came."""
         came = False
         with contextlib.closing(self.feed.read()) as shots:  # type: ignore[type-var]
             for shot in shots:

@@ -1,4 +1,4 @@
-"""Films through PyAV: frames with their exact times, of a damaged film those before the break."""
+"""Films through PyAV: frames with their exact times; a damaged film's up to the break."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, reason
 from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, reason, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 PLAIN_LUMA = re.compile(r"yuvj?4\d\dp|nv12|nv16|nv21|gray")
 """Pixel formats whose first plane is the 8-bit luma."""
 DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")
-"""Those with more bits."""
+"""Pixel formats with more bits."""
 FULL_RANGE = 2
 """FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
 LONGEST_STUTTER = 1.0
-"""Seconds; times that go back by more have started anew."""
+"""Seconds; times that go back by more are taken for a new start."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
-"""Video's usual luma range, 16..235, stretched to 0..255."""
+"""Lookup table from video's usual luma range, 16..235, to 0..255."""
 
 
 def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
-    """A film's frames; its first one is decoded to learn the size. Raises `VideoError`."""
+    """A film's frames; decodes the first to find the size. Raises `VideoError`."""
     with opened(path) as (container, stream):
         try:
             first = next(decoded(container, stream), None)
@@ -44,9 +44,9 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
             raise VideoError(f"{path}: no frame of it can be decoded ({stream.codec_context.name})")
         size = size_of(converter(grey)(first))
         timed = first.pts is not None or first.dts is not None
-        told = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
-        duration, mean_rate = _declared_duration(container, stream), float(told or math.nan)
-        false = abs(stream.frames - duration * mean_rate) > 1 + 0.01 * stream.frames  # of an .mp4 whose writer was interrupted
+        stated_rate = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
+        duration, mean_rate = _declared_duration(container, stream), float(stated_rate or math.nan)
+        false = abs(stream.frames - duration * mean_rate) > 1 + 0.01 * stream.frames  # an .mp4 whose writer was interrupted
         count = None if false else stream.frames or None
 
     step = 1 / (mean_rate if math.isfinite(mean_rate) else rate or ASSUMED_RATE)
@@ -59,11 +59,11 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
 
 
 def tells_times(path: Path) -> bool:
-    """Whether a film's first frames have times. Raises `VideoError`."""
+    """Whether a film's first frames have time stamps. Raises `VideoError`."""
     with opened(path) as (container, stream), contextlib.suppress(Break):
         frames = decoded(container, stream)
         return all(frame.pts is not None or frame.dts is not None for frame, _ in zip(frames, range(3)))
-    return True  # a damaged one, which is said elsewhere
+    return True  # damaged; reported elsewhere
 
 
 def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None) -> Iterator[Frame]:
@@ -80,7 +80,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 longest, n = max(longest, time - before), n + 1
         except Break as cause:
             broken = str(cause)
-    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # not where there is no duration
+    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # false where the duration is unknown
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
         of = f" of {film.count}" if film.count else ""
@@ -93,13 +93,13 @@ def _say(warning: str) -> None:
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
     if container.format.name == "avi" and stream.frames and stream.average_rate:
-        return float(stream.frames / stream.average_rate)  # FFmpeg's figure is that of what is left of the file
+        return float(stream.frames / stream.average_rate)  # FFmpeg states the duration of what is left of a cut file
     if stream.duration is not None and stream.time_base is not None:
         return float(stream.duration * stream.time_base)
-    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska's, for each stream
+    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska's, per stream
     if tag:
         return int(tag[1]) * 3600 + int(tag[2]) * 60 + float(tag[3])
-    alone = len(container.streams) == 1  # the container's own is that of its longest stream, maybe of sound
+    alone = len(container.streams) == 1  # the container's is that of its longest stream, perhaps audio
     return container.duration / 1e6 if alone and container.duration else math.nan
 
 
@@ -112,27 +112,27 @@ class Break(Exception):
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """A film's container and its pictures. Raises `VideoError`."""
+    """Open a film; its container and video stream. Raises `VideoError`."""
     import av
     import av.error
 
     try:
-        # "file:" and the white list: a name with a colon is no protocol, and a play list fetches nothing from elsewhere.
+        # "file:" and the white list: a name with a colon is no protocol, and a play list cannot open other files or addresses.
         container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(f"{path}: no film that can be read ({reason(error)}); an .mp4 that was cut off while being written "
                          "lacks its index and cannot be played") from None
     with container:
         streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
-        if not streams or container.format.name == "tty":  # FFmpeg draws text files as pictures
+        if not streams or container.format.name == "tty":  # FFmpeg renders text files as video
             raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
         streams[0].thread_type = "AUTO"
-        streams[0].codec_context.thread_count = thread_limit() or 0  # 0: as FFmpeg likes
+        streams[0].codec_context.thread_count = thread_limit() or 0  # 0: FFmpeg's default
         yield container, streams[0]
 
 
 def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
-    """Frames in order of presentation; raises `Break` after the last whole one where the film is damaged."""
+    """Frames in order of presentation. Raises `Break` after the last whole one of a damaged film."""
     import av.error
 
     packets, broken, last = container.demux(stream), "", None
@@ -140,7 +140,7 @@ def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFra
         try:
             if (packet := next(packets, None)) is None:
                 return
-            if packet.is_corrupt and last:  # a part of one, at the end of what is left of a file
+            if packet.is_corrupt and last:  # partial, at the end of a cut file
                 frames, broken = _held(stream, last), "a cut picture"
             else:
                 frames = packet.decode()
@@ -155,7 +155,7 @@ def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFra
 
 
 def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:
-    """Frames that the decoder still holds at a break, as far as they follow on the `last` one; its threads may be beyond it."""
+    """Frames that the decoder still holds at a break, as far as they follow the `last` one without a gap."""
     import av.error
 
     frames: list[VideoFrame] = []
@@ -164,24 +164,24 @@ def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:
             step = frame.pts - last.pts if last and frame.pts is not None and last.pts is not None else 0
             if last and 0 < 1.5 * last.duration < step:
                 break
-            frame.time_base = stream.time_base  # which only packets know
+            frame.time_base = stream.time_base  # known by packets only
             frames.append(frame)
             last = frame
     return frames
 
 
 class _Clock:
-    """Seconds after the first frame, increasing: the container's where they can be used, else filled in, with a warning."""
+    """Increasing seconds after the first frame: the container's where usable, else filled in, with a warning."""
 
     def __init__(self, path: Path, step: float, quiet: bool = False) -> None:
-        self.path, self.step, self.told = path, step, quiet
+        self.path, self.step, self.warned = path, step, quiet
         self.zero, self.last, self.shift = None, -step, 0.0
         self.last_dts, self.bad_pts, self.bad_dts = -math.inf, 0, 0
 
     def __call__(self, frame: VideoFrame) -> float:
         stamp, base = self._stamp(frame), frame.time_base
         if stamp is None or base is None:
-            self._tell(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s")
+            self._warn(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s")
             self.last += self.step
         else:
             self.zero = stamp if self.zero is None else self.zero
@@ -189,7 +189,7 @@ class _Clock:
         return self.last
 
     def _stamp(self, frame: VideoFrame) -> int | None:
-        # As FFmpeg's "best effort": presentation times that went back more often than decoding times lose their credit.
+        # As FFmpeg's "best effort": use decoding times if presentation times went back more often than those.
         if frame.dts is not None:
             self.bad_dts += frame.dts <= self.last_dts
             self.last_dts = frame.dts
@@ -200,16 +200,16 @@ class _Clock:
         if time > self.last:
             return time
         self.bad_pts += 1
-        self._tell(self.last, "is followed by one that is not later; times are moved so that they increase")
-        if self.last - time < LONGEST_STUTTER:  # the times after it are right again
+        self._warn(self.last, "is followed by one that is not later; times are moved so that they increase")
+        if self.last - time < LONGEST_STUTTER:  # later times are right again
             return self.last + self.step / 2
         self.shift += self.last + self.step - time  # a new start
         return self.last + self.step
 
-    def _tell(self, time: float, what: str) -> None:
-        if not self.told:
+    def _warn(self, time: float, what: str) -> None:
+        if not self.warned:
             _say(f"{self.path}: the frame at {time:.3f} s {what}")
-        self.told = True
+        self.warned = True
 
 
 # Pixels
@@ -220,7 +220,7 @@ def converter(grey: bool) -> Callable[[VideoFrame], Image]:
     import cv2
     from av.video.reformatter import VideoReformatter
 
-    reformat = VideoReformatter().reformat  # one for the film: it keeps its tables from frame to frame
+    reformat = VideoReformatter().reformat  # one per film: it keeps its tables between frames
 
     def convert(frame: VideoFrame) -> Image:
         if grey and PLAIN_LUMA.fullmatch(frame.format.name):
@@ -237,7 +237,7 @@ def converter(grey: bool) -> Callable[[VideoFrame], Image]:
 
 
 def _luma(frame: VideoFrame) -> Image:
-    """The luma plane alone, (H, W), over 0..255: grey frames need no colour conversion."""
+    """The luma plane (H, W), scaled to 0..255, without colour conversion."""
     import cv2
 
     plane = frame.planes[0]

@@ -1,4 +1,4 @@
-"""What a frame and a source of frames are."""
+"""Frames, and sources of frames."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Size = tuple[int, int]
 """Width and height, pixels."""
 
 ASSUMED_RATE = 30.0
-"""Frames/s where neither the source nor the caller says anything of time."""
+"""Frames/s where neither the source nor the caller states times."""
 
 
 class Frame(NamedTuple):
-    """One picture and when it is shown."""
+    """A picture and its time."""
 
     time: float
     """Seconds after the source's first frame."""
@@ -30,17 +30,17 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class FrameSource:
-    """Frames in order of time; iterate as often as needed: each time from the start, a live camera from now."""
+    """An iterable of frames in order of time. Each iteration begins at the start; a live camera's, now."""
 
     name: str
     size: Size
-    """Width and height of the frames that it gives, pixels."""
+    """Width and height of the frames, pixels."""
     rate: float
-    """Frames/s on average; not a number where unknown."""
+    """Mean frames/s; NaN if unknown."""
     count: int | None
-    """Number of frames where the container says it."""
+    """Number of frames, if the container states it."""
     duration: float
-    """Seconds where the container says it, else not a number."""
+    """Seconds, if the container states it, else NaN."""
     read: Callable[[], Iterator[Frame]] = field(repr=False)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -54,13 +54,8 @@ def size_of(image: Image) -> Size:
 
 
 def check_size(name: object, n: int, time: float, image: Image, size: Size) -> None:
-    """Raise `VideoError` where frame `n` has another size than those before it."""
+    """Raise `VideoError` where frame `n` differs in size from those before it."""
     found = size_of(image)
     if found != size:
         raise VideoError(f"{name}: frame {n} ({time:.3f} s) is {found[0]} x {found[1]} pixels, those before it "
                          f"{size[0]} x {size[1]}; all frames must have one size")
-
-
-def reason(error: BaseException) -> str:
-    """What an error of the system or a codec says, without its numbers and paths."""
-    return (getattr(error, "strerror", None) or str(error)).lower()

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, choices
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, reason, size_of
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, choices, reason
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
 
 def read_image(path: str | Path, grey: bool = False) -> Image:
-    """A picture file, (H, W, 3) blue green red or (H, W) grey, 8 bit, upright as its EXIF data say. Raises `VideoError`."""
+    """Read a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, rotated as its EXIF data say. Raises `VideoError`."""
     import cv2
 
     try:
@@ -36,14 +36,14 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
 
 
 def write_image(path: str | Path, image: Image) -> None:
-    """Write a picture (H, W, 3) blue green red or (H, W) grey, 8 bit; the name's ending says the format. Raises `VideoError`."""
+    """Write a picture (H, W, 3) blue green red or (H, W) grey, 8 bit, in the format of the path's ending. Raises `VideoError`."""
     import cv2
 
     path = Path(path)
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise VideoError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(IMAGE_SUFFIXES)}")
     check_image(path, image)
-    part = path.with_name(f"{path.stem}.part{path.suffix}")  # a picture is whole or not there
+    part = path.with_name(f"{path.stem}.part{path.suffix}")  # so that no partial picture remains
     try:
         part.write_bytes(cv2.imencode(path.suffix.lower(), image)[1].tobytes())
         os.replace(part, path)
@@ -54,14 +54,14 @@ def write_image(path: str | Path, image: Image) -> None:
 
 
 def check_image(path: Path, image: Image) -> None:
-    """Raise `VideoError` where an array is no picture that can be written."""
+    """Raise `VideoError` where an array is no (H, W, 3) or (H, W) picture of uint8."""
     found = np.asarray(image)
     if found.dtype != np.uint8 or found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] != 3) or not found.size:
         raise VideoError(f"{path}: found a picture of {found.dtype}, shape {found.shape}; expected uint8, (H, W, 3) or (H, W)")
 
 
 def open_picture(path: Path, grey: bool) -> FrameSource:
-    """One picture as a source of one frame."""
+    """A picture as a source of one frame."""
     size = size_of(read_image(path, grey))
     return FrameSource(str(path), size, math.nan, 1, math.nan, lambda: iter([Frame(0.0, read_image(path, grey))]))
 
@@ -85,7 +85,7 @@ def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
 
 
 def in_folder(folder: Path, rate: float | None = None) -> tuple[list[Path], NDArray[np.float64], bool]:
-    """A folder's pictures in natural order, their times (s), and whether these are assumed. Raises `VideoError`."""
+    """A folder's pictures in natural order, their times (s), and whether the times are assumed. Raises `VideoError`."""
     paths = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES and p.name[0] != "."), key=_natural)
     if not paths:
         raise VideoError(f"{folder}: no pictures in this folder (endings looked for: {choices(IMAGE_SUFFIXES)})")
@@ -96,12 +96,12 @@ def in_folder(folder: Path, rate: float | None = None) -> tuple[list[Path], NDAr
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sort key that puts 2 before 10."""
+    """Sort key for natural order: 2 before 10."""
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())]
 
 
 def _read_times(path: Path, count: int) -> NDArray[np.float64]:
-    """Times (count,), seconds after the first: a number a line, or the first column of a table; a heading may stand above."""
+    """Read times (count,), seconds after the first: a number a line, or the first column of a table, with or without a header."""
     try:
         lines = [line.strip() for line in path.read_text("utf-8-sig").splitlines() if line.strip()]
         cells = [re.split(r"[,;\s]", line)[0] for line in lines]

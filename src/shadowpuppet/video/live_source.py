@@ -1,4 +1,4 @@
-"""Pictures as they come: from a camera, a network stream, or a film played at its own rate as if it were live."""
+"""Live feeds of pictures: a camera, a network stream, or a film played at its own rate."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ from shadowpuppet.video.frames import size_of
 from shadowpuppet.video.network_stream import SCHEMES, open_stream, without_secrets
 
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
-"""How a network address begins."""
-LATE = 1.0
-"""Seconds that a film may be behind its own clock before the clock is put back."""
+"""Beginning of a network address."""
+MAX_DELAY = 1.0
+"""Seconds by which a film may lag behind its clock before the clock is set back."""
 
 
 class Snapshot(NamedTuple):
-    """A picture that was just taken."""
+    """A picture from a feed."""
 
     captured: float
-    """When, in seconds of a clock that never goes back."""
+    """Time of capture, seconds of the monotonic clock."""
     image: Image
     shown: float | None = None
-    """A film's own time, seconds."""
+    """Time in the film, seconds; None for a camera."""
     number: int = 0
-    """How many pictures came before it."""
+    """Number of pictures before it."""
 
 
 @dataclass(frozen=True)
 class Feed:
-    """Where pictures come from; every `read` opens it anew."""
+    """A live source of pictures; every `read` opens it again."""
 
     name: str
     size: Size
     """Width and height of its first picture, pixels."""
     rate: float
-    """Frames/s that it tells of itself; not a number where it does not."""
+    """Stated frames/s; NaN if unknown."""
     live: bool
-    """Whether more is to be expected where it ends; a film is over then."""
+    """Whether to reopen it when it ends; False for films."""
     read: Callable[[], Iterator[Snapshot]] = field(repr=False)
-    """Pictures as they come. Ends where no more come; raises `VideoError` where it cannot be opened or breaks off."""
+    """Pictures as they come, until the source ends. Raises `VideoError` where it cannot be opened or breaks off."""
 
 
 def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0) -> Feed:
     """Open a camera (its number, or `camera:N`), a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures.
 
-    A film is played at its own times, `speed` times as fast; `rate` (frames/s) replaces them, and is asked of a camera.
-    Raises `VideoError` where nothing can be read, or a film does not tell its times and no rate is given.
+    A film is played at its own times, `speed` times as fast; `rate` (frames/s) replaces them, and is requested from a camera.
+    Raises `VideoError` where nothing can be read, or a film has no times and no rate is given.
     """
     number = int(source) if str(source).isdecimal() else camera_number(source)
     scheme = ADDRESS.match(str(source))
@@ -73,18 +73,18 @@ def _camera(number: int, rate: float | None) -> Feed:
     import cv2
 
     device, first = open_device(number, rate)
-    told, ready = device.get(cv2.CAP_PROP_FPS), [device]  # opening takes a second: the first reader takes over
+    stated_rate, ready = device.get(cv2.CAP_PROP_FPS), [device]  # opening takes a second: the first reader continues with it
 
     def read() -> Iterator[Snapshot]:
         for now, image in pictures(ready.pop() if ready else open_device(number, rate)[0]):
             yield Snapshot(now, image)
 
-    return Feed(f"camera {number}", size_of(first), told if told > 0 else math.nan, True, read)
+    return Feed(f"camera {number}", size_of(first), stated_rate if stated_rate > 0 else math.nan, True, read)
 
 
 def _stream(address: str) -> Feed:
     shown, size, rate = open_stream(address)
-    ready = [shown]  # many senders serve one reader, once
+    ready = [shown]  # many senders serve one reader only once
 
     def read() -> Iterator[Snapshot]:
         for now, image in ready.pop() if ready else open_stream(address)[0]:
@@ -95,28 +95,28 @@ def _stream(address: str) -> Feed:
 
 def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] = time.monotonic,
               wait: Callable[[float], None] = time.sleep) -> Feed:
-    """A film played as if it were live: each frame comes when it is due, and is stamped with that moment."""
+    """A film played as if live: each frame comes when it is due, with that time as its time of capture."""
 
     def read() -> Iterator[Snapshot]:
-        start, told = math.nan, False
+        start, warned = math.nan, False
         for time_, image in film:
             start = clock() - time_ / speed if math.isnan(start) else start
             due = start + time_ / speed
             while (ahead := due - clock()) > 0:
                 wait(ahead)
-            if -ahead > LATE:  # as a camera, which would be slower too
+            if -ahead > MAX_DELAY:  # as a camera would, play it slower
                 start, due = start - ahead, due - ahead
-                if not told:
+                if not warned:
                     warnings.warn(f"{film.name}: cannot be decoded as fast as it is to be played; it is played slower", ShadowPuppetWarning,
                                   stacklevel=2)
-                told = True
+                warned = True
             yield Snapshot(due, image, time_)
 
     return Feed(film.name, film.size, film.rate * speed, False, read)
 
 
 def _timed(path: Path, rate: float | None) -> FrameSource:
-    """A film that has times. Raises `VideoError` where it has none and no rate is given."""
+    """Open a film. Raises `VideoError` where it has no times and no rate is given."""
     if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file():
         raise VideoError(f"{path}: found a single picture, expected a film, a folder of pictures, the number of a camera, or a network "
                          "address")

@@ -9,27 +9,27 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from shadowpuppet.errors import VideoError
+from shadowpuppet.errors import VideoError, reason
 from shadowpuppet.video.film import converter
-from shadowpuppet.video.frames import Image, Size, reason, size_of
+from shadowpuppet.video.frames import Image, Size, size_of
 
 if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
 SCHEMES = ("http", "https", "rtmp", "rtp", "rtsp", "rtsps", "tcp", "udp")
-"""Kinds of addresses."""
+"""Schemes of addresses that can be opened."""
 PROTOCOLS = "crypto,http,https,httpproxy,rtmp,rtp,rtsp,srtp,tcp,tls,udp"
-"""What FFmpeg may use on its way: no files, so that a stream's play list reads none of this machine."""
+"""Protocols that FFmpeg may use; not files, so that a stream's play list cannot read this machine's."""
 OPEN_SECONDS, READ_SECONDS = 8.0, 3.0
-"""How long an address may take to answer, and a stream to go on."""
+"""Time-outs for an address to answer, and for a stream's next data."""
 
 
 def open_stream(address: str) -> tuple[Iterator[tuple[float, Image]], Size, float]:
-    """A stream's pictures (H, W, 3) as they arrive, with the monotonic clock's seconds; their size, and the rate that it tells.
+    """Open a stream: its pictures (H, W, 3) with seconds of the monotonic clock, their size, and the stated rate (NaN if none).
 
-    The seconds are those at which a picture's data were there, before it was decoded. The first picture is waited for.
-    Raises `VideoError` where nothing answers in time or there are no pictures in it; the iterator, where the stream breaks off.
+    A picture's time is when its data had arrived, before decoding. Waits for the first picture. Raises `VideoError` where nothing answers
+    in time or the stream has no pictures; the iterator raises it where the stream breaks off.
     """
     name = without_secrets(address)
     container, stream = _opened(address, name)
@@ -51,7 +51,7 @@ def open_stream(address: str) -> tuple[Iterator[tuple[float, Image]], Size, floa
 
 
 def without_secrets(address: str) -> str:
-    """An address without a user's name and password, so that it can be shown and saved."""
+    """An address without user name and password, for display and files."""
     return re.sub(r"(?<=://)[^/@]*@", "", address)
 
 
@@ -59,7 +59,7 @@ def _opened(address: str, name: str) -> tuple[InputContainer, VideoStream]:
     import av
     import av.error
 
-    # Little is buffered on the way: a picture that waited is an old one.
+    # Buffer little: a picture that waits gets old.
     options = {"protocol_whitelist": PROTOCOLS, "fflags": "nobuffer", "flags": "low_delay", "analyzeduration": "1000000",
                **({"rtsp_transport": "tcp"} if address.lower().startswith("rtsp") else {})}
     try:
@@ -70,7 +70,7 @@ def _opened(address: str, name: str) -> tuple[InputContainer, VideoStream]:
         container.close()
         raise VideoError(f"{name}: found a stream without pictures, expected video")
     stream = container.streams.video[0]
-    stream.thread_type = "SLICE"  # threads by frames hold some back
+    stream.thread_type = "SLICE"  # threads by frames delay pictures
     return container, stream
 
 
@@ -88,7 +88,7 @@ def _pictures(container: InputContainer, stream: VideoStream, name: str) -> Iter
             except (OSError, av.error.FFmpegError) as error:
                 raise VideoError(f"{name}: the stream broke off ({_why(error)})") from None
             frames = []
-            with contextlib.suppress(av.error.FFmpegError):  # who joins late, or loses a packet, waits for the next whole picture
+            with contextlib.suppress(av.error.FFmpegError):  # after joining late or losing a packet, wait for the next key frame
                 frames = packet.decode()
             for frame in frames:
                 healthy = healthy or frame.key_frame

@@ -1,4 +1,4 @@
-"""Frames of a film at any time, for whoever goes back and forth in it: the film stays open, no more than a frame is held."""
+"""Random access to a film's frames by time; the film stays open, at most two frames are in memory."""
 
 from __future__ import annotations
 
@@ -19,19 +19,18 @@ from shadowpuppet.video.images import IMAGE_SUFFIXES, in_folder, read_image
 if TYPE_CHECKING:
     from av import VideoFrame
 
-AHEAD = 1.0
-"""Seconds up to which frames are decoded one after the other; what is farther is sought by the container's index."""
+MAX_DECODED = 1.0
+"""Seconds ahead that are decoded frame by frame; beyond, the container's index is used."""
 
 
 class Seeker:
-    """A film, picture or folder of pictures: `at(time)` is the frame nearest to a time, None where there is none within a step and a half.
+    """Frames of a film, picture or folder by time: `at(time)` is the nearest frame, None if none is within 1.5 frame intervals.
 
-    Times are as `open_frames` gives them for films whose times increase; those of others are counted from the start at each step back.
-    May be used by several threads, one at a time.
+    Times are those of `open_frames` if they increase; else frames are counted from the start after each step back. Thread-safe.
     """
 
     def __init__(self, source: Path, size: Size, rate: float | None = None) -> None:
-        """`size`: frames are scaled to it; `rate` (frames/s) replaces the film's times. Raises `VideoError` where nothing can be read."""
+        """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` where nothing can be read."""
         self.source, self.size, self.rate = source, size, rate
         self._lock, self._stack = threading.Lock(), contextlib.ExitStack()
         if source.is_dir():
@@ -42,7 +41,7 @@ class Seeker:
             self._roll = _Film(source, rate)
 
     def __enter__(self) -> Self:
-        """It is open already."""
+        """Return itself; it is open already."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -50,12 +49,12 @@ class Seeker:
         self.close()
 
     def close(self) -> None:
-        """Let the film go."""
+        """Close the film."""
         with self._lock:
             self._roll.close()
 
     def at(self, time: float) -> Image | None:
-        """The frame (H, W, 3), blue green red, that is shown at a time, seconds after the first."""
+        """The frame (H, W, 3), blue green red, at a time, seconds after the first; None if there is none."""
         import cv2
 
         with self._lock:
@@ -67,7 +66,7 @@ class Seeker:
 
 
 class _Still:
-    """One picture, at every time."""
+    """A single picture, at every time."""
 
     def __init__(self, path: Path) -> None:
         self.image = read_image(path)
@@ -80,7 +79,7 @@ class _Still:
 
 
 class _Folder:
-    """Pictures by their times."""
+    """Pictures of a folder by time."""
 
     def __init__(self, folder: Path, rate: float | None) -> None:
         self.paths, self.times, _ = in_folder(folder, rate)
@@ -95,15 +94,15 @@ class _Folder:
         """Nothing is open."""
 
 
-class _Shown(NamedTuple):
-    """A frame as it was decoded; pixels are made of those alone that are asked for."""
+class _Decoded(NamedTuple):
+    """A decoded frame; pixels are converted on demand."""
 
     time: float
     frame: VideoFrame
 
 
 class _Film:
-    """A film that is read on from where it is, or from a key frame before the one that is wanted."""
+    """A film, decoded from the present position, or from a key frame before the wanted time."""
 
     def __init__(self, path: Path, rate: float | None) -> None:
         self.path, self.convert = path, converter(grey=False)
@@ -111,37 +110,37 @@ class _Film:
         self.container, self.stream = self.stack.enter_context(opened(path))
         self.step = 1 / float(self.stream.average_rate or self.stream.guessed_rate or rate or ASSUMED_RATE)
         self.zero: int | None = None
-        self.held: _Shown | None = None
-        self.waiting: _Shown | None = None
+        self.held: _Decoded | None = None
+        self.waiting: _Decoded | None = None
         self.frames = self._read()
         self._advance()
         if self.waiting is None:
             raise VideoError(f"{path}: no frame of it can be decoded ({self.stream.codec_context.name})")
-        if self.zero is None:  # its frames tell no times
+        if self.zero is None:  # frames without times
             self.step = 1 / float(self.stream.guessed_rate or rate or ASSUMED_RATE)
-        self.scale = 1.0 if rate is None else rate * self.step  # from times that are asked for to the film's own
+        self.scale = 1.0 if rate is None else rate * self.step  # from requested times to the film's
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file."""
         self.frames.close()  # pyright: ignore[reportAttributeAccessIssue]
         self.stack.close()
 
     def at(self, time: float) -> Image | None:
         wanted = time * self.scale
         reached = self.waiting or self.held
-        if reached is None or wanted > reached.time + AHEAD or (self.held is not None and wanted < self.held.time - self.step / 4):
+        if reached is None or wanted > reached.time + MAX_DECODED or (self.held is not None and wanted < self.held.time - self.step / 4):
             self._seek(wanted)
         while self.waiting is not None and self.waiting.time <= wanted:
             self._advance()
-        near = [shown for shown in (self.held, self.waiting) if shown is not None and abs(shown.time - wanted) <= 1.5 * self.step]
-        return self.convert(min(near, key=lambda shown: abs(shown.time - wanted)).frame) if near else None
+        near = [frame for frame in (self.held, self.waiting) if frame is not None and abs(frame.time - wanted) <= 1.5 * self.step]
+        return self.convert(min(near, key=lambda frame: abs(frame.time - wanted)).frame) if near else None
 
     def _advance(self) -> None:
-        """The next frame is held, the one after it waits."""
+        """Move on by a frame: `held` is the present one, `waiting` the next."""
         self.held, self.waiting = self.waiting, next(self.frames, None)
 
     def _seek(self, wanted: float) -> None:
-        """Go to the last key frame before a time, or to the start where the film cannot be sought in."""
+        """Go to the last key frame before a time, or to the start if the film has no index."""
         import av.error
 
         base = self.stream.time_base
@@ -163,8 +162,8 @@ class _Film:
         self.frames = self._read()
         self._advance()
 
-    def _read(self) -> Iterator[_Shown]:
-        """Frames from where the container is; those of films that tell no times are counted from the start."""
+    def _read(self) -> Iterator[_Decoded]:
+        """Frames from the container's position; without time stamps they are counted from the start."""
         base, last = self.stream.time_base, -self.step
         with contextlib.suppress(Break):
             for frame in decoded(self.container, self.stream):
@@ -175,4 +174,4 @@ class _Film:
                 else:
                     self.zero = stamp if self.zero is None else self.zero
                     last = max(float((stamp - self.zero) * base), last)
-                yield _Shown(last, frame)
+                yield _Decoded(last, frame)

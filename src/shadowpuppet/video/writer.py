@@ -1,4 +1,4 @@
-"""Films written so that an interrupted one can be played."""
+"""Films written; an interrupted one can be played."""
 
 from __future__ import annotations
 
@@ -11,26 +11,32 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from shadowpuppet.errors import VideoError
-from shadowpuppet.video.frames import Image, Size, reason, size_of
+from shadowpuppet.errors import VideoError, reason
+from shadowpuppet.video.frames import Image, Size, size_of
 from shadowpuppet.video.images import check_image
 
 if TYPE_CHECKING:
     from av import VideoFrame
 
 CRF = 18
-"""Constant rate factor of H.264: the loss is hardly visible."""
+"""Constant rate factor of H.264 with hardly visible loss."""
 BT601, STUDIO_RANGE = 6, 1
-"""FFmpeg's AVCOL_SPC_SMPTE170M and AVCOL_RANGE_MPEG: how colours are turned to video, said so that players need not guess."""
+"""FFmpeg's AVCOL_SPC_SMPTE170M and AVCOL_RANGE_MPEG, stated so that players need not guess the conversion of colours."""
 
 
 def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False, crf: int = CRF) -> FrameWriter:
     """Write a film of `rate` frames/s: `with write_frames("film.mp4", 25) as film: film.write(image)`.
 
-    H.264 (.mp4, .mov, .mkv; odd sizes get their last row or column twice) of constant rate factor `crf`, 0 to 51, or with `lossless`
-    FFV1 (.mkv; grey or in colour as the first picture is). The film grows under the name `<name>.part.<ending>` and gets its own when
-    all went well; what an interrupted one has can be played from there. Raises `VideoError` where it cannot be written (no such
-    folder, disk full, no frames).
+    H.264 (.mp4, .mov, .mkv; of odd sizes the last row or column is doubled), or FFV1 if `lossless` (.mkv; grey or colour as the first
+    picture). The film is named `<name>.part.<ending>` until it is finished; an interrupted one can be played under that name. Raises
+    `VideoError` where it cannot be written (no such folder, disk full, no frames).
+
+    Args:
+        path: the film.
+        rate: frames/s.
+        size: width and height to which pictures are scaled.
+        lossless: write FFV1.
+        crf: constant rate factor of H.264, 0 to 51.
     """
     path, endings = Path(path), [".mkv"] if lossless else [".mkv", ".mov", ".mp4"]
     if path.suffix not in endings:
@@ -42,10 +48,10 @@ def write_frames(path: str | Path, rate: float, *, size: Size | None = None, los
 
 
 class FrameWriter:
-    """A film being written: a context manager with `write`. Made by `write_frames`."""
+    """Writes a film within its `with` block; made by `write_frames`."""
 
     def __init__(self, path: Path, rate: float, size: Size | None, lossless: bool, crf: int = CRF) -> None:
-        """Nothing is written before the first picture."""
+        """The file is created at the first picture."""
         self.crf = crf
         self.path, self.partial = path, path.with_name(f"{path.stem}.part{path.suffix}")
         self.rate, self.size, self.lossless = Fraction(rate).limit_denominator(1001), size, lossless
@@ -53,32 +59,32 @@ class FrameWriter:
         self._shape: tuple[int, ...] = ()
         self._container: Any = None
         self._stream: Any = None
-        self._sound = False
+        self._intact = False
 
     def __enter__(self) -> Self:
-        """Use it in a `with` block."""
+        """Return itself."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Finish the film; after an error what there is stays under its partial name, and the error goes on."""
+        """Finish the film; after an error it keeps its partial name."""
         if kind is not None:
-            with contextlib.suppress(VideoError), self._told():
+            with contextlib.suppress(VideoError), self._system_errors():
                 self._close()
             return
         if self._container is None:
             raise VideoError(f"{self.path}: no frame was given, so no film was written")
-        with self._told():
+        with self._system_errors():
             self._close()
             os.replace(self.partial, self.path)
 
     def write(self, image: Image, time: float | None = None) -> None:
-        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, of the first one's shape; it is scaled to `size`.
+        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, of the first one's shape.
 
-        `time`: when it is shown, seconds, to the millisecond, for a film whose pictures do not come at its rate; for all or none.
+        `time`: its time, seconds, to the millisecond, for pictures at no constant rate; given for all pictures or none.
         """
         check_image(self.path, image)
         image = self._fitted(image)
-        with self._told():
+        with self._system_errors():
             if self._container is None:
                 self._base = 1 / self.rate if time is None else Fraction(1, 1000)
                 self._open(image)
@@ -93,7 +99,7 @@ class FrameWriter:
         self._shape = self._shape or image.shape
         if image.shape != self._shape:
             raise VideoError(f"{self.path}: picture {self.count} has the shape {image.shape}, those before it {self._shape}")
-        if not self.lossless:  # H.264 with halved colours knows even sizes only
+        if not self.lossless:  # H.264 with 4:2:0 colours has even sizes only
             image = np.pad(image, [(0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)][: image.ndim], "edge")
         return np.ascontiguousarray(image)
 
@@ -108,7 +114,7 @@ class FrameWriter:
     def _open(self, image: Image) -> None:
         import av
 
-        # What is written so far can be read at any time, even after a kill: flushed, and .mp4 and .mov in fragments.
+        # Readable at any time, even after a kill: flushed, .mp4 and .mov in fragments.
         options = {"flush_packets": "1"} | ({} if self.path.suffix == ".mkv" else {"movflags": "hybrid_fragmented"})
         self._container = container = av.open(f"file:{self.partial}", "w", options=options)
         if self.lossless:
@@ -122,28 +128,29 @@ class FrameWriter:
         if not self.lossless:
             stream.codec_context.colorspace, stream.codec_context.color_range = BT601, STUDIO_RANGE
         self._stream = stream
-        container.start_encoding()  # creates the file: what stands in its way shows now, not many pictures later
-        self._sound = True
+        container.start_encoding()  # creates the file, so that an error is raised now
+        self._intact = True
 
     def _encode(self, frame: VideoFrame | None) -> None:
         try:
             self._container.mux(self._stream.encode(frame))
-        except Exception:  # FFmpeg crashes where more is written to a film after a failure; after Ctrl-C it can be finished
-            self._sound = False
+        except Exception:  # FFmpeg crashes if more is written after a failure; after Ctrl-C the film can be finished
+            self._intact = False
             raise
 
     def _close(self) -> None:
         if self._container is None:
             return
         try:
-            if self._sound:
+            if self._intact:
                 self._encode(None)
         finally:
             self._container.close()
             self._container = None
 
     @contextlib.contextmanager
-    def _told(self) -> Iterator[None]:
+    def _system_errors(self) -> Iterator[None]:
+        """Raises errors of the system and FFmpeg as `VideoError`, which says what was saved."""
         import av.error
         from av.codec.codec import UnknownCodecError
 

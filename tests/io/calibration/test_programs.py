@@ -16,15 +16,15 @@ from shadowpuppet.errors import CalibrationError, ShadowPuppetError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import (
     UPS,
+    examine_calibration,
     find_calibration,
     is_calibration,
-    look_into,
     read_calibration,
-    stood_up,
+    rotated_up,
     write_calibration,
 )
 from shadowpuppet.io.calibration.opencv_storage import read_storage
-from shadowpuppet.io.calibration.vicon import Bend, opencv_distortion
+from shadowpuppet.io.calibration.vicon import ViconDistortion, opencv_distortion
 from shadowpuppet.io.recording import read_recording
 
 KINDS = ("anipose.toml", "freemocap.toml", "camera_array.toml", "Calib.qca.txt", "easy", "cal", "yaml", "xml")
@@ -53,7 +53,7 @@ def said(path, *words, error=CalibrationError, **more):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_tells_the_same_cameras(files, made, kind, rng):
-    found = look_into(files[kind], sizes=lambda name: calibrations.SIZE)
+    found = examine_calibration(files[kind], sizes=lambda name: calibrations.SIZE)
     points = rng.normal(0, 0.4, (60, 3))
     assert len(found.cameras) == len(made)
     for a, b in zip(found.cameras, made):
@@ -68,8 +68,8 @@ def test_every_kind_tells_the_same_cameras(files, made, kind, rng):
     ("anipose.toml", "m", False), ("easy", "m", False),
 ])
 def test_what_lengths_are_in_is_told(files, kind, unit, told):
-    found = look_into(files[kind])
-    assert (found.unit, found.told) == (unit, told)
+    found = examine_calibration(files[kind])
+    assert (found.unit, found.unit_known) == (unit, told)
 
 
 def test_a_unit_that_no_file_tells_is_asked_for_by_name(tmp_path, made):
@@ -87,16 +87,16 @@ def test_a_unit_that_no_file_tells_is_asked_for_by_name(tmp_path, made):
 def test_freemocap_s_board_tells_the_unit(tmp_path, made, square, unit):
     path = tmp_path / "c.toml"
     path.write_text(calibrations.toml(made, 1.0, f"[metadata]\ncharuco_square_size = {square}\n"))
-    found = look_into(path)
-    assert (found.unit, found.told) == (unit, square != "1.0")
+    found = examine_calibration(path)
+    assert (found.unit, found.unit_known) == (unit, square != "1.0")
     assert any("FreeMoCap" in note for note in found.notes)
 
 
 def test_cameras_that_are_not_to_be_used_are_left_out_and_named(files):
-    assert any("set aside in Caliscope, left out: 9" in note for note in look_into(files["camera_array.toml"]).notes)
-    assert any("not placed, left out: 8" in note for note in look_into(files["camera_array.toml"]).notes)
-    assert any("markers are left out: marker" in note for note in look_into(files["Calib.qca.txt"]).notes)
-    assert look_into(files["session.xcp"]).notes == ("cameras for markers are left out: 999", "not calibrated, left out: 77")
+    assert any("set aside in Caliscope, left out: 9" in note for note in examine_calibration(files["camera_array.toml"]).notes)
+    assert any("not placed, left out: 8" in note for note in examine_calibration(files["camera_array.toml"]).notes)
+    assert any("markers are left out: marker" in note for note in examine_calibration(files["Calib.qca.txt"]).notes)
+    assert examine_calibration(files["session.xcp"]).notes == ("cameras for markers are left out: 999", "not calibrated, left out: 77")
 
 
 def test_caliscope_without_places_is_said(tmp_path):
@@ -134,16 +134,16 @@ def test_vicon_s_distortion_over_the_focal_length_is_known_by_its_size(tmp_path,
 
 def test_a_distortion_that_opencv_cannot_follow_is_told():
     matrix = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
-    straight, none = opencv_distortion(matrix, np.array([640, 480]), Bend(np.array([320.0, 240]), np.zeros(3)))
+    straight, none = opencv_distortion(matrix, np.array([640, 480]), ViconDistortion(np.array([320.0, 240]), np.zeros(3)))
     assert np.abs(straight).max() < 1e-12
     assert none < 1e-9
-    assert opencv_distortion(matrix, np.array([640, 480]), Bend(np.array([320.0, 240]), np.array([-6e-6, 0, 0])))[1] > 0.5
+    assert opencv_distortion(matrix, np.array([640, 480]), ViconDistortion(np.array([320.0, 240]), np.array([-6e-6, 0, 0])))[1] > 0.5
 
 
 def test_a_file_without_sizes_is_given_one(tmp_path, made):
     (tmp_path / "intri.yml").write_text(calibrations.intri(made, sizes=False))
     (tmp_path / "extri.yml").write_text(calibrations.extri(made))
-    found = look_into(tmp_path / "extri.yml")
+    found = examine_calibration(tmp_path / "extri.yml")
     assert {camera.size for camera in found.cameras} == {(640, 480)}
     assert "taken for 640 x 480, by the principal point" in found.notes[0]
     assert read_calibration(tmp_path, sizes=lambda name: (1280, 960))[0].size == (1280, 960)
@@ -172,7 +172,7 @@ def test_a_lens_alone_is_a_level_camera(tmp_path, made):
     path.write_text("image_width: 640\nimage_height: 480\ncamera_name: left\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [500, 0, 320, "
                     "0, 500, 240, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
                     "  data: [0.1, 0, 0, 0, 0]\n")  # fmt: skip
-    found = look_into(path)
+    found = examine_calibration(path)
     (camera,) = found.cameras
     assert (camera.name, camera.size, camera.oriented, camera.distortion[0]) == ("left", (640, 480), False, 0.1)
     assert "lens alone" in found.notes[0]
@@ -181,7 +181,7 @@ def test_a_lens_alone_is_a_level_camera(tmp_path, made):
 @pytest.mark.parametrize("up", [up for up in UPS if up != "cameras"])
 def test_the_way_up_is_brought_to_z(made, up):
     axis = np.array(UPS[up], float)
-    turned = stood_up(tuple(made), up)
+    turned = rotated_up(tuple(made), up)
     for a, b in zip(turned, made):
         assert a.centre[2] == pytest.approx(b.centre @ axis)
         assert np.linalg.det(a.T_camera_world[:3, :3]) == pytest.approx(1)
@@ -326,10 +326,26 @@ def test_damaged_files_are_read_or_said(tmp_path, name, data):
 
 def told_or_read(path) -> bool:
     try:
-        found = look_into(path)
+        found = examine_calibration(path)
     except ShadowPuppetError as error:
         return str(path) in str(error) and "\n" not in str(error) and len(str(error)) < 900
     return len(found.cameras) > 0 and all(np.isfinite(camera.T_camera_world).all() for camera in found.cameras)
+
+
+@pytest.mark.parametrize(("rows", "cols"), [("0", "1e308"), ("1e308", "0"), ("0", "5000"), ("1e200", "1e200")])
+def test_impossible_matrices_are_passed_over(tmp_path, rows, cols):
+    (tmp_path / "a.yml").write_text(f"%YAML:1.0\nmap: !!opencv-matrix\n  rows: {rows}\n  cols: {cols}\n  dt: d\n  data: []\n")
+    with pytest.raises(CalibrationError, match=r"a\.yml: no camera matrix in it"):
+        examine_calibration(tmp_path / "a.yml")
+
+
+def test_a_distortion_that_no_lens_has_is_said(tmp_path, files):
+    text = files["session.xcp"].read_text()
+    text = re.sub(r'VICON_RADIAL2="ViconRadial2 (\S+) (\S+) \S+', r'VICON_RADIAL2="ViconRadial2 \1 \2 1e300', text)
+    text = re.sub(r'VICON_RADIAL="\S+', 'VICON_RADIAL="1e300', text)
+    (tmp_path / "a.xcp").write_text(text)
+    with pytest.raises(CalibrationError, match=r"a\.xcp: camera '.*': found the distortion .*, expected that of a lens"):
+        examine_calibration(tmp_path / "a.xcp")
 
 
 @settings(max_examples=30, suppress_health_check=SCRATCH, deadline=None)
@@ -371,4 +387,5 @@ def test_a_recording_may_have_any_of_them(tmp_path, made, files):
 
 
 def test_a_turn_of_half_a_circle_is_one(made):
-    assert np.allclose(stood_up((Camera("a", (4, 4), np.eye(3), T_camera_world=rigid(np.eye(3), [1, 2, 3])),), "-z")[0].centre, [-1, 2, 3])
+    camera = Camera("a", (4, 4), np.eye(3), T_camera_world=rigid(np.eye(3), [1, 2, 3]))
+    assert np.allclose(rotated_up((camera,), "-z")[0].centre, [-1, 2, 3])

@@ -15,7 +15,7 @@ from vicon import c3d
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, renamed
-from shadowpuppet.io.motion.motion_files import TURNS, leg_length, read_motion, up_axis
+from shadowpuppet.io.motion.motion_files import TO_Z_UP, leg_length, read_motion, up_axis
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.metrics import LIMB_JOINTS
 from shadowpuppet.motion.motion import JointTable
@@ -110,9 +110,9 @@ def test_acclaim_finds_its_skeleton_and_takes_a_rate(tmp_path):
         read_motion(path)
 
 
-@pytest.mark.parametrize("axis", TURNS)
+@pytest.mark.parametrize("axis", TO_Z_UP)
 def test_whichever_axis_is_up_z_is_afterwards(tmp_path, standing, axis):
-    R = np.array(TURNS[axis], float)
+    R = np.array(TO_Z_UP[axis], float)
     np.testing.assert_allclose(R @ R.T, np.eye(3))
     assert np.linalg.det(R) == pytest.approx(1)  # a mirror would make left right
     write_joints(tmp_path / "turned.trc", JointTable(standing.times, standing.names, standing.positions @ R))

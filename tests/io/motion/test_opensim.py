@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.io.motion.mot import Coordinates, read_mot, write_mot
 from shadowpuppet.io.motion.motion_files import read_motion
-from shadowpuppet.io.motion.opensim import COORDINATES, MARKERS, Ball, coordinates, marker_names
+from shadowpuppet.io.motion.opensim import COORDINATES, MARKERS, Ball, Coordinates, coordinates, marker_names, read_mot, write_mot
 from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation

@@ -14,10 +14,9 @@ from damage import told_or_read
 
 from shadowpuppet.body.models import MODELS
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.files.npz import read_npz, write_npz
-from shadowpuppet.io.motion.motion_table import LENGTHS, motion_columns, table_columns, write_columns_csv
+from shadowpuppet.io.motion.npz import read_npz, write_npz
 from shadowpuppet.io.motion.parquet import read_parquet, write_parquet
-from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.motion.table import TRANSLATIONS, motion_columns, read_joints, table_columns, write_columns
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.motion import JointTable, Motion
 
@@ -70,13 +69,13 @@ def test_a_run_as_columns_has_everything_with_units_in_the_names_and_nulls_in_ga
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_degrees_of_freedom_that_are_places_are_known_as_such(name):
     dofs = runs.body_of(name).skeleton.dofs
-    assert {dof.name for dof in dofs if dof.kind == "translation"} == {dof.name for dof in dofs} & set(LENGTHS)
+    assert {dof.name for dof in dofs if dof.kind == "translation"} == {dof.name for dof in dofs} & set(TRANSLATIONS)
 
 
 @pytest.mark.parametrize("name", ["rounded", "anatomical"])
 def test_the_same_columns_as_a_csv_are_a_table_of_joints(tmp_path, name):
     motion = read_run(runs.make_run(tmp_path / "run", name, lost=(2,), spread=True)).motion
-    write_columns_csv(tmp_path / "a.csv", motion_columns(motion))
+    write_columns(tmp_path / "a.csv", motion_columns(motion))
     found = read_joints(tmp_path / "a.csv")
     assert found.names == motion.joint_names
     np.testing.assert_allclose(found.positions, motion.joints, atol=6e-7)

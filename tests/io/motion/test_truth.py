@@ -14,8 +14,8 @@ from measured import moved, person
 from vicon import c3d
 
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
+from shadowpuppet.io.motion.motion_files import names_in, read_truth
 from shadowpuppet.io.motion.table import write_joints
-from shadowpuppet.io.motion.truth import names_in, read_truth
 from shadowpuppet.motion.metrics import LIMB_JOINTS
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",

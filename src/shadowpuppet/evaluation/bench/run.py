@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.errors import ShadowPuppetError, reason
 from shadowpuppet.evaluation.bench.machine import environment
 from shadowpuppet.evaluation.bench.mono import run_mono
 from shadowpuppet.evaluation.bench.multi import run_multi
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.threads import one_blas_thread
 

@@ -1,4 +1,4 @@
-"""XML of motion capture systems and of OpenCV, without what makes XML dangerous."""
+"""XML of motion capture systems and OpenCV, read without entities, at limited depth."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.draft import numbers_of, text_of
 
-DEEPEST = 40
-"""Levels; calibrations have seven."""
+MAX_DEPTH = 40
+"""Levels of elements; calibrations have seven."""
 
 
 def tree_of(path: Path) -> Element:
-    """The root of an XML file. Raises `CalibrationError`; definitions of a file's own (DOCTYPE, ENTITY) are refused, not followed."""
+    """The root of an XML file. Raises `CalibrationError`, also for a file with definitions (DOCTYPE, ENTITY)."""
     text = text_of(path)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise CalibrationError(f"{path}: found definitions of its own (DOCTYPE), expected plain XML, as calibrations are")
@@ -27,8 +27,8 @@ def tree_of(path: Path) -> Element:
             for event, element in cast("Iterator[tuple[str, Element]]", parser.read_events()):
                 root = element if root is None else root
                 depth += 1 if event == "start" else -1
-                if depth > DEEPEST:
-                    raise CalibrationError(f"{path}: found more than {DEEPEST} levels of XML, expected a calibration")
+                if depth > MAX_DEPTH:
+                    raise CalibrationError(f"{path}: found more than {MAX_DEPTH} levels of XML, expected a calibration")
         parser.close()
     except (ParseError, ValueError) as error:
         raise CalibrationError(f"{path}: not valid XML: {error}") from None

@@ -1,4 +1,4 @@
-"""HumanEva's calibrations (.cal): the numbers of Bouguet's toolbox, `Xc = R X + T` in millimetres, one camera a file; no sizes."""
+"""HumanEva's calibrations (.cal): numbers of Bouguet's toolbox, `Xc = R X + T` in millimetres, a camera a file, no picture sizes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.calibration.draft import Draft, Found, text_of
+from shadowpuppet.io.calibration.draft import Draft, Drafts, text_of
 
-CALIBRATION = 22
-"""Numbers of a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
-HIGHEST = 480
-"""Rows of HumanEva's pictures; by how many pixels a skew leans over half of so many is told where the size is not known."""
+NUMBERS = 22
+"""In a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
+ROWS = 480
+"""Rows of HumanEva's pictures, for the effect of a skew where the size is unknown."""
 
 
 def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
-    """A camera from a .cal file. Raises `CalibrationError`."""
+    """Read a camera from a .cal file. Raises `CalibrationError`."""
     draft = draft_of(path, name, size)
     assert draft.T is not None
     try:
@@ -28,22 +28,22 @@ def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
         raise CalibrationError(f"{path}: {error}") from None
 
 
-def read_bouguet(path: Path) -> Found:
-    """The camera of a .cal file, or of all in a folder, named by the files. Raises `CalibrationError`."""
+def read_bouguet(path: Path) -> Drafts:
+    """Read a .cal file, or all in a folder; cameras have the files' names. Raises `CalibrationError`."""
     files = sorted(path.glob("*.cal")) if path.is_dir() else [path]
-    return Found(tuple(draft_of(file, file.stem) for file in files), "mm")
+    return Drafts(tuple(draft_of(file, file.stem) for file in files), "mm")
 
 
 def draft_of(path: Path, name: str, size: tuple[int, int] | None = None) -> Draft:
-    """A .cal file's camera."""
+    """The camera of a .cal file, lengths in millimetres. Raises `CalibrationError`."""
     try:
         values = np.array(text_of(path).split(), float)
     except ValueError:
         values = np.full(1, np.nan)
-    if len(values) < CALIBRATION or not np.isfinite(values).all():
-        raise CalibrationError(f"{path}: expected {CALIBRATION} numbers (fc, cc, alpha, kc, R row by row, T), found something else")
-    fc, cc, alpha, kc, R, T = np.split(values[:CALIBRATION], np.cumsum([2, 2, 1, 5, 9]))
-    skew = abs(float(alpha[0])) * (size[1] if size is not None else HIGHEST) / 2
+    if len(values) < NUMBERS or not np.isfinite(values).all():
+        raise CalibrationError(f"{path}: expected {NUMBERS} numbers (fc, cc, alpha, kc, R row by row, T), found something else")
+    fc, cc, alpha, kc, R, T = np.split(values[:NUMBERS], np.cumsum([2, 2, 1, 5, 9]))
+    skew = abs(float(alpha[0])) * (size[1] if size is not None else ROWS) / 2
     if skew > 1:
         raise CalibrationError(f"{path}: alpha: found {alpha[0]:g}, a skew of up to {skew:.4g} pixels, expected none")
     if skew > 0.01:

@@ -1,4 +1,4 @@
-"""Calibrations of any kind to cameras in metres, Z up, and back: which formats there are, and what is settled for all of them."""
+"""Calibration files of all formats, read as cameras in metres, Z up, and written."""
 
 from __future__ import annotations
 
@@ -10,59 +10,57 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices
+from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices, reason
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration.bouguet import read_bouguet
-from shadowpuppet.io.calibration.draft import Draft, Found
+from shadowpuppet.io.calibration.draft import Draft, Drafts
 from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts, files_of, pair_of, read_opencv
 from shadowpuppet.io.calibration.pose2sim import check_name, read_tables, tables_text
 from shadowpuppet.io.calibration.qualisys import read_qualisys
 from shadowpuppet.io.calibration.vicon import read_vicon
-from shadowpuppet.io.files.text import reason, write_whole
-from shadowpuppet.io.files.toml import FILE_LIMIT as FILE_LIMIT
-from shadowpuppet.io.files.toml import read_toml as read_toml
+from shadowpuppet.io.files.text import write_whole
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-"""Metres of what lengths may be in."""
+"""Units of length in metres."""
 UPS = {"z": (0, 0, 1), "y": (0, 1, 0), "x": (1, 0, 0), "-z": (0, 0, -1), "-y": (0, -1, 0), "-x": (-1, 0, 0), "cameras": None}
-"""Directions of a file's world that may be up; `cameras`: what is up in the pictures, on the whole."""
-FARTHEST = 100.0
-"""Metres; a camera farther from the world's origin was measured in millimetres."""
+"""Directions of a file's world that may be up; `cameras`: the direction that is up in the pictures."""
+MAX_DISTANCE = 100.0
+"""Limit of a camera's distance from the origin, metres; beyond, lengths are probably millimetres."""
 SIZES = ((640, 480), (848, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024), (1440, 1080), (1600, 1200), (1920, 1080),
          (1920, 1200), (2048, 1536), (2704, 1520), (2560, 1440), (3840, 2160), (4096, 2160))
-"""Pictures that there are; what a file without sizes is held against, with twice the principal point."""
-NEAR = 0.08
-"""How far twice the principal point may be from such a size, relatively."""
-PARALLEL, BORNE_OUT = 0.02, 0.8
-"""How much rows of pictures must differ in direction, and agree with what is up in them, to tell what is level."""
-HEAD = 4096
-"""Bytes by which a format is known."""
+"""Common picture sizes; a camera without a size gets the one nearest to twice its principal point."""
+SIZE_TOLERANCE = 0.08
+"""Largest relative difference to one of `SIZES`."""
+MIN_SPREAD, MIN_AGREEMENT = 0.02, 0.8
+"""For `_level`: least second eigenvalue of the directions of rows, and cosine between their normal and the mean up direction."""
+HEAD_BYTES = 4096
+"""Bytes by which a format is recognised."""
 
 
 class Format(NamedTuple):
-    """A kind of calibration file."""
+    """A format of calibration files."""
 
     name: str
-    """As it is told."""
+    """For messages."""
     fits: Callable[[Path, str], bool]
-    """Whether a file is of this kind, by its path and how it begins."""
-    read: Callable[[Path], Found]
+    """Whether a file has this format, by its path and beginning."""
+    read: Callable[[Path], Drafts]
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Cameras of a file, and how it was read."""
+    """A calibration's cameras, and how it was read."""
 
     path: Path
     format: str
     cameras: tuple[Camera, ...]
-    """Metres, Z up as far as is known."""
+    """In metres, Z up if known."""
     unit: str
-    """What the file's lengths are in: m, cm or mm."""
-    told: bool
-    """Whether the file, its format or the user says so; metres otherwise."""
+    """Unit of the file: m, cm or mm."""
+    unit_known: bool
+    """Whether the file, its format or the user states the unit; else metres are assumed."""
     notes: tuple[str, ...]
-    """What a user should know of how it was read, a sentence each."""
+    """Remarks for the user, a sentence each."""
 
 
 def _ends(path: Path, *endings: str) -> bool:
@@ -79,24 +77,29 @@ HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), rea
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
 FORMATS = (QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
-"""By what they are known, in this order."""
+"""In the order in which they are tried."""
 
 
 def read_calibration(path: str | Path, *, unit: str | None = None, up: str | None = None,
                      sizes: Callable[[str], tuple[int, int] | None] | None = None) -> tuple[Camera, ...]:
-    """Cameras of a calibration file, or folder of such, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
+    """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
-    TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML, EasyMocap's pair, Qualisys'
-    .qca.txt, Vicon's .xcp, HumanEva's .cal; known by content. `unit` (m, cm, mm) is what its lengths are in, where it does not say; `up`
-    (`UPS`) which direction of its world is up. `sizes`: width and height of a camera's pictures by its name, for files without.
-    Raises `CalibrationError` with the file, camera and field where something is missing or cannot be a camera's.
+    Formats, recognised by content: TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML,
+    EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field where
+    something is missing or impossible.
+
+    Args:
+        path: the file or folder.
+        unit: unit of lengths (m, cm, mm), for files that do not state it.
+        up: direction of the file's world that is up, of `UPS`.
+        sizes: width and height of a camera's pictures by its name, for files without sizes.
     """
-    return look_into(path, unit, up, sizes).cameras
+    return examine_calibration(path, unit, up, sizes).cameras
 
 
-def look_into(path: str | Path, unit: str | None = None, up: str | None = None,
+def examine_calibration(path: str | Path, unit: str | None = None, up: str | None = None,
               sizes: Callable[[str], tuple[int, int] | None] | None = None) -> Calibration:
-    """As `read_calibration`, with how it was read."""
+    """As `read_calibration`, with remarks."""
     path = Path(path)
     for what, value, known in (("unit", unit, UNITS), ("up", up, UPS)):
         if value is not None and value not in known:
@@ -114,12 +117,12 @@ def look_into(path: str | Path, unit: str | None = None, up: str | None = None,
             where = draft.where or f"camera {draft.name!r}: "
             raise CalibrationError(f"{path}: {'' if str(error).startswith(where) else where}{error}") from None
         cameras[camera.name] = camera
-    upright = stood_up(tuple(cameras.values()), up) if up else tuple(cameras.values())
+    upright = rotated_up(tuple(cameras.values()), up) if up else tuple(cameras.values())
     return Calibration(path, kind.name, upright, used, bool(unit or found.unit), tuple(notes))
 
 
 def format_of(path: Path) -> Format:
-    """The kind of calibration that a file or folder is. Raises `CalibrationError` where it is none that is known."""
+    """The format of a file or folder. Raises `CalibrationError` where it is none of `FORMATS`."""
     if path.is_dir():
         if any(path.glob("*.cal")):
             return HUMANEVA
@@ -129,7 +132,7 @@ def format_of(path: Path) -> Format:
         return EASYMOCAP if any(file.stem in ("intri", "extri") for file in files_of(path)) else OPENCV
     try:
         with path.open("rb") as file:
-            head = file.read(HEAD)
+            head = file.read(HEAD_BYTES)
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be read ({reason(error)})") from None
     if path.suffix.lower() in (".pickle", ".pkl") or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5"):
@@ -143,14 +146,14 @@ def format_of(path: Path) -> Format:
 
 
 def is_calibration(path: Path) -> bool:
-    """Whether a file or folder is a calibration, by its beginning; whether it is a good one is said when it is read."""
+    """Whether a file or folder is a calibration, by its beginning; reading it may still fail."""
     try:
         kind = format_of(path)
     except CalibrationError:
         return path.suffix.lower() in (".pickle", ".pkl")
     if path.is_file() and kind is TABLES:
         with path.open("rb") as file:
-            return b"matrix" in file.read(HEAD)
+            return b"matrix" in file.read(HEAD_BYTES)
     return True
 
 
@@ -158,8 +161,8 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
     check_name(draft.name)
     T = draft.T if draft.T is not None else Camera.from_fov((2, 2), 1.0).T_camera_world
     distance = float(np.linalg.norm(T[:3, 3])) * metres
-    if not distance <= FARTHEST:
-        raise CalibrationError(f"translation: found {T[:3, 3].tolist()}, {distance:g} long, expected at most {FARTHEST:g} "
+    if not distance <= MAX_DISTANCE:
+        raise CalibrationError(f"translation: found {T[:3, 3].tolist()}, {distance:g} long, expected at most {MAX_DISTANCE:g} "
                                "metres; it is probably in millimetres: say so by unit = \"mm\" in recording.toml, or write it in metres, "
                                "with `shadowpuppet info FILE --unit mm --to NEW.toml`")
     size = draft.size or (sizes(draft.name) if sizes is not None else None) or _guessed(draft, notes)
@@ -172,20 +175,20 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
 
 
 def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
-    """A size for a file without, by twice the principal point."""
+    """A size for a camera without one, by twice the principal point."""
     twice = 2 * np.asarray(draft.matrix, float)[:2, 2] + 1
     if not (np.isfinite(twice).all() and (twice >= 2).all() and (twice < 1e5).all()):
         raise CalibrationError(f"found no picture size, and a principal point of {((twice - 1) / 2).tolist()}, expected one in the picture")
     known = [size for wide, high in SIZES for size in ((wide, high), (high, wide))]
     off = np.abs(np.array(known) / twice - 1).max(1)
     best = int(off.argmin())
-    size: tuple[float, float] = known[best] if off[best] < NEAR else (round(float(twice[0])), round(float(twice[1])))
+    size: tuple[float, float] = known[best] if off[best] < SIZE_TOLERANCE else (round(float(twice[0])), round(float(twice[1])))
     notes.append(f"camera {draft.name!r}: no picture size in the file: taken for {size[0]} x {size[1]}, by the principal point")
     return size
 
 
-def stood_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
-    """Cameras in a world that is turned so that its direction `up` (`UPS`) is Z."""
+def rotated_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
+    """Cameras in the world rotated so that its direction `up` (of `UPS`) is Z."""
     direction = UPS[up]
     if direction is None:
         direction = _level(cameras)
@@ -194,19 +197,19 @@ def stood_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
 
 
 def _level(cameras: tuple[Camera, ...]) -> Array:
-    """What is up (3,) where cameras are not rolled: at right angles to the rows of all pictures, whatever they are tilted by.
+    """The up direction (3,) for cameras without roll: normal to the rows of all pictures, whatever the tilt.
 
-    What is up in the pictures on the whole, where rows are parallel, or do not bear it out.
+    Where rows are parallel, or the normal disagrees with the pictures' mean up direction, that mean.
     """
     mean = -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
     rows = np.array([camera.T_camera_world[0, :3] for camera in cameras])
     sizes, axes = np.linalg.eigh(rows.T @ rows / len(rows))
     up = axes[:, 0] * np.sign(axes[:, 0] @ mean)
-    return up if sizes[1] > PARALLEL and up @ mean > BORNE_OUT * np.linalg.norm(mean) else mean
+    return up if sizes[1] > MIN_SPREAD and up @ mean > MIN_AGREEMENT * np.linalg.norm(mean) else mean
 
 
 def _turn_to_z(direction: Array) -> Array:
-    """The least turn (4, 4) that brings a direction (3,) to Z."""
+    """The smallest rotation (4, 4) that brings a direction (3,) to Z."""
     length = float(np.linalg.norm(direction))
     d = direction / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
     v, c = np.cross(d, (0, 0, 1)), d[2]
@@ -217,10 +220,10 @@ def _turn_to_z(direction: Array) -> Array:
 
 
 def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
-    """Write cameras so that `read_calibration` gives them back, in metres: TOML as Pose2Sim and Anipose read it, or, where the path is a
-    folder or one of intri.yml and extri.yml, EasyMocap's two files.
+    """Write cameras for `read_calibration`, in metres: TOML for Pose2Sim and Anipose; into a folder, or for intri.yml or extri.yml,
+    EasyMocap's two files.
 
-    Raises `CalibrationError` where that cannot be.
+    Raises `CalibrationError` where they cannot be written.
     """
     path, made = Path(path), list(cameras)
     names = [camera.name for camera in made]
@@ -250,9 +253,9 @@ def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
 
 
 def find_calibration(folder: Path) -> Path | None:
-    """The calibration that lies in a recording folder, or in its folder `calibration`; None where there is none.
+    """The calibration in a recording folder, or in its folder `calibration`; None without one. calibration.toml comes first.
 
-    calibration.toml is it, where it is there. Raises `CalibrationError` where there are several.
+    Raises `CalibrationError` where there are several.
     """
     if (folder / "calibration.toml").exists():
         return folder / "calibration.toml"
@@ -260,7 +263,7 @@ def find_calibration(folder: Path) -> Path | None:
         if not place.is_dir():
             continue
         files = [path for path in sorted(place.iterdir()) if path.is_file() and path.suffix.lower() in ENDINGS and path.name[0] != "."
-                 and path.name not in OTHERS and is_calibration(path)]
+                 and path.name not in NO_CALIBRATIONS and is_calibration(path)]
         whole = {place if _in_pieces(path, files) else path for path in files}
         if len(whole) > 1:
             raise CalibrationError(f"{place}: found several calibrations ({choices(path.name for path in files)}); say in recording.toml "
@@ -271,12 +274,12 @@ def find_calibration(folder: Path) -> Path | None:
 
 
 ENDINGS = (".toml", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".pickle", ".pkl")
-"""Of files that may be calibrations, in a folder."""
-OTHERS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml")
-"""Files of such endings that are known to be something else."""
+"""Endings of files that may be calibrations."""
+NO_CALIBRATIONS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml")
+"""Files with such endings that are something else."""
 
 
 def _in_pieces(path: Path, files: list[Path]) -> bool:
-    """Whether a file is a part of its folder's calibration, not one alone."""
+    """Whether a file is only a part of its folder's calibration."""
     alike = [other for other in files if other.suffix == path.suffix]
     return pair_of(path) is not None or (len(alike) > 1 and len(alike) == len(files) and path.suffix.lower() in (".cal", *SUFFIXES))

@@ -1,4 +1,4 @@
-"""What a calibration file tells of its cameras, before units, the way up and sizes are settled."""
+"""Cameras as a calibration file has them, before unit, up direction and sizes are resolved."""
 
 from __future__ import annotations
 
@@ -11,56 +11,48 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.files.text import reason
-from shadowpuppet.io.files.toml import FILE_LIMIT
+from shadowpuppet.io.files.text import TOML_LIMIT, read_limited
 
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """One camera of a file; lengths in the file's unit, everything else as `Camera` has it."""
+    """A camera of a file: lengths in the file's unit, all else as in `Camera`."""
 
     name: str
     matrix: object
     """Intrinsics, (3, 3), pixels."""
     distortion: object
-    """As OpenCV has it."""
+    """In OpenCV's order."""
     T: Array | None
-    """World to camera, (4, 4), its translation in the file's unit; None where the file tells of the lens alone."""
+    """World to camera, (4, 4), translation in the file's unit; None where the file has the lens only."""
     size: Sequence[float] | None = None
-    """Width and height, pixels; None where the file does not tell."""
+    """Width and height, pixels; None if not stated."""
     fisheye: bool = False
     oriented: bool = True
     where: str = ""
-    """What messages about it begin with, such as `[cam1]: `."""
+    """Beginning of messages about it, such as `[cam1]: `."""
 
 
-class Found(NamedTuple):
-    """What a calibration file holds."""
+class Drafts(NamedTuple):
+    """The content of a calibration file."""
 
     drafts: tuple[Draft, ...]
     unit: str | None = None
-    """What its lengths are in, where the format or the file itself says so: m, cm or mm."""
+    """Unit of lengths, m, cm or mm, if the format or file states it."""
     notes: tuple[str, ...] = ()
-    """What a user should know of how it was read, a sentence each."""
+    """Remarks for the user, a sentence each."""
 
 
 def text_of(path: Path) -> str:
-    """A calibration file's text. Raises `CalibrationError` where it cannot be read, is too long or no text."""
-    try:
-        if path.stat().st_size > FILE_LIMIT:
-            raise CalibrationError(f"{path}: found {path.stat().st_size} bytes, expected a calibration of at most {FILE_LIMIT}")
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be read ({reason(error)})") from None
-    except UnicodeDecodeError as error:
-        raise CalibrationError(f"{path}: found bytes that are no text at position {error.start}, expected a calibration file") from None
+    """The text of a calibration file. Raises `CalibrationError` where it cannot be read, is too long or no text."""
+    text = read_limited(path, TOML_LIMIT, CalibrationError, "a calibration file", "a calibration")
     if "\0" in text:
         raise CalibrationError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
     return text
 
 
 def numbers_of(text: str | None, counts: Sequence[int]) -> Array | None:
-    """Finite numbers with blanks or commas between; None where these are none, or not so many."""
+    """Finite numbers separated by blanks or commas; None for anything else, or a number of them not in `counts`."""
     try:
         values = np.array((text or "").replace(",", " ").split(), float)
     except ValueError:

@@ -1,9 +1,9 @@
 """Calibrations in OpenCV's YAML or XML: one camera a file, several by numbered or named keys, a stereo pair, EasyMocap's two files.
 
-Programs name the same things differently; keys are told by what they begin with: camera_matrix, K_1, M1, cameraMatrix ... Rotations
-and translations go from the world to the camera. Where there is but one pair of these beside two lenses, it is `stereoCalibrate`'s:
-from the first camera, which is the world, to the second. EasyMocap: intri.yml has `names`, K_<name>, dist_<name> and maybe H_, W_<name>,
-extri.yml R_<name> (a vector), Rot_<name> (a matrix), T_<name>, in the unit of its user, metres as a rule.
+Programs use different names; keys are recognised by their beginnings: camera_matrix, K_1, M1, cameraMatrix ... Rotations and
+translations are from the world to the camera. A single pair of these beside two lenses is `stereoCalibrate`'s: from the first camera,
+which is the world, to the second. EasyMocap: intri.yml has `names`, K_<name>, dist_<name> and perhaps H_, W_<name>, extri.yml R_<name>
+(a vector), Rot_<name> (a matrix), T_<name>, usually in metres.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
-from shadowpuppet.io.calibration.draft import Draft, Found
+from shadowpuppet.io.calibration.draft import Draft, Drafts
 from shadowpuppet.io.calibration.opencv_storage import read_storage
 
 STEMS = {
@@ -28,15 +28,15 @@ STEMS = {
     "translation": "translation_?vector|translation|tvec|trans|t",
     "width": "image_?width|width|w", "height": "image_?height|height|h", "size": "image_?size|img_?size|resolution|size",
 }
-"""How programs name what a camera has."""
+"""Programs' names for a camera's parameters."""
 PATTERNS = {kind: re.compile(rf"({stem})(?:[_-]?(\d+)|[_-](.+))?", re.IGNORECASE) for kind, stem in STEMS.items()}
 PAIR = (("intri", "extri"), ("intrinsics", "extrinsics"), ("intrinsic", "extrinsic"))
-"""Names of files that belong together."""
+"""Names of pairs of files."""
 SUFFIXES = (".yml", ".yaml", ".xml")
 
 
-def read_opencv(path: Path) -> Found:
-    """Cameras of a file, of the two that belong together, or of a folder with one camera a file. Raises `CalibrationError`."""
+def read_opencv(path: Path) -> Drafts:
+    """Cameras of a file, a pair of files, or a folder with a camera a file. Raises `CalibrationError`."""
     if path.is_dir():
         pair = next((pair for pair in map(pair_of, sorted(path.iterdir())) if pair is not None), None)
         return read_opencv(pair[0]) if pair is not None else _one_a_file(path)
@@ -45,11 +45,11 @@ def read_opencv(path: Path) -> Found:
     for file in pair or [path]:
         values |= read_storage(file)
     drafts, notes = _drafts(path, values, path.stem if pair is None else "cam")
-    return Found(tuple(drafts), None, tuple(notes))
+    return Drafts(tuple(drafts), None, tuple(notes))
 
 
 def pair_of(path: Path) -> tuple[Path, Path] | None:
-    """The files for lenses and places that a file is one of; None where it stands alone."""
+    """The pair of files, intrinsics and extrinsics, to which a file belongs; None if it has no partner."""
     for names in PAIR:
         if path.stem in names and path.suffix.lower() in SUFFIXES:
             files = path.with_stem(names[0]), path.with_stem(names[1])
@@ -58,11 +58,11 @@ def pair_of(path: Path) -> tuple[Path, Path] | None:
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Files of a folder that are OpenCV's by their ending."""
+    """Files of a folder with an ending of OpenCV's."""
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file() and path.name[0] != ".")
 
 
-def _one_a_file(folder: Path) -> Found:
+def _one_a_file(folder: Path) -> Drafts:
     drafts, notes = [], []
     for file in files_of(folder):
         made, said = _drafts(file, read_storage(file), file.stem)
@@ -70,11 +70,11 @@ def _one_a_file(folder: Path) -> Found:
             raise CalibrationError(f"{file}: found {len(made)} cameras, expected one, as there are several files in {folder}")
         drafts += made
         notes += said
-    return Found(tuple(drafts), None, tuple(notes))
+    return Drafts(tuple(drafts), None, tuple(notes))
 
 
 def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft], list[str]]:
-    """Cameras by what the ends of keys say; one without is called `alone`."""
+    """Cameras by the ends of keys; `alone`: name of a camera whose keys have none."""
     cameras = _grouped(values)
     lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
     if not lenses:
@@ -98,10 +98,10 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft]
 
 
 def _grouped(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """What each camera has, by the ends of keys."""
+    """Each camera's parameters, by the end of their keys."""
     cameras: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
-        if value is None or (key in ("R1", "R2") and "P1" in values):  # stereoRectify's, which are no places
+        if value is None or (key in ("R1", "R2") and "P1" in values):  # stereoRectify's, which are no extrinsics
             continue
         for kind, pattern in PATTERNS.items():
             match = pattern.fullmatch(key)
@@ -138,7 +138,7 @@ def _draft(path: Path, name: str, parts: dict[str, Any], fisheye: bool) -> Draft
 
 
 def easymocap_texts(cameras: Sequence[Camera]) -> tuple[str, str]:
-    """EasyMocap's intri.yml and extri.yml; metres. Raises `CalibrationError` for what it has no place for."""
+    """Contents of EasyMocap's intri.yml and extri.yml; metres. Raises `CalibrationError` for what these cannot hold."""
     for camera in cameras:
         if camera.fisheye:
             raise CalibrationError(f"camera {camera.name!r} is a fisheye, which EasyMocap's files have no place for; write TOML")

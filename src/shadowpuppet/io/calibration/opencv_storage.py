@@ -1,6 +1,6 @@
-"""OpenCV's FileStorage, YAML and XML, as plain values: matrices, numbers, words and lists of them.
+"""OpenCV's FileStorage, YAML and XML, read as matrices, numbers, words and lists of these.
 
-A small reader of our own: files come from anywhere, and OpenCV's parser runs outside of Python's care.
+A reader of our own: damaged files crash OpenCV's parser.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from shadowpuppet.io.calibration._xml import tree_of
 from shadowpuppet.io.calibration.draft import numbers_of, text_of
 
 MATRIX = ("rows", "cols", "data")
-"""What makes a table a matrix."""
+"""Keys of a matrix."""
 KEY = re.compile(r"^(\s*)([\w.-]+)\s*:(?:\s+(.*))?$")
-LARGEST = 4096
-"""Numbers of a matrix that is read; calibrations have 3 x 3 of them, maps of rectification have millions."""
+MAX_ELEMENTS = 4096
+"""Larger matrices are skipped: calibrations have 3 x 3 numbers, maps of rectification millions."""
 
 
 def read_storage(path: Path) -> dict[str, Any]:
-    """Entries of the top level. Raises `CalibrationError`."""
+    """The entries of a file's top level. Raises `CalibrationError`."""
     text = text_of(path)
     return _of_xml(path) if text.lstrip().startswith("<") else _of_yaml(path, text)
 
@@ -44,7 +44,7 @@ def _plain(path: Path, element: Element) -> Any:
 
 
 def _of_yaml(path: Path, text: str) -> dict[str, Any]:
-    """The subset that OpenCV writes, and ROS's camera files: keys, matrices as tables, lists in brackets or with dashes."""
+    """Parse the subset of YAML in files of OpenCV and ROS: keys, matrices as tables, lists in brackets or with dashes."""
     found: dict[str, Any] = {}
     lines = [line for line in _logical(path, text) if line.strip() and not line.lstrip().startswith(("#", "%", "---", "..."))]
     n = 0
@@ -64,7 +64,7 @@ def _of_yaml(path: Path, text: str) -> dict[str, Any]:
 
 
 def _logical(path: Path, text: str) -> list[str]:
-    """Lines, those of a list in brackets joined."""
+    """Lines; those of a list in brackets are joined."""
     lines, open_since = [], None
     for line in text.splitlines():
         line = line.rstrip()
@@ -83,7 +83,7 @@ def _logical(path: Path, text: str) -> list[str]:
 
 
 def _below(path: Path, key: str, value: str, below: list[str]) -> Any:
-    """What stands after a key, in its line or in those below it."""
+    """The value of a key, on its line or on those below."""
     if value and not value.startswith("!!") and not below:
         return [_word(word) for word in value.strip("[]").split(",") if word.strip()] if value.startswith("[") else _word(value)
     if "!!opencv-matrix" not in value and all(line.startswith("-") for line in below):
@@ -102,9 +102,9 @@ def _matrix(path: Path, key: str, table: dict[str, str]) -> Array | None:
     if shape is None or (shape < 0).any() or (shape % 1).any():
         raise CalibrationError(f"{path}: {key}: found {table['rows'][:20]!r} rows and {table['cols'][:20]!r} columns, expected whole "
                                "numbers")
+    if shape.max() > MAX_ELEMENTS or shape.prod() > MAX_ELEMENTS:
+        return None
     rows, cols = int(shape[0]), int(shape[1])
-    if rows * cols > LARGEST:
-        return None  # nothing that a camera is told by
     values = numbers_of(table["data"].strip("[] "), (rows * cols,)) if rows * cols else np.zeros(0)
     if values is None:
         raise CalibrationError(f"{path}: {key}: found {table['data'][:60]!r}, expected {rows} x {cols} finite numbers")
@@ -112,7 +112,7 @@ def _matrix(path: Path, key: str, table: dict[str, str]) -> Array | None:
 
 
 def _word(text: str) -> Any:
-    """A number, or a word without its quotes."""
+    """A number, or a word without quotes."""
     text = text.strip()
     value = numbers_of(text, (1,)) if not text.startswith('"') else None
     return text.strip("\"'") if value is None else float(value[0])

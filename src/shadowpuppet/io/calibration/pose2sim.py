@@ -1,4 +1,4 @@
-"""Calibrations in TOML: the schema that Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export share, and Caliscope's own.
+"""Calibrations in TOML: the schema of Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export, and Caliscope's own.
 
 A section a camera: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to camera, or a
 3 x 3 matrix), `translation`, `fisheye`. Caliscope's own file (camera_array.toml) has its sections below `cameras`, by number.
@@ -18,19 +18,19 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
-from shadowpuppet.io.calibration.draft import Draft, Found
-from shadowpuppet.io.files.toml import read_toml
+from shadowpuppet.io.calibration.draft import Draft, Drafts
+from shadowpuppet.io.files.text import read_toml
 
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
-"""What a camera's section must have; `name` is the section's own where it is missing, `fisheye` false."""
+"""Required in a camera's section. Defaults: `name` is the section's, `fisheye` false."""
 BARE_KEY = r"[A-Za-z0-9_-]+"
-"""Section titles that TOML takes without quotes."""
+"""Section titles without quotes."""
 SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
-"""Sizes of a board's squares by which the unit is known; FreeMoCap writes down what its user gave."""
+"""Ranges of a board's squares in each unit; FreeMoCap stores the number that its user gave."""
 
 
-def read_tables(path: Path) -> Found:
-    """Cameras of a TOML file. Raises `CalibrationError` with the section and field where something is missing or cannot be."""
+def read_tables(path: Path) -> Drafts:
+    """Cameras of a TOML file. Raises `CalibrationError` with the section and field where something is missing or impossible."""
     data = read_toml(path, CalibrationError)
     nested = data.get("cameras")
     if isinstance(nested, dict) and nested and all(isinstance(table, dict) for table in nested.values()):
@@ -39,11 +39,11 @@ def read_tables(path: Path) -> Found:
     if not sections:
         raise CalibrationError(f"{path}: no camera in it, expected a section for each, such as [cam1], with {', '.join(FIELDS)}")
     unit, notes = _freemocap(data.get("metadata"))
-    return Found(tuple(_draft(path, title, table, table.get("name", title)) for title, table in sections.items()), unit, notes)
+    return Drafts(tuple(_draft(path, title, table, table.get("name", title)) for title, table in sections.items()), unit, notes)
 
 
-def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Found:
-    """Those that are placed and not set aside, by the names of Caliscope's films and export, cam_0, cam_1, ..."""
+def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Drafts:
+    """Cameras with extrinsics that are not ignored, named as Caliscope's films and export: cam_0, cam_1, ..."""
     def name(number: str, table: dict[str, Any]) -> str:
         return table.get("name") or (f"port_{number}" if "port" in table and "cam_id" not in table else f"cam_{number}")
 
@@ -56,11 +56,11 @@ def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Found:
     notes = [f"{why}, left out: {choices(map(str, numbers))}" for why, numbers in (("set aside in Caliscope", aside), ("not placed", bare))
              if numbers]
     drafts = [_draft(path, f"cameras.{number}", table, name(number, table)) for number, table in used.items()]
-    return Found(tuple(drafts), None, tuple(notes))
+    return Drafts(tuple(drafts), None, tuple(notes))
 
 
 def _freemocap(metadata: object) -> tuple[str | None, tuple[str, ...]]:
-    """The unit that FreeMoCap's notes of its board tell."""
+    """The unit, and remarks, by the size of FreeMoCap's board."""
     square = metadata.get("charuco_square_size") if isinstance(metadata, dict) else None
     if not isinstance(square, (int, float)) or isinstance(square, bool):
         return None, ()
@@ -88,7 +88,7 @@ def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft
 
 
 def check_name(name: object) -> None:
-    """Raise `CalibrationError` for what cannot be a camera's name, which is that of its film, too."""
+    """Raise `CalibrationError` for what cannot be a camera's name, which is also its film's."""
     if not isinstance(name, str) or not name.strip(" .") or not name.isprintable() or "/" in name or "\\" in name:
         raise CalibrationError(f"name: found {_short(repr(name))}, expected a word that can be a file's name")
 
@@ -105,7 +105,7 @@ def _rotation(table: dict[str, Any]) -> Array:
 
 
 def _flat(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
-    """As `_numbers`; a row in a list, or a column, is as good: OpenCV gives such."""
+    """As `_numbers`; accepts also a nested row or column, as OpenCV returns them."""
     value = table[key]
     if isinstance(value, list) and len(value) == 1 and isinstance(value[0], list):
         value = value[0]
@@ -115,7 +115,7 @@ def _flat(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None 
 
 
 def _numbers(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
-    """The finite numbers of a field, of one of the `shapes`, or any number of them in a row."""
+    """A field's finite numbers, of one of `shapes`, or a vector of any length."""
     value = table[key]
     expected = " or ".join(" x ".join(map(str, s)) for s in shapes) + " finite numbers" if shapes else "a row of finite numbers"
     try:
@@ -140,14 +140,14 @@ def _short(value: object) -> str:
 
 
 def tables_text(cameras: Iterable[Camera]) -> str:
-    """A TOML file that `read_tables`, Pose2Sim and Anipose read; metres."""
+    """The content of a TOML file for `read_tables`, Pose2Sim and Anipose; metres."""
     return "\n".join(map(_section, cameras))
 
 
 def _section(camera: Camera) -> str:
-    """A camera's section; a value a line, where JSON's spelling of printable words and finite numbers is TOML's, too."""
+    """A camera's section, a value a line; JSON's printable words and finite numbers are valid TOML."""
     distortions = camera.distortion.tolist()
-    if not camera.fisheye:  # only as many as there are
+    if not camera.fisheye:  # without trailing zeros
         distortions = distortions[: 8 if any(distortions[5:]) else 5 if distortions[4] else 4]
     values = {"name": camera.name, "size": list(camera.size), "matrix": camera.matrix.tolist(), "distortions": distortions,
               "rotation": vector_from_rotation(camera.T_camera_world[:3, :3]).tolist(),

@@ -1,9 +1,8 @@
 """Qualisys' calibrations (.qca.txt), as QTM exports them: XML.
 
-Positions are in millimetres, `r11` to `r33` turn the world to the camera's axes, which are x right, y up and z backward: y and z are
-turned round. Focal lengths and the principal point are in 64ths of a pixel of the whole sensor, `fov_video` says which part of it is
-the film. Distortion is of the undistorted place over the focal length, as OpenCV's; Pose2Sim (0.10) divides it by 64 too, after which
-a Miqus camera would have none: here it is taken as it stands.
+Positions are in millimetres. `r11` to `r33` rotate the world to the camera's axes, x right, y up and z backward, so that y and z are
+negated here. Focal lengths and the principal point are in 64ths of a pixel of the whole sensor; `fov_video` is the part that is filmed.
+Distortion is as OpenCV's. Pose2Sim (0.10) divides it by 64, too, which would leave a Miqus camera none.
 """
 
 from __future__ import annotations
@@ -15,15 +14,15 @@ import numpy as np
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
-from shadowpuppet.io.calibration.draft import Draft, Found
+from shadowpuppet.io.calibration.draft import Draft, Drafts
 
 SUBPIXELS = 64
 BACKWARD = np.diag([1.0, -1.0, -1.0])
-"""From axes of which z is backward and y up."""
+"""From axes with y up and z backward to OpenCV's."""
 
 
-def read_qualisys(path: Path) -> Found:
-    """Cameras of a .qca.txt file; where some are video cameras, these. Raises `CalibrationError`."""
+def read_qualisys(path: Path) -> Drafts:
+    """Cameras of a .qca.txt file; only the video cameras if there are any. Raises `CalibrationError`."""
     cameras = [entry for entry in entries(path, tree_of(path), ".//cameras/camera", "serial") if entry.element.get("active", "1") != "0"]
     films = [entry for entry in cameras if "video" in entry.element.get("model", "").lower()]
     used = films or cameras
@@ -34,7 +33,7 @@ def read_qualisys(path: Path) -> Found:
     turned = [entry.camera for entry in used if entry.element.get("viewrotation", "0") not in ("0", "")]
     if turned:
         notes.append(f"the view of {', '.join(turned)} was turned in QTM: films must have been exported without turning")
-    return Found(tuple(map(_draft, used)), "mm", tuple(notes))
+    return Drafts(tuple(map(_draft, used)), "mm", tuple(notes))
 
 
 def _draft(entry: Entry) -> Draft:

@@ -1,8 +1,8 @@
 """Vicon's calibrations (.xcp), of Nexus, Shogun and Blade: XML.
 
-`POSITION` is the camera's place in millimetres, `ORIENTATION` the quaternion (x y z w) that turns the world to the camera's axes, which
-are OpenCV's. Vicon goes from the seen pixel to the straight one, by 1 + k1 r^2 + k2 r^4 + k3 r^6 with r in pixels from a centre of
-distortion; OpenCV goes the other way. So OpenCV's coefficients are fitted to it over the whole picture, by least squares.
+`POSITION` is the camera's in millimetres, `ORIENTATION` the quaternion (x y z w) that rotates the world to the camera's axes, which are
+OpenCV's. Vicon maps distorted pixels to undistorted ones, by 1 + k1 r^2 + k2 r^4 + k3 r^6 with r in pixels from the centre of
+distortion; OpenCV maps the other way. OpenCV's coefficients are fitted to that over the whole picture, by least squares.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import numpy as np
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid
 from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
-from shadowpuppet.io.calibration.draft import Draft, Found, numbers_of
+from shadowpuppet.io.calibration.draft import Draft, Drafts, numbers_of
 
 GRID = 33
-"""Pixels to a side at which distortion is compared."""
-ABSURD = 5.0
-"""Relative displacement at the picture's corner by k1 r^2 with r in pixels: beyond, r is over the focal length."""
-OFF = 0.5
-"""Pixels by which the fitted distortion may be off without a note."""
+"""Grid points along each side at which distortion is compared."""
+MAX_DISPLACEMENT = 5.0
+"""Relative displacement k1 r^2 at the picture's corner, r in pixels; beyond, r is in focal lengths."""
+MAX_MISFIT = 0.5
+"""Pixels by which the fitted distortion may be off without a remark."""
 
 
-class Bend(NamedTuple):
+class ViconDistortion(NamedTuple):
     """Vicon's distortion."""
 
     centre: Array
@@ -34,8 +34,8 @@ class Bend(NamedTuple):
     """Of r^2, r^4, r^6 (3,), r in pixels."""
 
 
-def read_vicon(path: Path) -> Found:
-    """Cameras of an .xcp file; where some are video cameras, these. Raises `CalibrationError`."""
+def read_vicon(path: Path) -> Drafts:
+    """Cameras of an .xcp file; only the video cameras if there are any. Raises `CalibrationError`."""
     cameras = list(entries(path, tree_of(path), ".//Camera", "DEVICEID"))
     used = [entry for entry in cameras if "video" in entry.element.get("TYPE", "").lower()] or cameras
     posed = [entry for entry in used if entry.element.find("KeyFrames/KeyFrame") is not None]
@@ -46,7 +46,7 @@ def read_vicon(path: Path) -> Found:
         notes.append(f"cameras for markers are left out: {', '.join(entry.camera for entry in cameras if entry not in used)}")
     if len(posed) < len(used):
         notes.append(f"not calibrated, left out: {', '.join(entry.camera for entry in used if entry not in posed)}")
-    return Found(tuple(_draft(entry, notes) for entry in posed), "mm", tuple(notes))
+    return Drafts(tuple(_draft(entry, notes) for entry in posed), "mm", tuple(notes))
 
 
 def _draft(entry: Entry, notes: list[str]) -> Draft:
@@ -59,8 +59,12 @@ def _draft(entry: Entry, notes: list[str]) -> Draft:
     principal = frame.numbers("PRINCIPAL_POINT", (2,))
     matrix = np.array([[focal, 0, principal[0]], [0, focal / aspect, principal[1]], [0, 0, 1]])
     R, place = _rotation(frame), frame.numbers("POSITION", (3,))
-    lens, off = opencv_distortion(matrix, size, _bend(frame, principal, size, focal))
-    if off > OFF:
+    try:
+        with np.errstate(all="ignore"):
+            lens, off = opencv_distortion(matrix, size, _bend(frame, principal, size, focal))
+    except CalibrationError as error:
+        raise CalibrationError(f"{entry.path}: camera {entry.camera!r}: {error}") from None
+    if off > MAX_MISFIT:
         notes.append(f"camera {entry.camera!r}: OpenCV's distortion follows Vicon's within {off:.1f} pixels only")
     return Draft(name=entry.camera, matrix=matrix, distortion=lens, T=rigid(R, -R @ place), size=size.tolist())
 
@@ -76,28 +80,30 @@ def _rotation(frame: Entry) -> Array:
                      [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
 
 
-def _bend(frame: Entry, principal: Array, size: Array, focal: float) -> Bend:
-    told = frame.element.get("VICON_RADIAL2")
-    values = numbers_of(told.partition(" ")[2] if told and told[:1].isalpha() else told, (5,))
+def _bend(frame: Entry, principal: Array, size: Array, focal: float) -> ViconDistortion:
+    text = frame.element.get("VICON_RADIAL2")
+    values = numbers_of(text.partition(" ")[2] if text and text[:1].isalpha() else text, (5,))
     if values is not None:
         centre, k = values[:2], values[2:]
     else:
         centre, k = principal, np.append(frame.numbers("VICON_RADIAL", (2,), "0 0"), 0.0)
     corner = float(np.linalg.norm(size)) / 2
-    return Bend(centre, k / focal ** np.array([2, 4, 6]) if abs(k[0]) * corner**2 > ABSURD else k)
+    return ViconDistortion(centre, k / focal ** np.array([2, 4, 6]) if abs(k[0]) * corner**2 > MAX_DISPLACEMENT else k)
 
 
-def opencv_distortion(matrix: Array, size: Array, bend: Bend) -> tuple[Array, float]:
-    """OpenCV's k1 k2 p1 p2 k3 of Vicon's distortion, and by how many pixels they are off at most, over a picture (2,)."""
+def opencv_distortion(matrix: Array, size: Array, bend: ViconDistortion) -> tuple[Array, float]:
+    """OpenCV's k1 k2 p1 p2 k3 for Vicon's distortion, and the largest misfit in a picture of `size` (2,), pixels."""
     across = [np.linspace(0, side - 1, GRID) for side in size]
-    seen = np.stack(np.meshgrid(*across), -1).reshape(-1, 2)
-    r2 = ((seen - bend.centre) ** 2).sum(1)
-    straight = bend.centre + (seen - bend.centre) * (1 + r2 * (bend.k[0] + r2 * (bend.k[1] + r2 * bend.k[2])))[:, None]
+    pixels = np.stack(np.meshgrid(*across), -1).reshape(-1, 2)
+    r2 = ((pixels - bend.centre) ** 2).sum(1)
+    straight = bend.centre + (pixels - bend.centre) * (1 + r2 * (bend.k[0] + r2 * (bend.k[1] + r2 * bend.k[2])))[:, None]
     focal, principal = np.diag(matrix)[:2], matrix[:2, 2]
-    (x, y), moved = ((straight - principal) / focal).T, (seen - straight) / focal
+    (x, y), moved = ((straight - principal) / focal).T, (pixels - straight) / focal
     r2 = x * x + y * y
     rows = np.concatenate([np.stack([x * r2, x * r2**2, 2 * x * y, r2 + 2 * x * x, x * r2**3], 1),
                            np.stack([y * r2, y * r2**2, r2 + 2 * y * y, 2 * x * y, y * r2**3], 1)])
     wanted = moved.T.ravel()
+    if not (np.isfinite(rows).all() and np.isfinite(wanted).all()):
+        raise CalibrationError(f"found the distortion {bend.k.tolist()} about {bend.centre.tolist()}, expected that of a lens")
     lens = np.linalg.lstsq(rows, wanted, rcond=None)[0]
     return lens, float(np.abs((rows @ lens - wanted).reshape(2, -1) * focal[:, None]).max())

@@ -1,1 +1,1 @@
-"""Text, tables, TOML and arrays, read and written safely."""
+"""Files of text, TOML, tables and arrays, read and written safely."""

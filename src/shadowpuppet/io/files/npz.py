@@ -1,47 +1,52 @@
-"""Joints as an archive of arrays (NPZ), with the names that a run's motion.npz has, which is read as well."""
+"""Archives of arrays (.npz), without pickled objects: nothing in them is executed."""
 
 from __future__ import annotations
 
 import io
 import lzma
 import struct
+import tokenize
 import zipfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.errors import ShadowPuppetError, reason
 
-ARRAYS = ("times", "joint_names", "joints")
-"""Seconds (T,), names (J,), and places (T, J, 3) in the world, metres, not a number where unknown."""
-
-BROKEN = (EOFError, ValueError, TypeError, KeyError, OverflowError, MemoryError, RuntimeError, SyntaxError, struct.error, zlib.error,
-          lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
-"""What reading raises, beside `OSError`, where an archive is damaged, encrypted or none."""
+BROKEN = (EOFError, ValueError, TypeError, KeyError, AttributeError, OverflowError, MemoryError, RuntimeError, SyntaxError,
+          tokenize.TokenError, struct.error, zlib.error, lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
+"""What NumPy raises, beside `OSError`, for a file that is damaged, encrypted or no archive."""
 
 
-def write_npz(path: str | Path, table: JointTable) -> None:
-    """Write joints as arrays. Raises `ShadowPuppetError` where that fails."""
-    out = io.BytesIO()
-    np.savez_compressed(out, allow_pickle=False, times=table.times, joint_names=np.array(table.names), joints=table.positions)
-    write_whole(Path(path), out.getvalue())
+class BrokenArchive(ShadowPuppetError):
+    """A file that is no whole archive of arrays."""
 
 
-def read_npz(path: str | Path) -> JointTable:
-    """Joints of an archive that has `ARRAYS`; others are skipped. Raises `FormatError`."""
-    path = Path(path)
+def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
+    """Those arrays of an archive that are among `names`. Raises `ShadowPuppetError` with the reason alone, `BrokenArchive` if damaged."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            missing = [name for name in ARRAYS if name not in data]
-            if missing:
-                raise ShadowPuppetError(f"no array {missing[0]!r}")
-            times, names, joints = (data[name] for name in ARRAYS)
-        return JointTable(times, tuple(names.astype(str).ravel().tolist()), joints)
+            return {name: np.asarray(data[name]) for name in names if name in data}
     except OSError as error:
-        problem = error.strerror or str(error)
-    except (*BROKEN, AttributeError, ShadowPuppetError) as error:
-        problem = str(error)
-    raise FormatError(f"{path}: no joints ({problem.lower()}), expected an archive with the arrays {', '.join(ARRAYS)}")
+        raise ShadowPuppetError(reason(error)) from None
+    except BROKEN as error:
+        raise BrokenArchive(str(error)) from None
+
+
+def read_all_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
+    """The arrays `names` of an archive. Raises as `read_arrays`, also where one is missing."""
+    arrays = read_arrays(path, names)
+    missing = [name for name in names if name not in arrays]
+    if missing:
+        raise ShadowPuppetError(f"no array {missing[0]!r}")
+    return arrays
+
+
+def archive_bytes(**arrays: ArrayLike) -> bytes:
+    """An archive's content."""
+    out = io.BytesIO()
+    np.savez_compressed(out, allow_pickle=False, **{name: np.asarray(values) for name, values in arrays.items()})
+    return out.getvalue()

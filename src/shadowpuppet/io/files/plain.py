@@ -1,4 +1,4 @@
-"""Values made plain, so that TOML and JSON can hold them."""
+"""Conversion of values to what TOML and JSON can hold."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shadowpuppet.errors import ShadowPuppetError
 
 
 def plain(value: Any, where: str) -> Any:
-    """Dataclasses and mappings as tables, arrays and tuples as lists, paths as text; else raises `ShadowPuppetError`."""
+    """Dataclasses and mappings as dictionaries, arrays and tuples as lists, paths as text. Raises `ShadowPuppetError` for other types."""
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, (np.ndarray, np.generic)):
@@ -31,14 +31,14 @@ def plain(value: Any, where: str) -> Any:
 
 
 def for_toml(value: Any) -> Any:
-    """Plain values without None, which TOML does not know."""
+    """Plain values without None, which TOML does not have."""
     if isinstance(value, dict):
         return {key: for_toml(item) for key, item in value.items() if item is not None}
     return [for_toml(item) for item in value if item is not None] if isinstance(value, list) else value
 
 
 def for_json(value: Any) -> Any:
-    """Plain values with null for what is not finite, which JSON does not know."""
+    """Plain values with None for numbers that are not finite, which JSON does not have."""
     if isinstance(value, dict):
         return {key: for_json(item) for key, item in value.items()}
     if isinstance(value, list):

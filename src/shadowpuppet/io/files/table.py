@@ -1,4 +1,4 @@
-"""Tables with named columns, one row a frame (CSV), and what is said where one is malformed."""
+"""Tables with named columns and a row a frame (CSV), and the checks of their cells."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from shadowpuppet.io.files.text import read_text
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as text; columns become numbers when they are asked for, so that others may hold anything."""
+    """A table as text. Columns are parsed on access, so that unused ones may hold anything."""
 
     path: Path
     columns: tuple[str, ...]
     rows: list[list[str]]
     lines: list[int]
-    """The file's line that each row stands in."""
+    """Line of the file of each row."""
 
     def numbers(self, names: Sequence[str]) -> Array:
-        """Columns as an array (T, len(names)), not a number in empty cells. Raises `FormatError` naming line and column."""
+        """Columns as an array (T, len(names)), NaN in empty cells. Raises `FormatError` naming line and column."""
         places = [self._place(name) for name in names]
         rows = [self._row(i, places) for i in range(len(self.rows))]
         return np.array(rows, float).reshape(len(rows), len(places))
 
     def texts(self, name: str) -> list[str]:
-        """A column as it stands. Raises `FormatError` where there is none."""
+        """A column's text. Raises `FormatError` where it is missing."""
         place = self._place(name)
         return [row[place].strip() for row in self.rows]
 
     def times(self) -> Array:
-        """The column `time`, of shape (T,), seconds. Raises `FormatError` where one is missing or not after that before it."""
+        """The column `time` (T,), seconds. Raises `FormatError` where a time is missing or does not increase."""
         times = self.numbers(["time"])[:, 0]
         check_times(self.path, times, self.lines)
         return times
@@ -52,7 +52,7 @@ class Table:
 
 
 def number(path: Path, line: int, column: str, cell: str) -> float:
-    """The number in a cell, none where it is empty. Raises `FormatError` naming line and column."""
+    """The number in a cell; NaN if it is empty. Raises `FormatError` naming line and column."""
     try:
         value = float(cell) if cell and not cell.isspace() else np.nan
     except ValueError:
@@ -75,7 +75,7 @@ def check_times(path: Path, times: Array, lines: Sequence[int]) -> None:
 def read_table(path: Path, cut: bool = False) -> Table:
     """Read a CSV table with a header line. Raises `FormatError`, naming file and line.
 
-    `cut`: the writer may have been killed, so that a last line without its end is left out.
+    `cut`: the writer may have been killed: ignore a last line without a line end.
     """
     text = read_text(path)
     if cut:
@@ -105,12 +105,12 @@ def csv_line(cells: Iterable[str]) -> str:
 
 
 def cells(values: Iterable[float], decimals: int = 6) -> list[str]:
-    """Numbers as cells; empty where not a number."""
+    """Numbers as text; empty for NaN."""
     return ["" if value != value else f"{value:.{decimals}f}" for value in values]
 
 
 def shorten(words: Iterable[str], limit: int = 120) -> str:
-    """Words as a list, cut to a length that a message can have."""
+    """Words with commas, cut to at most `limit` letters for messages."""
     text = ", ".join(words)
     return text if len(text) <= limit else text[: limit - 3] + "..."
 

@@ -1,33 +1,25 @@
-"""Text files read and written whole, and what is said where that fails."""
+"""Text and TOML files read, and files written whole."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
-
-
-def reason(error: OSError) -> str:
-    """What the system says, without numbers and paths."""
-    return (error.strerror or str(error) or "unknown reason").lower()
-
+from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 
 TEXT_LIMIT = 1_000_000_000
-"""Bytes; no table or motion that fits into memory as numbers is longer."""
+"""Bytes of a table or motion; a longer one would not fit into memory as numbers."""
+TOML_LIMIT = 10_000_000
+"""Bytes of a calibration or settings; a film given by mistake is not read."""
 
 
 def read_text(path: Path) -> str:
-    """A text file (UTF-8). Raises `FormatError` where it cannot be read, is empty, too long or no text."""
-    try:
-        if path.stat().st_size > TEXT_LIMIT:
-            raise FormatError(f"{path}: found {path.stat().st_size} bytes, expected a text file of at most {TEXT_LIMIT}")
-        text = path.read_text("utf-8-sig")
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({reason(error)})") from None
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{path}: found bytes that are no text at position {error.start}, expected a text file") from None
+    """The text of a UTF-8 file. Raises `FormatError` where it cannot be read, is empty, too long or no text."""
+    text = read_limited(path, TEXT_LIMIT, FormatError, "a text file")
     if "\0" in text:
         raise FormatError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
     if not text.strip():
@@ -35,11 +27,43 @@ def read_text(path: Path) -> str:
     return text
 
 
+def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any]:
+    """The tables of a TOML file. Raises `error` where it is missing, too long or not TOML."""
+    text = read_limited(Path(path), TOML_LIMIT, error, "a TOML file")
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as problem:
+        raise error(f"{path}: not valid TOML: {problem}") from None
+
+
+def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: str, kind_if_long: str = "") -> str:
+    """The text of a UTF-8 file of at most `limit` bytes. Raises `error`, which names the `kind` of file that is expected."""
+    try:
+        if path.stat().st_size > limit:
+            raise error(f"{path}: found {path.stat().st_size} bytes, expected {kind_if_long or kind} of at most {limit}")
+        return path.read_text("utf-8-sig")
+    except OSError as problem:
+        raise error(f"{path}: cannot be read ({reason(problem)})") from None
+    except UnicodeDecodeError as problem:
+        raise error(f"{path}: found bytes that are no text at position {problem.start}, expected {kind}") from None
+
+
+@contextlib.contextmanager
+def errors_named(where: object) -> Iterator[None]:
+    """Raises `ShadowPuppetError` as `FormatError` that begins with the file."""
+    try:
+        yield
+    except FormatError:
+        raise
+    except ShadowPuppetError as error:
+        raise FormatError(f"{where}: {error}") from None
+
+
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file that is whole or not there. Raises `ShadowPuppetError` where it cannot be written."""
+    """Write a file completely or not at all. Raises `ShadowPuppetError` where it cannot be written."""
     part = path.with_name(f"{path.name}.part")
     try:
-        part.write_bytes(content.encode() if isinstance(content, str) else content)
+        part.write_bytes(content.encode("utf-8", "replace") if isinstance(content, str) else content)
         os.replace(part, path)
     except OSError as error:
         with contextlib.suppress(OSError):

@@ -1,7 +1,6 @@
-"""AMC files (Acclaim): motion capture over an ASF skeleton (`asf.py`), as joints in metres.
+"""AMC files (Acclaim): motion over an ASF skeleton (`asf.py`), as joints in metres.
 
-The files of the CMU graphics lab motion capture database are of this kind; other skeletons are read, too, but the names of their
-bones must be the same for joints of ours.
+The format of the CMU graphics lab's motion capture database; joints by our names need that database's names of bones.
 """
 
 from __future__ import annotations
@@ -32,8 +31,8 @@ ENDS = {
                             ("hip", "hipjoint"), ("knee", "femur"), ("ankle", "tibia"), ("ball", "foot"), ("toes", "toes"))
     },
 }  # fmt: skip
-"""Joints, ours and some more that tell how segments are turned, and the bone at whose far end each lies. `pelvis` lies between the
-hips, `face` before the crown."""
+"""The bone at whose far end each joint lies; joints beside ours tell the rotation of segments. `pelvis` lies between the hips, `face`
+before the crown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,25 +41,25 @@ class Capture:
 
     skeleton: Skeleton
     root: Array
-    """Place of the root, of shape (T, 3), metres, the file's world."""
-    turn: Array
-    """Its rotation, of shape (T, 3, 3)."""
+    """Position of the root (T, 3), metres, in the file's world."""
+    root_rotation: Array
+    """(T, 3, 3)."""
     angles: Array
-    """Angles of every bone about x, y and z of its axis, of shape (T, B, 3), rad; 0 where it cannot turn."""
+    """Angles of the bones about x, y and z of their axes (T, B, 3), rad; 0 for axes without a degree of freedom."""
 
     @cached_property
     def rotations(self) -> Array:
-        """Bones' rotations against the pose of zero angles, of shape (T, B, 3, 3), the file's world."""
+        """Rotations of the bones from the zero pose, (T, B, 3, 3), in the file's world."""
         found = np.empty((len(self.root), len(self.skeleton.bones), 3, 3))
         for n, bone in enumerate(self.skeleton.bones):
-            above = self.turn if bone.parent < 0 else found[:, bone.parent]
+            above = self.root_rotation if bone.parent < 0 else found[:, bone.parent]
             own = bone.axis @ euler(bone.order, self.angles[:, n]) @ bone.axis.T if bone.dofs else np.eye(3)
             found[:, n] = above @ own
         return found
 
     @cached_property
     def ends(self) -> Array:
-        """Bones' far ends, of shape (T, B, 3), metres, the file's world."""
+        """Far ends of the bones (T, B, 3), metres, in the file's world."""
         found = np.empty((len(self.root), len(self.skeleton.bones), 3))
         for n, bone in enumerate(self.skeleton.bones):
             start = self.root if bone.parent < 0 else found[:, bone.parent]
@@ -68,9 +67,9 @@ class Capture:
         return found
 
     def joints(self, rate: float = 120.0) -> JointTable:
-        """Joints of `ENDS`, `pelvis` and `face` at `rate` frames a second, from 0 s; metres, z up.
+        """Joints of `ENDS`, `pelvis` and `face` at `rate` frames/s from 0 s, metres, z up.
 
-        Raises `FormatError` where the skeleton has no bone of a name that is needed.
+        Raises `FormatError` where the skeleton lacks a bone.
         """
         places = {name: self.ends[:, self.skeleton.index(bone)] for name, bone in ENDS.items()}
         places["pelvis"] = (places["left_hip"] + places["right_hip"]) / 2
@@ -80,20 +79,20 @@ class Capture:
 
     @property
     def at_rest(self) -> Capture:
-        """One frame with all angles zero."""
+        """The zero pose, one frame."""
         zero = np.zeros((1, len(self.skeleton.bones), 3))
         return Capture(self.skeleton, np.zeros((1, 3)), np.eye(3)[None], zero)
 
 
 def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
-    """The motion in an AMC file. Raises `FormatError`, naming the line, where it is malformed or not of this skeleton."""
+    """Read an AMC file. Raises `FormatError`, naming the line, where it is malformed or of another skeleton."""
     path = Path(path)
     lines = read_text(path).splitlines()
     first, degrees = _header(path, lines, skeleton)
     names, counts = _layout(path, lines, first, skeleton)
-    values = _fast(lines[first:], names, counts)
+    values = _parsed(lines[first:], names, counts)
     if values is None:
-        values = _careful(path, lines, first, names, counts)
+        _raise_malformed(path, lines, first, names, counts)
     angle = np.pi / 180 if degrees else 1.0
     frames, angles = values[:, 1:], np.zeros((len(values), len(skeleton.bones), 3))
     if (np.diff(values[:, 0]) <= 0).any():
@@ -112,9 +111,9 @@ def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
 
 
 def read_mocap(path: str | Path, skeleton: str | Path | None = None) -> Capture:
-    """The motion in an AMC file over the skeleton in `skeleton`, an ASF file, or in the one found beside it.
+    """Read an AMC file with its skeleton: an ASF file, or the one beside it.
 
-    Beside `02_10.amc` those are `02_10.asf`, `02.asf`, or the only .asf file there is. Raises `FormatError`.
+    For `02_10.amc` that is `02_10.asf`, `02.asf`, or the only .asf file in the folder. Raises `FormatError`.
     """
     path = Path(path)
     if path.suffix.lower() != ".amc":
@@ -151,7 +150,7 @@ def _header(path: Path, lines: list[str], skeleton: Skeleton) -> tuple[int, bool
 
 
 def _layout(path: Path, lines: list[str], first: int, skeleton: Skeleton) -> tuple[list[str], list[int]]:
-    """Names of the first frame's lines, and how many values each must have."""
+    """Names in the first frame's lines, and the number of values of each."""
     wanted = {"root": 6} | {bone.name: len(bone.dofs) for bone in skeleton.bones}
     names: list[str] = []
     for n, line in enumerate(lines[first + 1 :], first + 2):
@@ -170,8 +169,8 @@ def _layout(path: Path, lines: list[str], first: int, skeleton: Skeleton) -> tup
     return names, [wanted[name] for name in names]
 
 
-def _fast(lines: list[str], names: list[str], counts: list[int]) -> Array | None:
-    """Frame numbers and values (T, 1 + n) of a well-formed file; None where anything is odd."""
+def _parsed(lines: list[str], names: list[str], counts: list[int]) -> Array | None:
+    """Frame numbers and values (T, 1 + n) of a well-formed file; None for any other."""
     words = " ".join(lines).split()
     width = 1 + len(names) + sum(counts)
     if len(words) % width:
@@ -194,9 +193,8 @@ def _is_number(word: str) -> bool:
         return False
 
 
-
-def _careful(path: Path, lines: list[str], first: int, names: list[str], counts: list[int]) -> NoReturn:
-    """Find the line that is malformed, and raise `FormatError` with it."""
+def _raise_malformed(path: Path, lines: list[str], first: int, names: list[str], counts: list[int]) -> NoReturn:
+    """Raise `FormatError` with the line that is malformed."""
     due = [("", 0), *zip(names, counts)]
     place = 0
     for n, line in enumerate(lines[first:], first + 1):

@@ -15,7 +15,7 @@ from shadowpuppet.io.files.text import read_text
 
 INCH = 0.0254
 DOFS = ("rx", "ry", "rz")
-"""What a bone's degrees of freedom can be; stretching bones are not read."""
+"""Degrees of freedom of bones; stretching bones are not supported."""
 ROOT = ("tx", "ty", "tz", "rx", "ry", "rz")
 SECTIONS = ("version", "name", "units", "documentation", "root", "bonedata", "hierarchy")
 
@@ -26,38 +26,38 @@ class Bone:
 
     name: str
     direction: Array
-    """Unit vector (3,) along it when all angles are zero."""
+    """Unit vector (3,) along the bone in the zero pose."""
     length: float
     """Metres."""
     axis: Array
-    """The frame (3, 3) in which its angles are given."""
+    """The frame (3, 3) of its angles."""
     order: str
-    """Order in which its rotations are done: `XYZ` turns about x first."""
+    """Order of its rotations: `XYZ` rotates about x first."""
     dofs: tuple[str, ...] = ()
-    """Of `DOFS`, in the order of the motion file."""
+    """Some of `DOFS`, in the order of the motion file."""
     limits: Array | None = None
-    """Least and greatest angle of each degree of freedom, of shape (n, 2), rad."""
+    """Limits of each degree of freedom, (n, 2), rad."""
     parent: int = -1
-    """Index of the bone it hangs on; -1: the root."""
+    """Index of the parent bone; -1 for the root."""
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Bones, parents before children; the root moves freely."""
+    """Bones, parents before children; the root has six degrees of freedom."""
 
     path: Path
     bones: tuple[Bone, ...]
     root_dofs: tuple[str, ...]
     """`ROOT` in the order of the motion file."""
     root_order: str
-    """Order in which its rotations are done."""
+    """Order of the root's rotations."""
     unit: float
     """Metres of one unit of length."""
     degrees: bool
     """Whether angles in the file are degrees."""
 
     def index(self, name: str) -> int:
-        """Place of a bone in `bones`. Raises `FormatError` with the names there are."""
+        """Index of a bone. Raises `FormatError` with the names of all."""
         for place, bone in enumerate(self.bones):
             if bone.name == name:
                 return place
@@ -65,7 +65,7 @@ class Skeleton:
 
 
 def read_asf(path: str | Path) -> Skeleton:
-    """The skeleton in an ASF file. Lengths are in units of 1/length inches, as the CMU graphics lab's.
+    """Read an ASF file. Lengths are in units of 1/length inches, as the CMU graphics lab's.
 
     Raises `FormatError`, naming line and key, where the file is malformed.
     """
@@ -87,7 +87,7 @@ def read_asf(path: str | Path) -> Skeleton:
 
 
 def euler(order: str, angles: Array) -> Array:
-    """Rotations (..., 3, 3) about x, y and z by `angles` (..., 3), rad, done in the order of the letters in `order`."""
+    """Rotations (..., 3, 3) about x, y and z by `angles` (..., 3), rad, in the order of the letters in `order`."""
     R = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for letter in order:
         n = "XYZ".index(letter)
@@ -116,7 +116,7 @@ def _sections(path: Path) -> dict[str, Rows]:
 
 
 def _blocks(path: Path, rows: Rows) -> Iterator[Rows]:
-    """What stands between each begin and end."""
+    """The lines between each begin and end."""
     block: Rows | None = None
     for line, words in rows:
         if words[0].lower() == "begin":
@@ -155,7 +155,7 @@ def _bone(path: Path, rows: Rows, unit: float, degrees: bool) -> Bone:
 
 
 def _limits(path: Path, rows: Rows, dofs: Sequence[str], angle: float) -> Array | None:
-    """Pairs in brackets, beginning behind `limits` and going on over the following lines."""
+    """Limits (n, 2), rad: pairs in brackets after `limits` and on the following lines; None if there are none."""
     found = []
     for line, words in rows:
         text = " ".join(words)
@@ -170,7 +170,7 @@ def _limits(path: Path, rows: Rows, dofs: Sequence[str], angle: float) -> Array 
 
 
 def _ordered(path: Path, bones: list[Bone], rows: Rows) -> tuple[Bone, ...]:
-    """The bones with their parents, parents first. Raises `FormatError` where the hierarchy does not hang together."""
+    """The bones with their parents, parents first. Raises `FormatError` where the hierarchy is not one tree."""
     from dataclasses import replace
 
     named = {bone.name: bone for bone in bones}

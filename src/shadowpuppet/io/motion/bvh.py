@@ -1,4 +1,4 @@
-"""BVH files (Biovision): a skeleton and its motion in one text, as joints by forward kinematics."""
+"""BVH files (Biovision) read: a skeleton and its motion, as joints by forward kinematics."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.io.files.table import shorten
-from shadowpuppet.io.files.text import read_text
+from shadowpuppet.io.files.text import errors_named, read_text
 from shadowpuppet.motion.motion import JointTable
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
-"""What a channel can be; in any order, any number of them a joint."""
+"""Kinds of channels; a joint has any of them in any order."""
 END = "_end"
-"""What the name of a joint's end site is made with."""
+"""Suffix of the names of end sites."""
 BLOCK = 4096
-"""Frames that are placed at once, so that memory stays small."""
-MOST_JOINTS = 10_000
+"""Frames computed at once, to limit memory."""
+MAX_JOINTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +30,16 @@ class Node:
 
     name: str
     parent: int
-    """Index of the one above it; -1: none."""
+    """Index of the parent; -1 for none."""
     offset: Array
-    """Place against its parent, of shape (3,), the file's unit."""
+    """Position relative to the parent (3,), in the file's unit."""
     channels: tuple[int, ...] = ()
-    """Indices into `CHANNELS`, in the order of the file: rotations are multiplied in it."""
+    """Indices into `CHANNELS`, in the file's order, in which rotations are multiplied."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bvh:
-    """A file as it stands: its own unit of length, its own axes."""
+    """The content of a file, in its own unit of length and axes."""
 
     path: Path
     nodes: tuple[Node, ...]
@@ -47,25 +47,23 @@ class Bvh:
     step: float
     """Seconds from frame to frame."""
     values: Array
-    """Channels of all nodes one after another, of shape (T, C); the file's unit, and degrees."""
+    """Channels of all nodes (T, C); the file's unit, and degrees."""
 
     def joints(self) -> JointTable:
-        """Every joint and end site; the file's unit and axes, times from 0. Raises `FormatError` where a name is impossible."""
+        """All joints and end sites in the file's unit and axes, times from 0. Raises `FormatError` for an impossible name."""
         places = np.empty((len(self.values), len(self.nodes), 3))
         added = [self._is_added(n) for n in range(len(self.nodes))]
         for start in range(0, len(self.values), BLOCK):
-            places[start : start + BLOCK] = self._placed(*self._turned(self.values[start : start + BLOCK], added))
-        try:
-            return JointTable(np.arange(len(places), dtype=float) * self.step, different([node.name for node in self.nodes]), places)
-        except ShadowPuppetError as error:
-            raise FormatError(f"{self.path}: {error}") from None
+            places[start : start + BLOCK] = self._placed(*self._local(self.values[start : start + BLOCK], added))
+        with errors_named(self.path):
+            return JointTable(np.arange(len(places), dtype=float) * self.step, unique_names([node.name for node in self.nodes]), places)
 
-    def turned(self) -> tuple[Array, Array]:
-        """How each node is turned against its parent (T, J, 3, 3), and where it lies there (T, J, 3), the file's unit and axes."""
-        return self._turned(self.values, [self._is_added(n) for n in range(len(self.nodes))])
+    def local_transforms(self) -> tuple[Array, Array]:
+        """Rotations (T, J, 3, 3) and positions (T, J, 3) of the nodes relative to their parents, in the file's unit and axes."""
+        return self._local(self.values, [self._is_added(n) for n in range(len(self.nodes))])
 
-    def _turned(self, values: Array, added: list[bool]) -> tuple[Array, Array]:
-        """The same of channel values (T, C)."""
+    def _local(self, values: Array, added: list[bool]) -> tuple[Array, Array]:
+        """The same for channel values (T, C); `added`: as `_is_added`, by node."""
         turns, shifts = np.empty((len(values), len(self.nodes), 3, 3)), np.empty((len(values), len(self.nodes), 3))
         for n, (node, columns) in enumerate(zip(self.nodes, self._columns)):
             own, shifts[:, n] = np.eye(3), node.offset
@@ -78,7 +76,7 @@ class Bvh:
         return turns, shifts
 
     def _placed(self, turns: Array, shifts: Array) -> Array:
-        """Places (T, J, 3) of nodes turned (T, J, 3, 3) and shifted (T, J, 3) against their parents."""
+        """World positions (T, J, 3) of nodes with rotations (T, J, 3, 3) and positions (T, J, 3) relative to their parents."""
         for n, node in enumerate(self.nodes):
             if node.parent >= 0:
                 shifts[:, n] = shifts[:, node.parent] + (turns[:, node.parent] @ shifts[:, n, :, None])[:, :, 0]
@@ -87,15 +85,15 @@ class Bvh:
 
     @property
     def _columns(self) -> list[list[int]]:
-        """Columns of `values` that belong to each node."""
+        """Columns of `values` of each node."""
         ends = np.cumsum([len(node.channels) for node in self.nodes]).tolist()
         return [list(range(end - len(node.channels), end)) for node, end in zip(self.nodes, ends)]
 
     def _is_added(self, n: int) -> bool:
-        """Whether a node's position channels come on top of its offset.
+        """Whether a node's position channels are added to its offset, rather than replace it.
 
-        They do for the root, after the format's first description. Where other joints have them, programs differ: most write the whole
-        shift, offset and all, which shows in values about the offset.
+        For the root they are, by the format's first description. For other joints programs differ: most write the whole position, which
+        shows by values near the offset.
         """
         node, columns = self.nodes[n], self._columns[n]
         shifts = [(node.offset[channel], self.values[:, column]) for channel, column in zip(node.channels, columns) if channel < 3]
@@ -106,7 +104,7 @@ class Bvh:
 
 
 def read_bvh(path: str | Path) -> Bvh:
-    """The motion in a BVH file. Raises `FormatError`, naming the line, where it is malformed; warns where it breaks off."""
+    """Read a BVH file. Raises `FormatError`, naming the line, where it is malformed; warns where it breaks off."""
     path = Path(path)
     lines = read_text(path).splitlines()
     motion = next((n for n, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
@@ -118,7 +116,7 @@ def read_bvh(path: str | Path) -> Bvh:
 
 
 class _Words:
-    """The hierarchy's words one after another, with what is said where one is not what it should be."""
+    """Tokens of the hierarchy, with errors that name the line."""
 
     def __init__(self, path: Path, lines: list[str]) -> None:
         self.path, self.last = path, len(lines)
@@ -127,14 +125,14 @@ class _Words:
         self.line = 1
 
     def next(self, *expected: str) -> str:
-        """The next word; one of `expected`, whose capitals do not count, or any."""
+        """The next word; if `expected` is given, one of these, in any case, returned in capitals."""
         self.line, word = next(self._words, (self.last, ""))
         if not word or (expected and word.upper() not in expected):
             self.fail(word, " or ".join(expected))
         return word.upper() if expected else word
 
     def rest(self) -> str:
-        """The next word where there is one, or nothing."""
+        """The next word; empty at the end."""
         self.line, word = next(self._words, (self.last, ""))
         return word
 
@@ -153,7 +151,7 @@ class _Words:
 
 
 def _hierarchy(words: _Words) -> tuple[Node, ...]:
-    """Joints and end sites in the order in which they stand, which is parents first."""
+    """Joints and end sites in the file's order, parents first."""
     words.next("HIERARCHY")
     words.next("ROOT")
     nodes, above = list[Node](), [-1]
@@ -164,8 +162,8 @@ def _hierarchy(words: _Words) -> tuple[Node, ...]:
         if kind == "}":
             above.pop()
             continue
-        if len(nodes) >= MOST_JOINTS:
-            words.fail(f"more than {MOST_JOINTS} joints", "those of a person")
+        if len(nodes) >= MAX_JOINTS:
+            words.fail(f"more than {MAX_JOINTS} joints", "those of a person")
         if kind == "JOINT":
             nodes.append(_node(words, words.next(), above[-1]))
             above.append(len(nodes) - 1)
@@ -179,7 +177,7 @@ def _hierarchy(words: _Words) -> tuple[Node, ...]:
 
 
 def _node(words: _Words, name: str, parent: int, end: bool = False) -> Node:
-    """What stands behind a node's name: its offset, and its channels unless it is an `end`."""
+    """The node after its name: offset, and channels unless it is an `end` site."""
     words.next("{")
     words.next("OFFSET")
     offset = words.numbers(3)
@@ -197,8 +195,8 @@ def _node(words: _Words, name: str, parent: int, end: bool = False) -> Node:
 
 
 def _header(path: Path, lines: list[str], motion: int) -> tuple[float, int]:
-    """Seconds of a frame, and the index of the first frame's line."""
-    told: dict[str, float] = {}
+    """Seconds per frame, and the index of the first frame's line."""
+    header: dict[str, float] = {}
     n = motion
     for key in ("Frames:", "Frame Time:"):
         n += 1
@@ -208,16 +206,16 @@ def _header(path: Path, lines: list[str], motion: int) -> tuple[float, int]:
         value = _numbers([line[len(key) :].strip()]) if line.lower().startswith(key.lower()) else None
         if value is None or value[0] <= 0:
             raise FormatError(f"{path}: line {n + 1}: found {shorten([line])!r}, expected {key} and a number more than zero")
-        told[key] = float(value[0])
+        header[key] = float(value[0])
     frames = sum(bool(line.strip()) for line in lines[n + 1 :])
-    if frames and frames != told["Frames:"]:
-        warn(f"{path}: line {n}, Frames: found {told['Frames:']:g}, but the file has {frames}; those are used", ShadowPuppetWarning,
+    if frames and frames != header["Frames:"]:
+        warn(f"{path}: line {n}, Frames: found {header['Frames:']:g}, but the file has {frames}; those are used", ShadowPuppetWarning,
              stacklevel=4)
-    return told["Frame Time:"], n + 1
+    return header["Frame Time:"], n + 1
 
 
 def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
-    """Channel values (T, width) of the lines from index `first` on, a frame a line; a last line that breaks off is left out."""
+    """Channel values (T, width) of the lines from index `first` on, a frame a line, without a last line that breaks off."""
     rows = [(n, line.split()) for n, line in enumerate(lines[first:], first + 1) if line.strip()]
     if len(rows) > 1 and len(rows[-1][1]) < width:
         warn(f"{path}: line {rows[-1][0]}: the file breaks off within a frame; the {len(rows) - 1} before it are used",
@@ -236,7 +234,7 @@ def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
 
 
 def _numbers(words: list[str]) -> Array | None:
-    """Words as finite numbers; None where one is none."""
+    """Words as finite numbers; None where one is not."""
     try:
         values = np.array(words, float)
     except ValueError:
@@ -244,11 +242,11 @@ def _numbers(words: list[str]) -> Array | None:
     return values if np.isfinite(values).all() and len(values) else None
 
 
-def different(names: list[str]) -> tuple[str, ...]:
-    """Names made different by numbers where they are not."""
-    seen: dict[str, int] = {}
+def unique_names(names: list[str]) -> tuple[str, ...]:
+    """Names, made unique by numbers."""
+    counts: dict[str, int] = {}
     out = []
     for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        out.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+        counts[name] = counts.get(name, 0) + 1
+        out.append(name if counts[name] == 1 else f"{name}#{counts[name]}")
     return tuple(out)

@@ -1,6 +1,6 @@
-"""C3D files (c3d.org): markers over time in blocks of 512 bytes, whole numbers or floats of three kinds of processors.
+"""C3D files (c3d.org) read: markers over time in blocks of 512 bytes, as integers or floats of three kinds of processors.
 
-Read here and not by ezc3d, which damaged files can crash: files come from anywhere, and nothing in one may do more than be refused.
+A reader of our own: damaged files crash ezc3d.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning, choices, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
-from shadowpuppet.io.files.text import reason
+from shadowpuppet.io.files.text import errors_named
 from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.motion import JointTable
 
 BYTES = 512
-"""Of a block."""
+"""Size of a block."""
 KEY = 0x50
 """The second byte of every file."""
 INTEL, DEC, MIPS = 84, 85, 86
-"""Kinds of processors, as the parameter section tells them."""
-FARTHEST = 1e6
-"""Metres; what is farther away is no place."""
+"""Kinds of processors in the parameter section."""
+MAX_COORDINATE = 1e6
+"""Metres; larger coordinates are unknown."""
 CHAR, BYTE, INT, FLOAT = -1, 1, 2, 4
-"""Kinds of parameters, by their bytes."""
+"""Types of parameters, by their bytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class C3d:
-    """What a file says beside its data."""
+    """A file's header and parameters."""
 
     path: Path
     parameters: dict[str, Any]
@@ -46,38 +46,38 @@ class C3d:
     analog: int
     """Analog values a frame."""
     frames: int
-    """As many as the file says and has."""
+    """Frames that are both stated and present."""
     start: int
-    """Byte at which the data begins."""
+    """First byte of the data."""
     scale: float
-    """Factor of whole numbers; less than zero where the data is floats."""
+    """Factor of integers; negative for floats."""
     rate: float
     """Frames/s."""
     processor: int
 
     def numbers(self, name: str) -> Array:
-        """A parameter's numbers (n,); none where it is not there or is text."""
+        """A parameter's numbers (n,); empty if it is missing or text."""
         value = self.parameters.get(name)
         return value.ravel().astype(float) if isinstance(value, np.ndarray) else np.zeros(0)
 
     def words(self, name: str) -> list[str]:
-        """A parameter's words; none where it is not there or is numbers."""
+        """A parameter's words; empty if it is missing or numeric."""
         value = self.parameters.get(name)
         return value if isinstance(value, list) else []
 
     @property
     def labels(self) -> list[str]:
-        """Names of the points, N of them; empty where one has none."""
+        """Names of the N points; empty for points without one."""
         more = (self.words(f"POINT:LABELS{n}") for n in ("", *range(2, 200)))
         found = [word for words in more for word in words][: self.points]
         return found + [""] * (self.points - len(found))
 
 
 def read_c3d(path: str | Path) -> JointTable:
-    """Named points of a C3D file in metres, axes as they stand; not a number where they were not seen.
+    """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN where not measured.
 
-    That is where the residual is less than zero, or the place exactly the origin, as some programs write it, or no place at all. Times
-    count from the file's first frame. Raises `FormatError` where the file is malformed; warns where it breaks off or tells no unit.
+    Not measured: a negative residual, a position that is exactly the origin, as some programs write it, or no finite one. Raises
+    `FormatError` where the file is malformed; warns where it breaks off or has no unit.
     """
     path = Path(path)
     header = read_header(path)
@@ -86,17 +86,15 @@ def read_c3d(path: str | Path) -> JointTable:
     if not first:
         raise FormatError(f"{path}: POINT:LABELS: found {shorten(names)!r}, expected names of points")
     chosen = sorted(first.values())
-    places, seen = _points(header, chosen)
-    places *= _metres(header)
-    places[~seen | ~(np.abs(places) < FARTHEST).all(2)] = np.nan
-    try:
-        return JointTable(np.arange(len(places)) / header.rate, tuple(names[n] for n in chosen), places)
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
+    positions, measured = _points(header, chosen)
+    positions *= _metres(header)
+    positions[~measured | ~(np.abs(positions) < MAX_COORDINATE).all(2)] = np.nan
+    with errors_named(path):
+        return JointTable(np.arange(len(positions)) / header.rate, tuple(names[n] for n in chosen), positions)
 
 
 def read_header(path: Path) -> C3d:
-    """All of a file but its data. Raises `FormatError`."""
+    """Read a file's header and parameters. Raises `FormatError`."""
     try:
         size = path.stat().st_size
         with path.open("rb") as file:
@@ -134,16 +132,16 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
         raise FormatError(f"{path}: found {points} points at {rate:g} frames/s, scale {scale:g}, data from block {block}, expected some, "
                           "each more than zero (the scale less where they are floats)")
     start, width = (block - 1) * BYTES, (4 * points + analog) * (4 if scale < 0 else 2)
-    said, there = _said(known, first, last), max(size - start, 0) // width
-    if there < said:
-        warn(f"{path}: found {there} frames, but it tells of {said}; those are used", ShadowPuppetWarning, stacklevel=5)
-    if not min(said, there):
+    stated, there = _stated_frames(known, first, last), max(size - start, 0) // width
+    if there < stated:
+        warn(f"{path}: found {there} frames, but it tells of {stated}; those are used", ShadowPuppetWarning, stacklevel=5)
+    if not min(stated, there):
         raise FormatError(f"{path}: found no frame of {points} points from byte {start} on, expected a motion")
-    return C3d(path, parameters, points, analog, min(said, there), start, scale, rate, processor)
+    return C3d(path, parameters, points, analog, min(stated, there), start, scale, rate, processor)
 
 
-def _said(known: C3d, first: int, last: int) -> int:
-    """Frames, where the file tells it best: the header's 16 bits do not hold long ones."""
+def _stated_frames(known: C3d, first: int, last: int) -> int:
+    """Number of frames, by the most reliable entry: the header's 16 bits are too few for long files."""
     ends = [known.numbers(f"TRIAL:ACTUAL_{end}_FIELD").astype(np.int64) & 0xFFFF for end in ("START", "END")]
     if all(len(end) >= 2 for end in ends):
         start, end = (int(each[0]) + 65536 * int(each[1]) for each in ends)
@@ -154,7 +152,7 @@ def _said(known: C3d, first: int, last: int) -> int:
 
 
 def _points(header: C3d, chosen: list[int]) -> tuple[Array, NDArray[np.bool_]]:
-    """Places (T, len(chosen), 3) in the file's unit, and whether each was seen."""
+    """Positions (T, len(chosen), 3) in the file's unit, and whether each was measured."""
     order, floats = ">" if header.processor == MIPS else "<", header.scale < 0
     kind = np.dtype(f"{order}f4" if floats else f"{order}i2")
     frame = np.dtype([("points", kind, (header.points, 4)), ("analog", kind, (header.analog,))])
@@ -162,13 +160,13 @@ def _points(header: C3d, chosen: list[int]) -> tuple[Array, NDArray[np.bool_]]:
         data = np.memmap(header.path, frame, "r", header.start, (header.frames,))["points"][:, chosen]
     except (OSError, ValueError, OverflowError):
         raise FormatError(f"{header.path}: the data cannot be read from byte {header.start} on") from None
-    with np.errstate(all="ignore"):  # damaged floats are told by what is no number
+    with np.errstate(all="ignore"):  # damaged floats become NaN or infinite
         if floats and header.processor == DEC:
             data = _from_dec(np.ascontiguousarray(data).view("<u4"))
         values = data.astype(float)
-    places, residuals = values[..., :3], values[..., 3]
-    seen = ~(residuals < 0) & places.any(2)
-    return places if floats else places * header.scale, seen
+    positions, residuals = values[..., :3], values[..., 3]
+    measured = ~(residuals < 0) & positions.any(2)
+    return positions if floats else positions * header.scale, measured
 
 
 def _metres(header: C3d) -> float:
@@ -206,7 +204,7 @@ def _parameters(section: bytes, processor: int) -> dict[str, Any]:
 
 
 def _value(section: bytes, at: int, processor: int) -> Any:
-    """The value of the parameter whose kind stands at byte `at`: words, or numbers (n,)."""
+    """The parameter whose type is at byte `at`: words, or numbers (n,)."""
     kind, count = struct.unpack("bB", section[at : at + 2])
     shape = list(section[at + 2 : at + 2 + count])
     if kind not in (CHAR, BYTE, INT, FLOAT) or len(shape) < count:
@@ -232,7 +230,7 @@ def _float(raw: bytes, processor: int) -> float:
 
 
 def _from_dec(words: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Floats of a DEC processor: the 16-bit halves change places, and the exponent is greater by two."""
+    """Convert floats of a DEC processor: halves of 16 bits are swapped, and the exponent is greater by two."""
     swapped = (words >> 16) | (words << 16)
     with np.errstate(all="ignore"):
         return swapped.astype(np.uint32).view(np.float32) / np.float32(4)

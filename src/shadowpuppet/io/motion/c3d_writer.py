@@ -1,4 +1,4 @@
-"""C3D files written: points as floats with residuals, and angles as analog channels; `c3d.py` has the reading."""
+"""C3D files written (read by `c3d.py`): points as floats with residuals, and angles as analog channels."""
 
 from __future__ import annotations
 
@@ -19,50 +19,54 @@ from shadowpuppet.motion.interpolation import resample, uniform_sampling
 from shadowpuppet.motion.motion import JointTable
 
 MM = 1000.0
-"""The file's unit: millimetres of a metre."""
-MOST_BLOCKS, MOST_NAMES, LONGEST = 255, 255, 120
-"""What the format's bytes can count: blocks of parameters, names in a list, letters of one."""
-UNSEEN = -1.0
-"""The residual of a place that is not known."""
+"""Millimetres, the file's unit, per metre."""
+MAX_BLOCKS, MAX_NAMES, MAX_LETTERS = 255, 255, 120
+"""The format's limits: blocks of parameters, names in a list, letters of a name."""
+UNKNOWN_RESIDUAL = -1.0
+"""Marks an unknown position."""
 Parameter = tuple[str, int, Sequence[int], bytes]
 """Name, kind, shape and value."""
 Angles = Mapping[str, tuple[str, Array]]
-"""Names to units and values (T,)."""
+"""Units and values (T,) by name."""
 
 
 def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None) -> None:
-    """Write joints as points in millimetres, axes as they stand, and `angles` as analog channels, one value a frame.
+    """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, a value a frame.
 
-    spread: standard deviations (T, J), metres, as the points' residuals, whole millimetres; left out or not a number: 0. An unknown place
-    has the residual -1, as the format wants it. angles: not a number where unknown. Times become frames at one rate: missing ones are
-    unknown; where frames do not come at a constant rate they are found anew, which is said as a warning.
-    Raises `ShadowPuppetError` where there is no frame, a name is too long, or the file cannot be written.
+    Frames get one rate: missing ones are unknown; frames at no constant rate are resampled, with a warning. Raises `ShadowPuppetError`
+    where there is no frame, a name is too long, or the file cannot be written.
+
+    Args:
+        path: the file.
+        table: the joints; an unknown one gets the residual -1.
+        spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 where None or NaN.
+        angles: NaN where unknown.
     """
     path, angles = Path(path), angles or {}
-    bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= LONGEST]
+    bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= MAX_LETTERS]
     if bad or not table.names:
-        raise ShadowPuppetError(f"{path}: found the name {shorten(bad, 60)!r}, expected points with names of at most {LONGEST} letters")
+        raise ShadowPuppetError(f"{path}: found the name {shorten(bad, 60)!r}, expected points with names of at most {MAX_LETTERS} letters")
     deviations = np.full(table.positions.shape[:2], np.nan) if spread is None else spread
     count, points = len(table.times), len(table.names)
     columns = [table.positions.reshape(count, 3 * points), deviations, *(values[:, None] for _, values in angles.values())]
-    rate, columns = _in_step(path, table.times, np.concatenate(columns, 1))
+    rate, columns = _at_constant_rate(path, table.times, np.concatenate(columns, 1))
     count = len(columns)
     places, deviations, analog = np.split(columns, [3 * points, 4 * points], 1)
     data = np.concatenate([_points(places.reshape(count, points, 3), deviations).reshape(count, -1), analog], 1).astype("<f4")
     blocks, section = 0, b""
-    while True:  # where the data begins depends on how long that is told
+    while True:  # the parameters state where the data begins, which depends on their length
         section = _section(_groups(table.names, angles, rate, count, 2 + blocks), blocks)
         if len(section) <= blocks * BYTES:
             break
         blocks = -(-len(section) // BYTES)
-    if blocks > MOST_BLOCKS:
-        raise ShadowPuppetError(f"{path}: found {points} points, whose names need more than this format holds ({MOST_BLOCKS} blocks)")
+    if blocks > MAX_BLOCKS:
+        raise ShadowPuppetError(f"{path}: found {points} points, whose names need more than this format holds ({MAX_BLOCKS} blocks)")
     head = _header(points, len(angles), count, 2 + blocks, rate)
     write_whole(path, head + section.ljust(blocks * BYTES, b"\0") + data.tobytes() + b"\0" * (-data.nbytes % BYTES))
 
 
-def _in_step(path: Path, times: Array, values: Array) -> tuple[float, Array]:
-    """Frames/s, and values (K, C) of values (T, C) there."""
+def _at_constant_rate(path: Path, times: Array, values: Array) -> tuple[float, Array]:
+    """Frames/s of a constant rate, and values (T, C) at it, (K, C)."""
     try:
         grid = uniform_sampling(times)
     except ShadowPuppetError as error:
@@ -75,10 +79,10 @@ def _in_step(path: Path, times: Array, values: Array) -> tuple[float, Array]:
 
 
 def _points(places: Array, deviations: Array) -> Array:
-    """Points (T, J, 4) in the file's unit, with their residuals."""
+    """Positions (T, J, 3) with their residuals, (T, J, 4), in the file's unit."""
     known: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(2))
     residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), 255)), 0.0)
-    return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNSEEN)[..., None]], 2)
+    return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNKNOWN_RESIDUAL)[..., None]], 2)
 
 
 def _header(points: int, analog: int, count: int, start: int, rate: float) -> bytes:
@@ -116,15 +120,15 @@ def _word(name: str, word: str) -> Parameter:
 
 
 def _words(name: str, words: Sequence[str]) -> list[Parameter]:
-    """A list of words; what is more than it can hold goes into NAME2, NAME3, ..."""
-    parts = [[word.encode() for word in words[n : n + MOST_NAMES]] for n in range(0, len(words), MOST_NAMES)]
+    """A list of words, continued in NAME2, NAME3, ... where it is too long."""
+    parts = [[word.encode() for word in words[n : n + MAX_NAMES]] for n in range(0, len(words), MAX_NAMES)]
     widths = [max(map(len, part)) for part in parts]
     return [(f"{name}{n if n > 1 else ''}", CHAR, (width, len(part)), b"".join(word.ljust(width) for word in part))
             for n, (part, width) in enumerate(zip(parts, widths), 1)]  # fmt: skip
 
 
 def _section(groups: Mapping[str, Sequence[Parameter]], blocks: int) -> bytes:
-    """The section of parameters, without what fills its last block."""
+    """The section of parameters, without padding."""
     records = list[bytes]()
     for n, (group, parameters) in enumerate(groups.items(), 1):
         records.append(_record(group, -n, b"\0"))
@@ -134,7 +138,7 @@ def _section(groups: Mapping[str, Sequence[Parameter]], blocks: int) -> bytes:
 
 
 def _record(name: str, group: int, content: bytes) -> bytes:
-    """A group or parameter, with the distance to the next: from where that stands."""
+    """A group or parameter, with the offset of the next from that number."""
     return struct.pack("<2b", len(name), group) + name.encode() + struct.pack("<H", 2 + len(content)) + content
 
 

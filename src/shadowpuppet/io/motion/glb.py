@@ -1,4 +1,4 @@
-"""glTF 2.0 animations written as one binary file (GLB): a skinned puppet that moves, for Blender, game engines and browsers."""
+"""glTF 2.0 animations written as a binary file (GLB): a skinned puppet for Blender, game engines and browsers."""
 
 from __future__ import annotations
 
@@ -18,28 +18,27 @@ from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.mesh import Mesh
 
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
-"""Kinds of numbers in buffers."""
+"""Types of numbers in buffers."""
 POINTS, INDICES = 34962, 34963
-"""What a buffer is for: corners, or triangles."""
+"""Targets of buffers: vertices, and indices of triangles."""
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-TURN = 1e-7
-"""A joint whose rotations differ by no more than this is not animated."""
+MIN_ROTATION = 1e-7
+"""A joint whose rotation matrices differ less from the identity is not animated."""
 
 
 def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
     """Write a skinned mesh and its animation: metres, Y up, times from 0.
 
-    Frames that are not known have no keys: there the puppet has no size, so that it is not to be seen, and `extras.unknown` of the
-    animation lists them as pairs of seconds, from and to. That is said as a warning. Raises `ShadowPuppetError` where no frame is known or
-    the file cannot be written.
+    Unknown frames have no keys: the puppet's scale is 0 there, which hides it, and `extras.unknown` of the animation lists them as pairs
+    of seconds, from and to; a warning says so. Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
     """
     path, known = Path(path), np.flatnonzero(animation.known)
     if not len(known):
         raise ShadowPuppetError(f"{path}: found no frame in which the whole skeleton is known, expected one at least")
     gaps = len(animation.times) - len(known)
     if gaps:
-        told = f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them"
-        warn(told, ShadowPuppetWarning, stacklevel=2)
+        warn(f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them", ShadowPuppetWarning,
+             stacklevel=2)
     buffer = _Buffer()
     primitive = _primitive(buffer, mesh)
     skin = buffer.add(_inverse_bind(animation), "MAT4", FLOAT)
@@ -63,13 +62,13 @@ def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
 
 
 class _Buffer:
-    """Arrays one after another, each with the accessor that finds it."""
+    """A buffer of arrays, with a view and an accessor for each."""
 
     def __init__(self) -> None:
         self.data, self.views, self.accessors = bytearray(), list[dict[str, Any]](), list[dict[str, Any]]()
 
     def add(self, values: NDArray, kind: str, number: int, bounds: bool = False, target: int | None = None) -> int:
-        """Append values (N, width of `kind`); returns their accessor. `bounds`: tell the least and the greatest."""
+        """Append values (N, width of `kind`); the index of their accessor. `bounds`: state minimum and maximum."""
         dtype = {FLOAT: "<f4", BYTE: "u1", SHORT: "<u2", INT: "<u4"}[number]
         flat = np.ascontiguousarray(values).astype(dtype).reshape(-1, WIDTHS[kind])
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": flat.nbytes}
@@ -83,7 +82,7 @@ class _Buffer:
 
 
 def _primitive(buffer: _Buffer, mesh: Mesh) -> dict[str, Any]:
-    """The mesh: every point is carried by one joint alone."""
+    """The mesh; each point belongs to one joint."""
     joints = np.stack([mesh.joints, *[np.zeros_like(mesh.joints)] * 3], 1)
     attributes = {
         "POSITION": buffer.add(mesh.points, "VEC3", FLOAT, bounds=True, target=POINTS),
@@ -97,14 +96,14 @@ def _primitive(buffer: _Buffer, mesh: Mesh) -> dict[str, Any]:
 
 
 def _inverse_bind(animation: Animation) -> Array:
-    """From the mesh at rest to each joint's axes (J, 4, 4), column after column."""
+    """From the mesh at rest to each joint's axes (J, 4, 4), in column-major order."""
     matrices = np.tile(np.eye(4), (len(animation.names), 1, 1))
     matrices[:, :3, 3] = -animation.rest
     return np.swapaxes(matrices, 1, 2)
 
 
 def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
-    """A node a joint, as it is in a frame, so that viewers that show no motion show a posture."""
+    """A node a joint, posed as in `frame` for viewers without animation."""
     shifts = _shifts(animation)
     nodes = []
     for j, name in enumerate(animation.names):
@@ -116,7 +115,7 @@ def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
 
 
 def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> dict[str, Any]:
-    """Samplers and channels: rotations of joints that turn, places of those that move, and the size 0 where nothing is known."""
+    """Samplers and channels: rotations and positions of joints where they change, and scale 0 in unknown frames."""
     times = animation.times - animation.times[0]
     keys, shifts = buffer.add(times[known], "SCALAR", FLOAT, bounds=True), _shifts(animation)[known]
     samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()
@@ -130,7 +129,7 @@ def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> 
         turns = _turns(animation, j)[known]
         if j == 0 or j in animation.moving:
             animate(j, "translation", shifts[:, j])
-        if j == 0 or np.abs(turns - np.eye(3)).max() > TURN:
+        if j == 0 or np.abs(turns - np.eye(3)).max() > MIN_ROTATION:
             animate(j, "rotation", quaternions(turns))
     gaps = _gaps(animation)
     if gaps:
@@ -142,7 +141,7 @@ def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> 
 
 
 def _gaps(animation: Animation) -> list[list[float]]:
-    """Seconds from which and to which nothing is known: from the first such frame to the next known one, or the last."""
+    """Intervals of unknown frames, seconds: from the first to the next known frame, or the last."""
     times, edges = animation.times - animation.times[0], np.diff((~animation.known).astype(int), prepend=0, append=0)
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     return [[float(times[start]), float(times[min(end, len(times) - 1)])] for start, end in zip(starts, ends)]
@@ -160,7 +159,7 @@ def _shifts(animation: Animation) -> Array:
 
 
 def quaternions(rotations: Array) -> Array:
-    """Unit quaternions x, y, z, w (T, 4) of rotations (T, 3, 3), each on the side of the one before, so that none goes the long way."""
+    """Unit quaternions x, y, z, w (T, 4) of rotations (T, 3, 3), each with the sign nearest to the one before."""
     from scipy.spatial.transform import Rotation
 
     found = Rotation.from_matrix(rotations).as_quat()

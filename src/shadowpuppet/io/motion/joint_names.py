@@ -1,4 +1,4 @@
-"""Names that other programs give to joints, and ours."""
+"""Our joint names, and those of other programs."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from shadowpuppet.io.files.table import shorten
 from shadowpuppet.motion.motion import JointTable
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
-"""Ours."""
+"""Our names."""
 CENTRAL = {
     "pelvis": ("pelvis", "hips", "midhip", "chip", "spinebase", "hip", "pelo", "torsodistal"),
     "neck": ("neck", "trxo", "thorax", "torsoproximal"),
     "head": ("head", "hedo", "headbase", "headproximal"),
 }
-"""Joints without a side and what they are called, in the order of preference; letters and digits only, small.
+"""Other names of joints without a side, in order of preference; lower case, letters and digits only.
 
 `pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them, and `torsodistal`, ... the same in
 its own programs; `hips`, `upleg`, `forearm` are Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's. COCO, HALPE_26 and BODY_25
@@ -34,32 +34,32 @@ SIDED = {
     "knee": ("kjc", "knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo", "lowerlegproximal"),
     "ankle": ("ajc", "ankle", "foot", "tio", "lowerlegdistal"),
 }
-"""The same of those with a side. `hand` is the wrist where nothing else is called that; `hjc`, ... are joint centres of OpenSim's."""
+"""The same for joints with a side. `hand` is the wrist where no other name is; `hjc`, ... are OpenSim's joint centres."""
 EITHER_SIDE = {
     "elbow": (("lelbow", "melbow"), ("elbowlat", "elbowmed"), ("lel", "mel")),
     "wrist": (("lwrist", "mwrist"), ("wristlat", "wristmed"), ("faradius", "faulna")),
     "knee": (("knee", "mknee"), ("kneelat", "kneemed"), ("lfc", "mfc")),
     "ankle": (("ankle", "mankle"), ("anklelat", "anklemed"), ("lmal", "mmal")),
 }
-"""Two markers on the skin, outside and inside, between which a joint lies: OpenCap's, OpenSim's Gait2392's and Rajagopal2015's. Where both
-are there they are meant, and not what else is called by the joint's name."""
+"""Pairs of markers on the skin, lateral and medial, with the joint midway: OpenCap's, OpenSim's Gait2392's and Rajagopal2015's. A complete
+pair is preferred to other names of the joint."""
 STEMS = {stem for stems in SIDED.values() for stem in stems} | {stem for pairs in EITHER_SIDE.values() for pair in pairs for stem in pair}
 SUFFIX = re.compile(r"_study$")
-"""What OpenCap sets behind the markers of its models."""
+"""Suffix of OpenCap's markers."""
 HUMANEVA = re.compile(r"^(upper|lower)([LR])(Arm|Leg)(Proximal|Distal)$")
 """HumanEva's names have the side in the middle."""
 PREFIXES = re.compile(r"^(?:.*[:|]|mixamorig\d*_|bip0*1[ _]|character1_)", re.IGNORECASE)
-"""What may stand before a joint's own name: the person's, or the program's."""
+"""Prefixes of joint names: of the person, or the program."""
 WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-"""A name's words: LeftUpLeg, left_up_leg, L UpLeg."""
+"""The words of a name such as LeftUpLeg, left_up_leg, L UpLeg."""
 LETTERS = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
 def renamed(table: JointTable) -> JointTable:
-    """The joints of a table that are ours, by our names and in our order, whatever they are called there.
+    """The joints of a table that are ours, by our names and in our order.
 
-    Between two markers on either side of a joint the middle is it. `pelvis` is made where it is missing and both hips are there. A head
-    beside a nose is the crown, as 2D detectors have it, and left out. Raises `FormatError` where no joint is known.
+    A joint between a pair of markers is their middle. A missing `pelvis` is the middle of the hips. A head beside a nose is the crown, as
+    in 2D detectors, and left out. Raises `FormatError` where no joint is known.
     """
     columns, pairs = columns_of(table.names), pairs_of(table.names)
     if not columns and not pairs:
@@ -74,7 +74,7 @@ def renamed(table: JointTable) -> JointTable:
 
 
 def columns_of(names: Sequence[str]) -> dict[str, int]:
-    """For each of our joints that is among names, the index of the one that is meant."""
+    """Index into `names` of each of our joints that is among them."""
     found = {name.lower(): n for n, name in enumerate(names) if name.lower() in JOINTS}
     stems: dict[tuple[str, str], int] = {stem: n for n, stem in reversed([*enumerate(map(side_and_stem, names))])}
     taken = set(found.values())
@@ -91,7 +91,7 @@ def columns_of(names: Sequence[str]) -> dict[str, int]:
 
 
 def pairs_of(names: Sequence[str]) -> dict[str, list[int]]:
-    """For each of our joints that lies between two markers, and is not there by our own name, the indices of both."""
+    """Indices of the pair of markers of each of our joints that has one, and is not among `names` by our name."""
     stems = {stem: n for n, stem in reversed([*enumerate(map(side_and_stem, names))])}
     ours = {name.lower() for name in names}
     found = {}
@@ -104,7 +104,7 @@ def pairs_of(names: Sequence[str]) -> dict[str, list[int]]:
 
 
 def side_and_stem(name: str) -> tuple[str, str]:
-    """A name's side, `left`, `right` or none, and the rest, small and without signs."""
+    """A name's side (`left`, `right` or empty), and the rest in lower case without separators."""
     bare = SUFFIX.sub("", PREFIXES.sub("", name))
     if limb := HUMANEVA.match(bare):
         level, side, part, end = limb.groups()

@@ -1,7 +1,8 @@
-"""Motion of a person from any file that holds joints: ours, markers, skeletons of other programs."""
+"""Joints from motion files of any format, by our names, in metres, Z up; and the truth that a run is compared with."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from warnings import warn
@@ -10,55 +11,93 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.files.npz import read_npz
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.motion import READABLE
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.c3d import read_c3d
-from shadowpuppet.io.motion.joint_names import renamed
+from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, pairs_of, renamed
+from shadowpuppet.io.motion.npz import read_npz
 from shadowpuppet.io.motion.parquet import read_parquet
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
 
-ENDINGS = (".amc", ".bvh", ".c3d", ".csv", ".npz", ".parquet", ".trc")
-"""Of the files that are read."""
 AMC_RATE = 120.0
-"""Frames/s of files that tell none: the CMU laboratory's."""
-UNITS = {"metres": (0.35, 1.1, 1.0), "centimetres": (42.0, 110.0, 0.01), "millimetres": (350.0, 1100.0, 0.001),
-         "inches": (21.0, 42.0, 0.0254), "units of the CMU database": (7.0, 21.0, 0.0254 / 0.45)}
-"""Lengths of a leg, from hip to ankle, in a file's unit by which that is told, and the unit in metres. They do not overlap: people's
-legs are 0.4 to 1.1 m long, and who is measured in inches is no small child."""
+"""Default frames/s of .amc files, which do not state it: the CMU laboratory's."""
+LEG_LENGTHS = {"metres": (0.35, 1.1, 1.0), "centimetres": (42.0, 110.0, 0.01), "millimetres": (350.0, 1100.0, 0.001),
+               "inches": (21.0, 42.0, 0.0254), "units of the CMU database": (7.0, 21.0, 0.0254 / 0.45)}
+"""Range of a leg's length, hip to ankle, in each unit, and the unit in metres. Ranges do not overlap for legs of 0.4 to 1.1 m, if
+nobody measures a small child in inches."""
 ARM_TO_LEG = 1.48
-"""Length of a leg by that of an arm from shoulder to wrist (Drillis and Contini, in Winter 2009: 0.491 and 0.332 of the stature)."""
-CLEAR = 0.7
-"""Cosine from which on the direction from legs to head is taken for an axis."""
-TURNS = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)), "+y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+"""Ratio of a leg's length to an arm's, shoulder to wrist (Drillis and Contini, in Winter 2009: 0.491 and 0.332 of the stature)."""
+MIN_COSINE = 0.7
+"""Least cosine between an axis and the mean direction from legs to head for the axis to be up."""
+TO_Z_UP = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)), "+y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
          "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)), "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1))}
-"""Rotations by which each axis comes to point up."""
+"""Rotations from worlds in which another axis is up."""
 
 
 def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None) -> JointTable:
-    """Joints from a file of motion: .csv or .trc (`read_joints`), .bvh, .c3d, .npz, .parquet, or .amc with its .asf beside it.
+    """Joints from a motion file, an ending of `READABLE` (.amc: with its .asf beside it), in metres, Z up.
 
-    Joints have our names, metres, Z up, whatever the file's names, unit and axes are; joints of other names are left out, or all are kept
-    as they are called there (`own_names`). What the file does not tell, its unit (BVH) or which axis is up, is found from the person's legs
-    and posture, and said as a warning. `unit`: metres of a BVH file's unit, where that is known. `rate`: frames/s of an .amc file, which
-    tells none (default 120). Raises `FormatError`, naming the file.
+    What the file does not state, the unit (BVH) or the axis that is up, is estimated from the person's legs and posture, with a warning.
+    Raises `FormatError`, naming the file.
+
+    Args:
+        path: the file.
+        rate: frames/s of an .amc file (default 120).
+        own_names: keep all joints under the file's names; else our joints only, by our names.
+        unit: metres of a BVH file's unit, if known.
     """
     path = Path(path)
     ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(ENDINGS)}")
+    _check_ending(path)
     if ending == ".amc":
         table = read_mocap(path).joints(rate or AMC_RATE)
         return table if own_names else _ours(path, table)
     table = read_bvh(path).joints() if ending == ".bvh" else READERS[ending](path)
-    scale, up = 1.0 if ending != ".bvh" else unit_of(path, table) if unit is None else unit, turn_of(path, table)
+    scale, up = 1.0 if ending != ".bvh" else unit_of(path, table) if unit is None else unit, rotation_to_z_up(path, table)
     table = table if own_names else _ours(path, table)
     return replace(table, positions=table.positions * scale @ up.T)
 
 
 READERS = {".c3d": read_c3d, ".csv": read_joints, ".npz": read_npz, ".parquet": read_parquet, ".trc": read_joints}
-"""How files are read that tell their unit."""
+"""Readers of the formats that state their unit."""
+
+
+def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
+    """True joints to compare a run with, by our names, metres; joints named in `known` (the run's) are kept, too.
+
+    The axes of the file stay, as a truth must be in the cameras' world; BVH and AMC, which have worlds of their own, are read by
+    `read_motion`. Raises `FormatError`, naming the file and what is in it.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    _check_ending(path)
+    if ending in (".bvh", ".amc"):
+        return read_motion(path)
+    table = read_c3d(path) if ending == ".c3d" else read_joints(path)
+    same = [name for name in table.names if name in known and name not in JOINTS]
+    if not columns_of(table.names) and not pairs_of(table.names):
+        if same:
+            return table.select(same)
+        raise FormatError(f"{path}: found no joint of a known name, but {shorten(table.names)}; known are ours ({', '.join(JOINTS[:4])}, "
+                          "...), those of COCO, HALPE_26 and BODY_25 (LShoulder, ...), Vicon's and HumanEva's (LCLO, upperLArmProximal, "
+                          "...), OpenSim's (RHJC, R.Knee.Lat with R.Knee.Med, ...), and those of BVH files (LeftArm, ...)")
+    ours = renamed(table)
+    others = table.select(same)
+    return JointTable(table.times, (*ours.names, *others.names), np.concatenate([ours.positions, others.positions], 1))
+
+
+def names_in(path: str | Path) -> str:
+    """The names of joints in a table, for messages; empty for other formats."""
+    path = Path(path)
+    return shorten(read_joints(path).names) if path.suffix.lower() in (".csv", ".trc") else ""
+
+
+def _check_ending(path: Path) -> None:
+    if path.suffix.lower() not in READABLE:
+        raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(READABLE)}")
 
 
 def _ours(path: Path, table: JointTable) -> JointTable:
@@ -69,7 +108,7 @@ def _ours(path: Path, table: JointTable) -> JointTable:
 
 
 def _known(table: JointTable) -> JointTable:
-    """Those joints that are ours, by our names; none where none is."""
+    """The joints that are ours, by our names; may be empty."""
     try:
         return renamed(table)
     except ShadowPuppetError:
@@ -77,9 +116,9 @@ def _known(table: JointTable) -> JointTable:
 
 
 def unit_of(path: Path, table: JointTable) -> float:
-    """Metres of the unknown unit of a table, by the length of the legs, or arms; said as a warning. Raises `FormatError`."""
+    """A table's unit in metres, by the length of legs or arms. Warns of it. Raises `FormatError` where none fits."""
     length = leg_length(_known(table))
-    for unit, (low, high, metres) in UNITS.items():
+    for unit, (low, high, metres) in LEG_LENGTHS.items():
         if low <= length < high:
             if metres != 1:
                 warn(f"{path}: BVH files do not tell their unit; legs {length:.4g} long make it {unit}", ShadowPuppetWarning, stacklevel=3)
@@ -89,7 +128,7 @@ def unit_of(path: Path, table: JointTable) -> float:
 
 
 def leg_length(table: JointTable) -> float:
-    """Median length of the legs, or of the arms in proportion, in the table's unit; not a number where neither is known."""
+    """Median length of the legs, or of the arms in proportion, in the table's unit; NaN where unknown."""
     p = dict(zip(table.names, np.moveaxis(table.positions, 1, 0)))
     for chain, factor in ((("hip", "knee", "ankle"), 1.0), (("shoulder", "elbow", "wrist"), ARM_TO_LEG)):
         sides = [[p.get(f"{side}_{joint}") for joint in chain] for side in ("left", "right")]
@@ -102,17 +141,17 @@ def leg_length(table: JointTable) -> float:
     return np.nan
 
 
-def turn_of(path: Path, table: JointTable) -> Array:
-    """The rotation (3, 3) by which Z comes to point up: along that axis the head is over the legs for most of the time. Warns of one."""
+def rotation_to_z_up(path: Path, table: JointTable) -> Array:
+    """The rotation (3, 3) after which Z is up, by where the head is over the legs on average. Warns of one."""
     axis = up_axis(_known(table))
-    if axis not in TURNS:
+    if axis not in TO_Z_UP:
         return np.eye(3)
     warn(f"{path}: {axis.upper()} points up there; turned so that Z does", ShadowPuppetWarning, stacklevel=3)
-    return np.array(TURNS[axis], float)
+    return np.array(TO_Z_UP[axis], float)
 
 
 def up_axis(table: JointTable) -> str:
-    """The axis along which a person is upright, such as `+y`; `+z` where none is clearly."""
+    """The axis along which a person stands, such as `+y`; `+z` where none is clear."""
     low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip", "pelvis"), ("neck", "head", "shoulder")))
     up = high - low
     lengths = np.linalg.norm(up, axis=1, keepdims=True)
@@ -121,11 +160,11 @@ def up_axis(table: JointTable) -> str:
         return "+z"
     mean = (up[known] / lengths[known]).mean(0)
     n = int(np.abs(mean).argmax())
-    return f"{'+' if mean[n] > 0 else '-'}{'xyz'[n]}" if abs(mean[n]) >= CLEAR else "+z"
+    return f"{'+' if mean[n] > 0 else '-'}{'xyz'[n]}" if abs(mean[n]) >= MIN_COSINE else "+z"
 
 
 def _middle(table: JointTable, joints: tuple[str, ...]) -> Array:
-    """The middle (T, 3) of the first of `joints` that the table has, of both sides; not a number where it has none."""
+    """The middle (T, 3) of the first of `joints` that the table has, both sides; NaN where it has none."""
     for joint in joints:
         columns = [n for n, name in enumerate(table.names) if name in (joint, f"left_{joint}", f"right_{joint}")]
         if columns:

@@ -1,19 +1,25 @@
-"""What OpenSim calls our joints, and a skeleton's motion as the coordinates of its full-body model.
+"""OpenSim: names of markers, a skeleton's motion as coordinates of a full-body model, and MOT files, which hold coordinates.
 
-Markers are called as Pose2Sim's marker sets for OpenSim call them; coordinates are those of the full-body model of Rajagopal et al.
-(2016), which has arms. Its world and its bodies have X forward, Y up, Z to the right, and ball joints turn about Z, then X, then Y.
+Markers are named as in Pose2Sim's marker sets; coordinates are those of the full-body model of Rajagopal et al. (2016). Its world and
+bodies have X forward, Y up, Z to the right, and ball joints rotate about Z, then X, then Y. A MOT file is a table behind a short header,
+angles in degrees, lengths in metres.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, continuous_angles
+from shadowpuppet.io.files.table import check_times, number, shorten
+from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.motion import JointTable
 
@@ -23,31 +29,34 @@ MARKERS = {
         ("shoulder", "Shoulder"), ("elbow", "Elbow"), ("wrist", "Wrist"), ("hand", "Middle1"), ("hip", "Hip"), ("knee", "Knee"),
         ("ankle", "Ankle"))},
 }  # fmt: skip
-"""What a joint of ours is called as a marker. `Head` is the crown there, so the base of the skull has another name."""
-
+"""Marker names of our joints. `Head` is the crown there, so the base of the skull has another name."""
+TRANSLATIONS = ("_tx", "_ty", "_tz")
+"""Endings of coordinates in metres; all others are angles."""
+MAX_HEADER = 100
+"""Lines within which the header must end."""
 
 Pair = tuple[float, float]
 
 
 class Ball(NamedTuple):
-    """Three coordinates that turn about Z, X and Y of the joint above, one after another."""
+    """Three coordinates: successive rotations about Z, X and Y."""
 
     joint: str
-    """Of our trees."""
+    """Joint of the skeleton."""
     names: tuple[str, str, str]
     limits: tuple[Pair, Pair, Pair]
-    """What is usual, degrees: of the triples of angles that make a turn, the one that strays least is taken."""
+    """Usual ranges, degrees; of the equivalent triples of angles the one least outside is taken."""
     signs: tuple[int, int, int] = (1, 1, 1)
 
 
 class Hinge(NamedTuple):
-    """A coordinate that turns about the axis to the left, or the other way."""
+    """A coordinate that rotates about the axis to the left, `sign` times."""
 
     joint: str
     name: str
     sign: int
     first: bool = False
-    """Whether that turn comes before the joint's other one (an ankle's inversion); else after it (an elbow's about the upper arm)."""
+    """Whether it comes before the joint's other rotation (an ankle's inversion); else after it (an elbow's about the upper arm)."""
 
 
 COORDINATES: tuple[Ball | Hinge, ...] = (
@@ -63,24 +72,23 @@ COORDINATES: tuple[Ball | Hinge, ...] = (
         Hinge(f"{side}_elbow", f"elbow_flex_{s}", -1),
     )),
 )  # fmt: skip
-"""In the order of the file. A knee bends by positive angles, an ankle bends up; hips and arms are positive forward, inward, and turned
-inward. The upper body's `torso` is the chest. The turn of the head, and an ankle's inversion, about an axis that is not the model's, are
-left out."""
-PLACES = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+"""In the order of the file. Positive: a knee bends, an ankle bends up; hips and arms move forward, inward, and rotate inward. The upper
+body's `torso` is the chest. Not included: the head's rotation, and an ankle's inversion, whose axis is not the model's."""
+PELVIS_POSITION = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 TO_MODEL = np.array([[0.0, 0, 1], [0, 1.0, 0], [-1.0, 0, 0]])
 """From a skeleton's axes at rest (left, up, forward) to the model's (forward, up, right)."""
 
 
 def marker_names(table: JointTable) -> JointTable:
-    """The table with the names of `MARKERS`, turned so that Y is up, as (x, z, -y); joints without such a name keep theirs."""
+    """The table with names of `MARKERS`, rotated so that Y is up, (x, z, -y); joints without such a name keep theirs."""
     return replace(table, names=tuple(MARKERS.get(name, name) for name in table.names), positions=table.positions @ Y_UP.T)
 
 
 def coordinates(animation: Animation) -> dict[str, Array]:
-    """Coordinates of `COORDINATES` and `PLACES` over time, each (T,), rad or metres, of a skeleton that has our joints' names.
+    """`COORDINATES` and `PELVIS_POSITION` over time, each (T,), rad or metres, of a skeleton whose joints have our names.
 
-    Of known frames angles are continuous; others are not numbers. Where an elbow turns about the upper arm, too, that is the arm's turn.
-    Raises `ShadowPuppetError` where the pelvis has no name of ours, or no frame is known.
+    Angles are continuous over the known frames, NaN in others. An elbow's rotation about the upper arm is added to the shoulder's.
+    Raises `ShadowPuppetError` where the root is not the pelvis, or no frame is known.
     """
     known = np.flatnonzero(animation.known)
     if animation.names[0] != "pelvis" or not len(known):
@@ -89,9 +97,9 @@ def coordinates(animation: Animation) -> dict[str, Array]:
     if "torso" in turns:
         turns["chest"] = turns["torso"]
     turns["pelvis"] = Y_UP @ turns["pelvis"] @ TO_MODEL.T
-    found: dict[str, Array] = dict(zip(PLACES, (animation.shifts[known, 0] @ Y_UP.T).T))
+    found: dict[str, Array] = dict(zip(PELVIS_POSITION, (animation.shifts[known, 0] @ Y_UP.T).T))
     for part in COORDINATES:
-        if part.joint not in turns or not _turns(turns[part.joint]):
+        if part.joint not in turns or not _rotates(turns[part.joint]):
             continue
         if isinstance(part, Hinge):
             found[part.name] = part.sign * _hinge(turns[part.joint], part.first)
@@ -108,17 +116,17 @@ def _angles(rotations: Array, part: Ball) -> Array:
     return signs * continuous_angles(rotations, "ZXY", limits)
 
 
-def _turns(rotations: Array) -> bool:
-    """Whether a joint of rotations (T, 3, 3) ever turns: an ankle of a body without feet does not."""
+def _rotates(rotations: Array) -> bool:
+    """Whether rotations (T, 3, 3) differ from the identity; an ankle's of a body without feet do not."""
     return bool(np.abs(rotations - np.eye(3)).max() > 0)
 
 
 def _with_twist(turns: dict[str, Array], joint: str) -> Array:
-    """A joint's rotations (T, 3, 3); a shoulder's with the turn about the upper arm that the elbow has in an upper body."""
+    """A joint's rotations (T, 3, 3); a shoulder's include the rotation about the upper arm, which our upper bodies have in the elbow."""
     elbow = joint.replace("shoulder", "elbow")
     if elbow == joint or elbow not in turns:
         return turns[joint]
-    R = turns[elbow]  # about y (along the arm) by the twist, then about x by the bend: the first column tells the twist
+    R = turns[elbow]  # about y (along the arm) by the twist, then about x by the bend: the first column has the twist
     c, s = R[:, 0, 0], -R[:, 2, 0]
     twist = np.zeros_like(R)
     twist[:, 0, 0], twist[:, 0, 2], twist[:, 1, 1], twist[:, 2, 0], twist[:, 2, 2] = c, s, 1, -s, c
@@ -126,7 +134,7 @@ def _with_twist(turns: dict[str, Array], joint: str) -> Array:
 
 
 def _hinge(R: Array, first: bool) -> Array:
-    """The angle (T,) about x in rotations (T, 3, 3), before a turn about z where it is the `first`, else after one about y."""
+    """The angle (T,) about x in rotations (T, 3, 3): if `first` before a rotation about z, else after one about y."""
     return np.unwrap(np.arctan2(-R[:, 1, 2], R[:, 2, 2] if first else R[:, 1, 1]))
 
 
@@ -134,3 +142,54 @@ def _spread(values: Array, known: NDArray[np.int64], frames: int) -> Array:
     out = np.full(frames, np.nan)
     out[known] = values
     return out
+
+
+class Coordinates(NamedTuple):
+    """Coordinates over time."""
+
+    times: Array
+    """Seconds (T,)."""
+    values: dict[str, Array]
+    """Each coordinate's values (T,), rad or metres."""
+
+
+def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> None:
+    """Write coordinates (T,), rad or metres, as a MOT file. Frames with an unknown coordinate are left out: OpenSim has no gaps.
+
+    Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
+    """
+    path = Path(path)
+    table = np.stack([times, *(values[name] if name.endswith(TRANSLATIONS) else np.degrees(values[name]) for name in values)], 1)
+    table = table[np.isfinite(table).all(1)]
+    if not len(table) or not values:
+        raise ShadowPuppetError(f"{path}: found no frame in which all of {len(values)} coordinates are known, expected one at least")
+    sizes = [f"nRows={len(table)}", f"nColumns={table.shape[1]}"]
+    head = [path.stem, "version=1", *sizes, "inDegrees=yes", "endheader", "\t".join(["time", *values])]
+    rows = ("\t".join(f"{value + 0.0:.6f}" for value in row) for row in table.round(6).tolist())
+    write_whole(path, "\n".join([*head, *rows, ""]))
+
+
+def read_mot(path: str | Path) -> Coordinates:
+    """Read a MOT file. Raises `FormatError`, naming line and column, where it is malformed; warns of a wrong number of rows."""
+    path = Path(path)
+    lines = read_text(path).splitlines()
+    end = next((n for n, line in enumerate(lines[:MAX_HEADER]) if line.strip().lower() == "endheader"), None)
+    if end is None or len(lines) < end + 2:
+        raise FormatError(f"{path}: found no line endheader with columns behind it, expected a MOT file of OpenSim")
+    header = dict(line.strip().split("=", 1) for line in lines[:end] if "=" in line)
+    columns = lines[end + 1].split()
+    if columns[:1] != ["time"] or len(set(columns)) < len(columns) or len(columns) < 2:
+        raise FormatError(f"{path}: line {end + 2}: found {shorten(columns)!r}, expected time and the names of coordinates, each once")
+    numbered = [(n, line.split()) for n, line in enumerate(lines[end + 2 :], end + 3) if line.strip()]
+    for n, row in numbered:
+        if len(row) != len(columns):
+            raise FormatError(f"{path}: line {n}: found {len(row)} numbers, expected {len(columns)}, as many as there are columns")
+    table = np.array([[number(path, n, column, cell) for column, cell in zip(columns, row)] for n, row in numbered])
+    table = table.reshape(-1, len(columns))
+    check_times(path, table[:, 0], [n for n, _ in numbered])
+    if header.get("nRows", str(len(table))).strip() != str(len(table)):
+        warn(f"{path}: nRows: found {header['nRows']}, but the file has {len(table)} rows; those are used", ShadowPuppetWarning,
+             stacklevel=2)
+    angle = np.pi / 180 if header.get("inDegrees", "no").strip().lower() == "yes" else 1.0
+    values = zip(columns[1:], table.T[1:])
+    return Coordinates(table[:, 0], {name: column * (1.0 if name.endswith(TRANSLATIONS) else angle) for name, column in values})

@@ -1,4 +1,4 @@
-"""Parquet files (Apache): tables of columns, with the extra `formats`, which installs pyarrow."""
+"""Parquet files (Apache): tables of columns; needs the extra `formats` (pyarrow)."""
 
 from __future__ import annotations
 
@@ -11,32 +11,31 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.files.table import Table, shorten
-from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.motion.motion_table import Columns
-from shadowpuppet.io.motion.table import joint_columns, joint_names
+from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import errors_named, write_whole
+from shadowpuppet.io.motion.table import Columns, column_joints, joint_columns
 from shadowpuppet.motion.motion import JointTable
 
-TOLD = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up; radians"}
-"""Metadata of a file."""
+METADATA = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z up; radians"}
+"""Metadata of every file."""
 
 
 def write_parquet(path: str | Path, columns: Columns) -> None:
-    """Write columns; null where not a number. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
+    """Write columns; null for NaN. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
     write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
 
 
 def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns of plain values, each of one kind or None; raises as `write_parquet`."""
+    """Write columns of values of one kind each, or None. Raises as `write_parquet`."""
     arrow, parquet = _arrow(path)
     arrays = {name: arrow.array(column, from_pandas=True) for name, column in columns.items()}
     out = io.BytesIO()
-    parquet.write_table(arrow.table(arrays).replace_schema_metadata(TOLD), out)
+    parquet.write_table(arrow.table(arrays).replace_schema_metadata(METADATA), out)
     write_whole(Path(path), out.getvalue())
 
 
 def read_parquet(path: str | Path) -> JointTable:
-    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; other columns are skipped, nulls are unknown places.
+    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; ignores other columns; null where unknown.
 
     Raises `FormatError` where the file is malformed; `ShadowPuppetError` where pyarrow is missing.
     """
@@ -48,7 +47,7 @@ def read_parquet(path: str | Path) -> JointTable:
             columns = tuple(source.schema_arrow.names)
             if "time" not in columns:
                 raise FormatError(f"{path}: no column 'time'; columns there: {shorten(columns)}")
-            names = joint_names(Table(path, columns, [], []))
+            names = column_joints(path, columns)
             wanted = ["time", *joint_columns(names)]
             table = source.read(wanted)
             values = np.stack([table.column(name).cast(arrow.float64()).to_numpy() for name in wanted], 1)
@@ -57,10 +56,8 @@ def read_parquet(path: str | Path) -> JointTable:
     except (OSError, arrow.ArrowException, ValueError, KeyError) as error:
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FormatError(f"{path}: no Parquet table of joints ({shorten([first])})") from None
-    try:
+    with errors_named(path):
         return JointTable(values[:, 0], names, values[:, 1:].reshape(len(values), len(names), 3))
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _arrow(path: str | Path) -> tuple[ModuleType, ModuleType]:

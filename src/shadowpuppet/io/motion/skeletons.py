@@ -1,4 +1,4 @@
-"""Files that hold a skeleton beside its motion, BVH and ASF/AMC, as animations: joints under their own names, bones and turns kept."""
+"""Animated skeletons from BVH and ASF/AMC files, with the files' joint names, bones and rotations."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
+from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.files.text import errors_named
 from shadowpuppet.io.motion.amc import Z_UP, Capture, read_mocap
-from shadowpuppet.io.motion.bvh import END, Bvh, different, read_bvh
+from shadowpuppet.io.motion.bvh import END, Bvh, read_bvh, unique_names
 from shadowpuppet.io.motion.joint_names import columns_of
-from shadowpuppet.io.motion.motion_files import AMC_RATE, turn_of, unit_of
+from shadowpuppet.io.motion.motion_files import AMC_RATE, rotation_to_z_up, unit_of
 from shadowpuppet.motion.animation import Y_UP, Animation
 
 ENDINGS = (".amc", ".bvh")
@@ -20,49 +21,45 @@ CMU = {"root": "Hips", "lowerback": "LowerBack", "upperback": "Spine", "thorax":
            ("hipjoint", "HipJoint"), ("femur", "UpLeg"), ("tibia", "Leg"), ("foot", "Foot"), ("toes", "ToeBase"), ("clavicle", "Shoulder"),
            ("humerus", "Arm"), ("radius", "ForeArm"), ("wrist", "ForeArmTwist"), ("hand", "Hand"), ("fingers", "FingerBase"),
            ("thumb", "Thumb"))}}  # fmt: skip
-"""What the joint at which a bone of the CMU database begins is called as in BVH files; wrists and fingers where `amc.ENDS` has them."""
+"""Names, as in BVH files, of the joints at which bones of the CMU database begin; wrists and fingers as in `amc.ENDS`."""
 
 
 def read_animation(path: str | Path, rate: float | None = None, unit: float | None = None) -> Animation:
-    """The skeleton of a .bvh file, or of an .amc file with its .asf beside it, and its motion.
+    """The animated skeleton of a .bvh file, or of an .amc file with its .asf beside it, in metres, Z up.
 
-    In metres, Z up; `rate`, `unit` and what is warned of are as in `read_motion`. Raises `FormatError`.
+    `rate`, `unit` and warnings are as in `read_motion`. Raises `FormatError`.
     """
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:
         raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(ENDINGS)}")
-    try:
+    with errors_named(path):
         if path.suffix.lower() == ".amc":
             return _of_capture(read_mocap(path), rate or AMC_RATE)
         return _of_bvh(read_bvh(path), unit)
-    except FormatError:
-        raise
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _of_bvh(bvh: Bvh, unit: float | None) -> Animation:
     table = bvh.joints()
-    scale, up = unit_of(bvh.path, table) if unit is None else unit, turn_of(bvh.path, table)
-    if not columns_of(table.names) and not _stands(bvh):
+    scale, up = unit_of(bvh.path, table) if unit is None else unit, rotation_to_z_up(bvh.path, table)
+    if not columns_of(table.names) and not _is_z_up(bvh):
         up = Z_UP
-    turns, shifts = bvh.turned()
+    turns, shifts = bvh.local_transforms()
     above = {node.parent for node in bvh.nodes}
     tips = [n for n, node in enumerate(bvh.nodes) if n and n not in above and not node.channels and node.name.endswith(END)]
     kept = [n for n in range(len(bvh.nodes)) if n not in tips]
     place = {n: k for k, n in enumerate(kept)}
-    rest = Y_UP @ up  # from the file's axes to those of skeletons at rest
+    rest = Y_UP @ up  # from the file's axes to those of `Animation` at rest
     offsets = np.array([bvh.nodes[n].offset if n else np.zeros(3) for n in kept]) * scale @ rest.T
     ends = {place[bvh.nodes[n].parent]: _three(rest @ bvh.nodes[n].offset * scale) for n in tips}
     rotations, moved = rest @ turns[:, kept] @ rest.T, shifts[:, kept] * scale @ rest.T
     rotations[:, 0], moved[:, 0] = up @ turns[:, 0] @ rest.T, shifts[:, 0] * scale @ up.T
-    names = different([bvh.nodes[n].name for n in kept])
+    names = unique_names([bvh.nodes[n].name for n in kept])
     parents = tuple(place.get(bvh.nodes[n].parent, -1) for n in kept)
     return Animation(names, parents, offsets, ends, table.times, rotations, moved)
 
 
-def _stands(bvh: Bvh) -> bool:
-    """Whether the skeleton at rest is taller along Z than along Y."""
+def _is_z_up(bvh: Bvh) -> bool:
+    """Whether the skeleton is taller along Z than along Y in the zero pose."""
     places = np.array([node.offset for node in bvh.nodes], float)
     for n, node in enumerate(bvh.nodes):
         places[n] = places[node.parent] + node.offset if node.parent >= 0 else np.zeros(3)
@@ -71,16 +68,16 @@ def _stands(bvh: Bvh) -> bool:
 
 
 def _of_capture(capture: Capture, rate: float) -> Animation:
-    """A joint where each bone begins, which is where the one above it ends."""
+    """A joint at the beginning of each bone, which is its parent's end."""
     bones = capture.skeleton.bones
     along = np.array([bone.direction * bone.length for bone in bones])
     parents = (-1, *(bone.parent + 1 for bone in bones))
     offsets = np.array([np.zeros(3), *(along[bone.parent] if bone.parent >= 0 else np.zeros(3) for bone in bones)])
     T, world = len(capture.root), capture.rotations
     rotations, shifts = np.empty((T, len(parents), 3, 3)), np.tile(offsets, (T, 1, 1))
-    rotations[:, 0], shifts[:, 0] = Z_UP @ capture.turn, capture.root @ Z_UP.T
+    rotations[:, 0], shifts[:, 0] = Z_UP @ capture.root_rotation, capture.root @ Z_UP.T
     for n, bone in enumerate(bones):
-        above = capture.turn if bone.parent < 0 else world[:, bone.parent]
+        above = capture.root_rotation if bone.parent < 0 else world[:, bone.parent]
         rotations[:, n + 1] = np.swapaxes(above, 1, 2) @ world[:, n]
     leaves = set(range(len(bones))) - {bone.parent for bone in bones}
     ends = {n + 1: _three(along[n]) for n in sorted(leaves)}

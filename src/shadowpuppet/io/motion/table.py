@@ -1,74 +1,163 @@
-"""Joints over time: tables of ours (CSV) and marker files (TRC)."""
+"""Tables of ours: joints over time (CSV), a run's joints.csv and angles.csv, and a whole motion as columns.
+
+The names of all columns are made here. `MotionFrame` and `Motion` (motion.motion) hold what stands in them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import FormatError, choices
+from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.motion.trc import read_trc, write_trc
-from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
 
-__all__ = ["JointTable", "joint_columns", "joint_names", "read_joints", "write_joints"]
+AXES = ("_x", "_y", "_z")
+SD = "_sd"
+"""Ending of standard deviations; no joint or degree of freedom may end in it."""
+TRANSLATIONS = ("torso_y", "root_x", "root_y", "root_z")
+"""Degrees of freedom in metres; all others are angles."""
+Columns = dict[str, Array | NDArray[np.str_]]
+"""Numbers or words (T,) by the column's name."""
+
+
+def joint_columns(names: Sequence[str], suffix: str = "") -> list[str]:
+    """Names of the columns of joints, three each; `suffix`: `SD` for standard deviations."""
+    return [f"{name}{suffix}{axis}" for name in names for axis in AXES]
+
+
+def column_joints(path: Path, columns: Sequence[str]) -> tuple[str, ...]:
+    """The joints to which columns belong, in order. Raises `FormatError` where there is none, or one lacks a column."""
+    stems = list(dict.fromkeys(column[:-2] for column in columns if column.endswith(AXES)))
+    names = tuple(stem for stem in stems if not stem.endswith(SD))
+    missing = [column for column in joint_columns(names) if column not in columns]
+    if missing:
+        raise FormatError(f"{path}: no column {missing[0]!r}, expected _x, _y and _z of every joint")
+    if not names:
+        raise FormatError(f"{path}: no joints, expected columns time,<joint>_x,<joint>_y,<joint>_z,...; found {shorten(columns)!r}")
+    return names
+
+
+# Joints
 
 
 def read_joints(path: str | Path) -> JointTable:
     """Joints from a file: .csv with the header `time,<joint>_x,<joint>_y,<joint>_z,...` (seconds, metres), or .trc.
 
-    Other columns of a table are skipped; an empty cell is an unknown place. Raises `FormatError` naming file, line and column.
+    Other columns are ignored; an empty cell is an unknown coordinate. Raises `FormatError` naming file, line and column.
     """
     path = Path(path)
-    return _kind(path)[0](path)
+    return _functions(path)[0](path)
 
 
 def write_joints(path: str | Path, table: JointTable) -> None:
     """Write joints so that `read_joints` gives them back: .csv to the micrometre, or .trc. Raises `ShadowPuppetError`."""
     path = Path(path)
-    _kind(path)[1](path, table)
-
-
-def joint_names(table: Table) -> tuple[str, ...]:
-    """Joints that a table has columns of, in order. Raises `FormatError` where there is none, or a column of one is missing."""
-    stems = list(dict.fromkeys(column[:-2] for column in table.columns if column[-2:] in ("_x", "_y", "_z")))
-    names = tuple(stem for stem in stems if not stem.endswith("_sd"))
-    missing = [column for column in joint_columns(names) if column not in table.columns]
-    if missing:
-        raise FormatError(f"{table.path}: no column {missing[0]!r}, expected _x, _y and _z of every joint")
-    if not names:
-        raise FormatError(f"{table.path}: no joints, expected columns time,<joint>_x,<joint>_y,<joint>_z,...; "
-                          f"found {shorten(table.columns)!r}")
-    return names
-
-
-def joint_columns(names: tuple[str, ...], suffix: str = "") -> list[str]:
-    """Columns of joints: three each; `suffix` _sd for standard deviations."""
-    return [f"{name}{suffix}_{axis}" for name in names for axis in "xyz"]
+    _functions(path)[1](path, table)
 
 
 def _read_csv(path: Path) -> JointTable:
     table = read_table(path)
-    names, times = joint_names(table), table.times()
-    try:
-        return JointTable(times, names, table.numbers(joint_columns(names)).reshape(len(times), len(names), 3))
-    except FormatError:
-        raise
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
+    names, times = column_joints(path, table.columns), table.times()
+    with errors_named(path):
+        return JointTable(times, names, _joints(table, names))
+
+
+def _joints(table: Table, names: tuple[str, ...], suffix: str = "") -> Array:
+    return table.numbers(joint_columns(names, suffix)).reshape(-1, len(names), 3)
 
 
 def _write_csv(path: Path, table: JointTable) -> None:
-    rows = table.positions.reshape(len(table.times), 3 * len(table.names)).tolist()
-    lines = [csv_line(["time", *joint_columns(table.names)])]
-    lines += [csv_line(cells([time, *row])) for time, row in zip(table.times.tolist(), rows)]
-    write_whole(path, "".join(lines))
+    write_columns(path, table_columns(table))
 
 
-KINDS = {".csv": (_read_csv, _write_csv), ".trc": (read_trc, write_trc)}
-"""How each kind of file is read and written."""
+READERS_AND_WRITERS = {".csv": (_read_csv, _write_csv), ".trc": (read_trc, write_trc)}
 
 
-def _kind(path: Path) -> tuple:
-    if path.suffix.lower() not in KINDS:
-        raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(KINDS)}")
-    return KINDS[path.suffix.lower()]
+def _functions(path: Path) -> tuple:
+    if path.suffix.lower() not in READERS_AND_WRITERS:
+        raise FormatError(f"{path}: found the ending {path.suffix!r}, expected one of {choices(READERS_AND_WRITERS)}")
+    return READERS_AND_WRITERS[path.suffix.lower()]
+
+
+# A run: joints.csv and angles.csv
+
+
+def run_headers(joints: Sequence[str], dofs: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Columns of joints.csv and angles.csv."""
+    positions = [column for name in joints for suffix in ("", SD) for column in joint_columns([name], suffix)]
+    return ["time", *positions, "status", "cost", "overlap"], ["time", *dofs, *(f"{name}{SD}" for name in dofs)]
+
+
+def run_rows(frame: MotionFrame) -> tuple[list[str], list[str]]:
+    """A complete frame's cells in joints.csv and angles.csv."""
+    joints, joint_sd = (np.asarray(values).reshape(-1, 3) for values in (frame.joints, frame.joint_sd))
+    positions = np.concatenate([joints, joint_sd], 1).ravel().tolist()
+    angles = np.concatenate([np.asarray(frame.pose), np.asarray(frame.pose_sd)]).tolist()
+    time = cells([frame.time])
+    return [*time, *cells(positions), frame.status, *cells([frame.cost], 2), *cells([frame.overlap])], [*time, *cells(angles)]
+
+
+def read_run_tables(joints: Table, angles: Table, frames: int, body_name: str) -> Motion:
+    """The first `frames` frames of joints.csv and angles.csv. Raises `ShadowPuppetError`, `FormatError` naming line and column."""
+    names = column_joints(joints.path, joints.columns)
+    dofs = tuple(name for name in angles.columns if name != "time" and not name.endswith(SD))
+    series: dict[str, Any] = {
+        "times": joints.times(), "status": _statuses(joints), "cost": joints.numbers(["cost"])[:, 0],
+        "overlap": joints.numbers(["overlap"])[:, 0], "joints": _joints(joints, names), "joint_sd": _joints(joints, names, SD),
+        "poses": angles.numbers(dofs), "pose_sd": angles.numbers([f"{name}{SD}" for name in dofs]),
+    }
+    series = {name: values[:frames] for name, values in series.items()}
+    return Motion(body_name=body_name, dof_names=dofs, joint_names=names, **series)
+
+
+def _statuses(table: Table) -> np.ndarray:
+    status = table.texts("status")
+    wrong = [i for i, word in enumerate(status) if word not in STATUSES]
+    if wrong:
+        raise FormatError(f"{table.path}: line {table.lines[wrong[0]]}, column 'status': found {shorten([status[wrong[0]]])!r}, "
+                          f"expected one of {', '.join(STATUSES)}")
+    return np.array(status, str)
+
+
+# Columns, for exports
+
+
+def motion_columns(motion: Motion) -> Columns:
+    """A whole motion: `time`, joints (world, metres), their deviations, `status`, `cost`, `overlap`, then degrees of freedom.
+
+    The latter have their unit in the name, `chest_x [rad]`, so that none is taken for a joint's. Columns without a known value are
+    left out.
+    """
+    found: Columns = table_columns(motion.table)
+    deviations = motion.joint_sd.reshape(len(motion), 3 * len(motion.joint_names)).T
+    found |= dict(zip(joint_columns(motion.joint_names, SD), deviations))
+    found |= {"status": motion.status, "cost": motion.cost, "overlap": motion.overlap}
+    for values, suffix in ((motion.poses, ""), (motion.pose_sd, SD)):
+        found |= {f"{name}{suffix} [{dof_unit(name)}]": column for name, column in zip(motion.dof_names, values.T)}
+    always = {"time", "status", *joint_columns(motion.joint_names)}
+    return {name: column for name, column in found.items() if name in always or np.isfinite(column.astype(float)).any()}
+
+
+def table_columns(table: JointTable) -> Columns:
+    """`time`, and each joint's `_x`, `_y`, `_z`."""
+    found: Columns = {"time": table.times}
+    return found | dict(zip(joint_columns(table.names), table.positions.reshape(len(table.times), 3 * len(table.names)).T))
+
+
+def dof_unit(name: str) -> str:
+    """The unit of a degree of freedom: m or rad."""
+    return "m" if name in TRANSLATIONS else "rad"
+
+
+def write_columns(path: Path, columns: Columns) -> None:
+    """Write columns as CSV, to the micrometre; empty cells for NaN. Raises `ShadowPuppetError` where that fails."""
+    texts = [column.tolist() if column.dtype.kind == "U" else cells(column.tolist()) for column in columns.values()]
+    write_whole(path, "".join([csv_line(columns), *map(csv_line, zip(*texts))]))

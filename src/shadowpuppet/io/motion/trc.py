@@ -1,4 +1,4 @@
-"""TRC files (Motion Analysis; OpenSim, Pose2Sim): markers over time, tabs between columns, millimetres as a rule."""
+"""TRC files (Motion Analysis; OpenSim, Pose2Sim): markers over time, separated by tabs, usually in millimetres."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.io.files.table import cells, check_times, number, shorten
-from shadowpuppet.io.files.text import read_text, write_whole
+from shadowpuppet.io.files.text import errors_named, read_text, write_whole
 from shadowpuppet.motion.motion import JointTable
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-"""Units of length that a file can have, in metres."""
+"""Units of length in metres."""
 KEYS = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames")
 
 
 def read_trc(path: str | Path) -> JointTable:
-    """Markers of a TRC file in metres; axes as they stand in the file; an empty cell is an unknown place.
+    """Read a TRC file: markers in metres, in the file's axes; an empty cell is unknown.
 
-    Raises `FormatError`, naming line and column, where the file is malformed; warns where it has not as many frames as it says.
+    Raises `FormatError`, naming line and column, where the file is malformed; warns of a wrong number of frames.
     """
     path = Path(path)
     lines = [re.split("\t", line) for line in read_text(path).splitlines()]
@@ -30,16 +30,17 @@ def read_trc(path: str | Path) -> JointTable:
     header = dict(zip((key.strip() for key in lines[1]), (value.strip() for value in lines[2])))
     names, scale = _markers(path, header, lines[3]), _scale(path, header)
     columns = ["Frame#", "Time", *(f"{name} {axis}" for name in names for axis in "XYZ")]
-    start = 5 if len(lines) > 4 and not lines[4][0].strip() else 4  # X1 Y1 Z1 ..., which some leave out
+    start = 5 if len(lines) > 4 and not lines[4][0].strip() else 4  # X1 Y1 Z1 ..., which some files lack
     numbered = [(i, row) for i, row in enumerate(lines[start:], start + 1) if any(map(str.strip, row))]
     values = np.array([_row(path, i, columns, row) for i, row in numbered]).reshape(len(numbered), len(columns) - 1)
     check_times(path, values[:, 0], [i for i, _ in numbered])
     _check_count(path, header, len(numbered))
-    return _table(path, values[:, 0], names, values[:, 1:].reshape(-1, len(names), 3) * scale)
+    with errors_named(path):
+        return JointTable(values[:, 0], names, values[:, 1:].reshape(-1, len(names), 3) * scale)
 
 
 def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
-    """Write joints as markers, axes as they stand; unknown places stay empty. Raises `ShadowPuppetError` where that fails."""
+    """Write joints as markers without changing axes; empty where unknown. Raises `ShadowPuppetError` where that fails."""
     path = Path(path)
     if unit not in METRES:
         raise ShadowPuppetError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
@@ -56,7 +57,7 @@ def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
     decimals = {"mm": 3, "cm": 4, "m": 6}[unit]
     frames = enumerate(zip(table.times.tolist(), scaled.tolist()), 1)
     rows = [[str(n), *cells([time]), *cells(row, decimals)] for n, (time, row) in frames]
-    rows = [row if row[-1] else [*row, ""] for row in rows]  # an empty last cell needs a tab behind it: OpenSim does not count it else
+    rows = [row if row[-1] else [*row, ""] for row in rows]  # OpenSim ignores an empty last cell without a tab after it
     write_whole(path, "".join("\t".join(line) + "\n" for line in [*head, *rows]))
 
 
@@ -93,13 +94,6 @@ def _check_count(path: Path, header: dict[str, str], count: int) -> None:
     if said != str(count):
         warn(f"{path}: line 3, NumFrames: found {said!r}, but the file has {count} frames; those are used", ShadowPuppetWarning,
              stacklevel=3)
-
-
-def _table(path: Path, times: np.ndarray, names: tuple[str, ...], positions: np.ndarray) -> JointTable:
-    try:
-        return JointTable(times, names, positions)
-    except ShadowPuppetError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def _rate(table: JointTable) -> str:

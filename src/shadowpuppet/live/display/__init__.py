@@ -1,1 +1,1 @@
-"""What a live session shows: a window, a page for a browser, or nothing."""
+"""What a live session shows: a page for a browser, or nothing."""

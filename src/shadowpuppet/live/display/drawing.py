@@ -1,4 +1,4 @@
-"""The picture of a live session: the camera's, with the silhouette's outline, the body's and the skeleton."""
+"""The picture of a live session: the camera's, with the silhouette's outline, the body and the skeleton drawn on it."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image, Size
 
-LEAST, MOST = 640, 960
-"""Pixels of the longer side of what is shown: lines on smaller pictures are coarse."""
-MODEL = (0, 159, 230)
-"""The body's colour, blue green red."""
+MIN_SIDE, MAX_SIDE = 640, 960
+"""Limits of the longer side, pixels; lines on smaller pictures are coarse."""
+BODY_COLOUR = (0, 159, 230)
+"""Blue green red."""
 DIM, TINT = 0.45, 0.15
-"""Brightness of a picture that is not tracked, and how much of the body's colour lies over the person."""
+"""Brightness of a picture without tracking, and opacity of the body's colour."""
 
 
 def drawn(view: View) -> Image | None:
-    """The view's picture (H, W, 3), blue green red, with all that is known drawn upon it; None where there is no picture."""
+    """The view's picture (H, W, 3), blue green red, with outline, body and skeleton drawn where known; None without a picture."""
     import cv2
 
     if view.image is None:
@@ -42,7 +42,7 @@ def drawn(view: View) -> Image | None:
 
 
 def jpeg(image: Image, quality: int = 85) -> bytes:
-    """A picture as JPEG."""
+    """A picture encoded as JPEG."""
     import cv2
 
     return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
@@ -50,7 +50,7 @@ def jpeg(image: Image, quality: int = 85) -> bytes:
 
 def _shown_size(size: Size) -> Size:
     longest = max(size)
-    scale = min(max(longest, LEAST), MOST) / longest
+    scale = min(max(longest, MIN_SIDE), MAX_SIDE) / longest
     return round(size[0] * scale), round(size[1] * scale)
 
 
@@ -59,7 +59,7 @@ def _draw_body(out: Image, view: View) -> None:
     assert view.pose is not None
     picture = _scaled(view.picture, (out.shape[1], out.shape[0]))
     body = picture.mask(view.pose)
-    out[body] = (out[body] * (1 - TINT) + np.array(MODEL) * TINT).astype(np.uint8)
+    out[body] = (out[body] * (1 - TINT) + np.array(BODY_COLOUR) * TINT).astype(np.uint8)
     draw_skeleton(out, picture, view.pose)
 
 

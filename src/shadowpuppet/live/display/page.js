@@ -102,6 +102,10 @@ events.onmessage = (event) => {
 };
 events.onerror = () => { if (!over) { byId("chip").textContent = "no connection"; byId("chip").className = "chip lost"; } };
 
-for (const button of document.querySelectorAll("button")) {
-  button.onclick = () => fetch("wish/" + button.dataset.wish, {method: "POST", headers: {"X-Shadowpuppet": "1"}});
-}
+const send = (command) => fetch("command/" + command, {method: "POST", headers: {"X-Shadowpuppet": "1"}});
+for (const button of document.querySelectorAll("button")) button.onclick = () => send(button.dataset.command);
+
+const KEYS = {q: "stop", Escape: "stop", b: "learn", m: "measure"};
+document.addEventListener("keydown", (event) => {
+  if (KEYS[event.key] && !over && !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey) send(KEYS[event.key]);
+});

@@ -1,4 +1,4 @@
-"""What there is to be seen of a live session, and a display that shows nothing."""
+"""State of a live session after a picture, and the base class of displays."""
 
 from __future__ import annotations
 
@@ -7,69 +7,69 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-if TYPE_CHECKING:  # they bring a compiler with them
+if TYPE_CHECKING:  # these import Numba
     from numpy.typing import NDArray
 
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image
 
 PHASES = ("learning", "waiting", "measuring", "tracking")
-"""What a session does: it learns the empty scene, waits for a person, finds their sizes and place, and tracks them."""
-WISHES = ("stop", "learn", "measure")
-"""What can be asked of a session: to end, to learn the background anew, to find the person anew."""
+"""Phases of a session: learning the empty scene, waiting for a person, measuring their sizes and place, tracking them."""
+COMMANDS = ("stop", "learn", "measure")
+"""Commands to a session: end, learn the background again, find the person again."""
 
 
 class Angle(NamedTuple):
-    """A joint's angle with its limits, degrees."""
+    """A joint angle and its limits, degrees."""
 
     name: str
     value: float
-    """Not a number where it is not known."""
+    """NaN where unknown."""
     low: float
     high: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class View:
-    """What is known after a picture."""
+    """State of a session after a picture."""
 
     phase: str
     """One of `PHASES`."""
     message: str = ""
-    """What the person is to do, or what is being done."""
+    """Instruction to the person, or what the session is doing."""
     countdown: float | None = None
-    """Seconds until the phase goes on, where that is known."""
+    """Seconds until the next phase; None if unknown."""
     trouble: str = ""
-    """Why there are no pictures; empty where there are."""
+    """Why there are no pictures; empty while they come."""
     status: str = ""
-    """Of the person, while they are tracked: one of `motion.STATUSES`."""
+    """One of `motion.STATUSES` while tracking, else empty."""
     overlap: float = np.nan
-    """Of the body and the silhouette, 0..1."""
+    """Overlap of body and silhouette, 0..1."""
     angles: tuple[Angle, ...] = ()
     latency: float = np.nan
-    """Seconds from capture to pose, of this picture."""
+    """Seconds from capture to pose."""
     rate: float = np.nan
-    """Pictures worked on a second."""
+    """Pictures processed per second."""
     interval: float = np.nan
-    """Seconds from picture to picture, as the camera gives them."""
+    """Seconds between the camera's pictures."""
     dropped: int = 0
-    """Pictures that came while another was worked on."""
+    """Pictures skipped because they came while another was processed."""
     image: Image | None = None
-    """The picture (H, W, 3), blue green red, or (H, W) grey; not to be written to."""
+    """The picture (H, W, 3), blue green red, or (H, W) grey; read only."""
     mask: NDArray[np.bool_] | None = None
     """The silhouette (H, W)."""
     picture: Picture | None = None
-    """How the camera sees the body; None before it is known."""
+    """The body as the camera sees it; None before it is known."""
     pose: NDArray[np.float64] | None = None
-    """Degrees of freedom (D,); None where there is no honest one."""
+    """Degrees of freedom (D,); None without a trustworthy pose."""
 
     @property
     def chip(self) -> str:
-        """The state in a word."""
+        """The state as one word: paused, a status, or the phase."""
         return "paused" if self.trouble else self.status if self.phase == "tracking" and self.status else self.phase
 
     def figures(self) -> dict[str, Any]:
-        """All but the pictures, as JSON has it: milliseconds and degrees, null for what is not known."""
+        """Everything but the arrays, for JSON: milliseconds and degrees, None where unknown."""
         return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": _number(self.countdown, 1),
                 "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1),
                 "interval": _number(1000 * self.interval, 1), "rate": _number(self.rate, 1), "dropped": self.dropped,
@@ -77,10 +77,10 @@ class View:
 
 
 class Display:
-    """Shows nothing: derive from it. Used in a `with` block."""
+    """Base class of displays, used in a `with` block; shows nothing."""
 
     where = ""
-    """Where it can be seen, in words; empty where nowhere."""
+    """Where it is shown, for messages; empty if nowhere."""
 
     def __enter__(self) -> Self:
         """Open it."""
@@ -90,10 +90,10 @@ class Display:
         """Close it."""
 
     def show(self, view: View) -> None:
-        """Show a view; called at least ten times a second, whether anything changed or not."""
+        """Show a view; called at least ten times a second, changed or not."""
 
-    def wish(self) -> str:
-        """What is asked of the session, one of `WISHES`, once; empty where nothing is."""
+    def command(self) -> str:
+        """The last command given, one of `COMMANDS`, once; else empty."""
         return ""
 
 

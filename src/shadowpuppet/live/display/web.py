@@ -1,9 +1,8 @@
-"""A live session on a page for a browser, served by this machine to itself: nothing is fetched from elsewhere."""
+"""The page of a live session, and the HTTP server for it; the page loads nothing from other servers."""
 
 from __future__ import annotations
 
 import json
-import socket
 import threading
 import time
 from http import HTTPStatus
@@ -12,51 +11,51 @@ from importlib.resources import files
 from typing import Any, Self
 from urllib.parse import urlsplit
 
-from shadowpuppet.errors import SettingsError
 from shadowpuppet.live.display.drawing import drawn, jpeg
-from shadowpuppet.live.display.view import WISHES, Display, View
-from shadowpuppet.network import is_loopback, known_host, shown_host
+from shadowpuppet.live.display.view import COMMANDS, Display, View
+from shadowpuppet.network import address_family, is_loopback, is_own_host, open_browser, open_page, page_headers, shown_host
 
 PORT = 8600
-"""Tried first where none is asked for."""
-MOST_A_SECOND = 20.0
-"""Pictures and figures that a browser gets in a second; more cost the tracker time and show nothing new."""
+"""Default port; another free one if it is taken."""
+MAX_RATE = 20.0
+"""Pictures and figures sent to a browser per second; more would take the tracker's time and show nothing new."""
 PAGE = {"/": ("page.html", "text/html"), "/page.css": ("page.css", "text/css"), "/page.js": ("page.js", "text/javascript"),
         "/icon.svg": ("icon.svg", "image/svg+xml")}
 BOUNDARY = "shadowpuppet"
-HEADERS = {
-    "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Content-Security-Policy": "default-src 'none'; img-src 'self'; connect-src 'self'; script-src 'self'; style-src 'self'; "
-                               "base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-}  # fmt: skip
-"""Of every answer: other sites' pages can neither show nor read what is here."""
-WISH_HEADER = "X-Shadowpuppet"
-"""A wish must have it: other sites' pages cannot send it."""
+HEADERS = page_headers("default-src 'none'; img-src 'self'; connect-src 'self'; script-src 'self'; style-src 'self'; base-uri 'none'; "
+                       "form-action 'none'")
+COMMAND_HEADER = "X-Shadowpuppet"
+"""Required of commands: pages of other sites cannot send it."""
 
 
 class WebDisplay(Display):
-    """Serves a page from its `with` block's beginning to its end."""
+    """Serves the page within its `with` block."""
 
-    def __init__(self, listen: str = "127.0.0.1", port: int | None = None, footer: str = "") -> None:
-        """`footer`: what the page says at its foot. Raises `SettingsError` where the address or port cannot be had."""
-        self.footer = footer
+    def __init__(self, listen: str = "127.0.0.1", port: int | None = None, footer: str = "", opening: bool = False) -> None:
+        """Listen at an address and port (None: `PORT`, or any that is free).
+
+        `footer`: the page's last line; `opening`: open the page in this machine's browser. Raises `SettingsError` where the address
+        or port is not available.
+        """
+        self.footer, self.opening = footer, opening
         self.closed = False
         self._view = View(phase="learning", message="getting ready")
-        self._number, self._wish = 0, ""
+        self._number, self._command = 0, ""
         self._drawn: tuple[int, bytes] = (-1, b"")
         self._changed, self._drawing = threading.Condition(), threading.Lock()
-        self.server = _listening(listen, port, self)
+        self.server = open_page(lambda tried: _Server(self, listen, tried), listen, port, PORT)
         self.address = f"http://{shown_host(listen)}:{self.server.server_port}/"
         self.where = f"at {self.address}"
 
     def __enter__(self) -> Self:
-        """Begin to serve."""
+        """Start the server's thread."""
         threading.Thread(target=self.server.serve_forever, name="page", daemon=True).start()
+        if self.opening:
+            open_browser(self.address)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Tell whoever looks that it is over, and close."""
+        """Tell open pages that the session is over, and close."""
         with self._changed:
             self.closed = True
             self._changed.notify_all()
@@ -64,31 +63,31 @@ class WebDisplay(Display):
         self.server.server_close()
 
     def show(self, view: View) -> None:
-        """The next view; what was not fetched is left out."""
+        """Set the newest view; pages skip views that they did not fetch in time."""
         with self._changed:
-            if view.image is None and view.chip == self._view.chip:  # nothing new: what was seen last stays
+            if view.image is None and view.chip == self._view.chip:  # nothing new: pages keep the last picture
                 return
             self._view, self._number = view, self._number + 1
             self._changed.notify_all()
 
-    def wish(self) -> str:
-        """The last button that was pressed."""
-        wish, self._wish = self._wish, ""
-        return wish
+    def command(self) -> str:
+        """The last button or key pressed, once."""
+        command, self._command = self._command, ""
+        return command
 
-    def ask(self, wish: str) -> None:
-        """A button was pressed."""
-        self._wish = wish
+    def press(self, command: str) -> None:
+        """Store the command of a button or key."""
+        self._command = command
 
     def next(self, after: int, timeout: float = 1.0) -> tuple[int, View]:
-        """The newest view and its number, waited for where it is not newer than one that is known."""
+        """The newest view and its number; waits up to `timeout` seconds for one newer than number `after`."""
         with self._changed:
             if self._number <= after and not self.closed:
                 self._changed.wait(timeout)
             return self._number, self._view
 
     def picture(self, number: int, view: View) -> bytes:
-        """A view's picture as JPEG, drawn once for all who look; empty where there is none."""
+        """A view's picture as JPEG, drawn once for all connections; empty without a picture."""
         with self._drawing:
             if self._drawn[0] != number:
                 image = drawn(view)
@@ -99,15 +98,13 @@ class WebDisplay(Display):
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     allow_reuse_address = False
-    display: WebDisplay
-    loopback = True
+
+    def __init__(self, display: WebDisplay, listen: str, port: int) -> None:
+        self.display, self.loopback, self.address_family = display, is_loopback(listen), address_family(listen)
+        super().__init__((listen, port), _Handler)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Somebody closed the page: nobody need know."""
-
-
-class _Server6(_Server):
-    address_family = socket.AF_INET6
+        """Ignore connections that a browser closed."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -116,12 +113,12 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 30
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing is logged."""
+        """Log nothing."""
 
     def do_GET(self) -> None:
-        """The page, its pictures, its figures."""
+        """Answer with a file of the page, a picture, or a stream of pictures or figures."""
         path = urlsplit(self.path).path
-        if not self._is_for_us():
+        if not self._accepted():
             return
         if path in PAGE:
             name, kind = PAGE[path]
@@ -139,21 +136,21 @@ class _Handler(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.NOT_FOUND, "no such page")
 
     def do_POST(self) -> None:
-        """A button of the page."""
-        wish = urlsplit(self.path).path.removeprefix("/wish/")
-        if not self._is_for_us():
+        """Store the command of a button or key of the page."""
+        command = urlsplit(self.path).path.removeprefix("/command/")
+        if not self._accepted():
             return
-        if WISH_HEADER not in self.headers:
+        if COMMAND_HEADER not in self.headers:
             self._refuse(HTTPStatus.FORBIDDEN, "only the page itself may ask this")
-        elif wish not in WISHES:
-            self._refuse(HTTPStatus.NOT_FOUND, "no such wish")
+        elif command not in COMMANDS:
+            self._refuse(HTTPStatus.NOT_FOUND, "no such command")
         else:
-            self.server.display.ask(wish)
+            self.server.display.press(command)
             self._answer(b"", "text/plain")
 
-    def _is_for_us(self) -> bool:
-        """Whether the browser means this machine: a name that another site had turned to this address is refused."""
-        if known_host(self.headers.get("Host", ""), self.server.loopback):
+    def _accepted(self) -> bool:
+        """Whether the request names this machine as its host; else it is refused."""
+        if is_own_host(self.headers, self.server.loopback):
             return True
         self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this page is served under the machine's own address only")
         return False
@@ -172,7 +169,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def _follow(self, part: Any) -> None:
-        """Send parts as views come, and again where none comes, until somebody has enough."""
+        """Stream a part per view, at most `MAX_RATE` a second, until the client disconnects; repeats the last one when idle."""
         display, number = self.server.display, 0
         while not display.closed:
             began = time.monotonic()
@@ -180,12 +177,12 @@ class _Handler(BaseHTTPRequestHandler):
             if data := part(new, view):
                 self.wfile.write(data)
             number = new
-            time.sleep(max(1 / MOST_A_SECOND - (time.monotonic() - began), 0))
+            time.sleep(max(1 / MAX_RATE - (time.monotonic() - began), 0))
         if part == self._figures:
             self.wfile.write(b'data: {"over": true}\n\n')
 
     def _picture(self, number: int, view: View) -> bytes:
-        """A part, and the boundary after it: browsers show a picture once they see where it ends."""
+        """One part and the boundary after it, at which browsers show the picture."""
         data = self.server.display.picture(number, view)
         head = f"Content-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
         return head.encode() + data + f"\r\n--{BOUNDARY}\r\n".encode() if data else b""
@@ -193,17 +190,3 @@ class _Handler(BaseHTTPRequestHandler):
     def _figures(self, number: int, view: View) -> bytes:
         figures = view.figures() | {"footer": self.server.display.footer}
         return f"data: {json.dumps(figures, allow_nan=False)}\n\n".encode()
-
-
-def _listening(listen: str, port: int | None, display: WebDisplay) -> _Server:
-    kind, why = _Server6 if ":" in listen else _Server, ""
-    for tried in (PORT, 0) if port is None else (port,):
-        try:
-            server = kind((listen, tried), _Handler)
-        except (OSError, OverflowError) as error:
-            why = (getattr(error, "strerror", None) or str(error)).lower()
-            continue
-        server.display, server.loopback = display, is_loopback(listen)
-        return server
-    of = f"listen: {listen}" if port is None else f"listen: {listen}, port: {port}"
-    raise SettingsError(f"{of}: the page cannot be served there ({why}); --listen takes an address of this machine, --port a free port")

@@ -1,1 +1,1 @@
-"""Motion given to other programs as it is tracked: OSC in VMC's messages, JSON over a WebSocket, the lab streaming layer."""
+"""Motion sent to other programs while it is tracked: VMC messages by OSC, JSON by WebSocket, the lab streaming layer."""

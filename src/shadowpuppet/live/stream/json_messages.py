@@ -1,4 +1,4 @@
-"""Frames as JSON: the first message says whose they are, then comes one a frame. docs/live.md has the schema."""
+"""Frames as JSON: a first message about the person, then one per frame. The schema is in docs/live.md."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.live.stream.outlet import Subject, Told
+from shadowpuppet.live.stream.outlet import StreamFrame, Subject
 
 VERSION = 1
-"""Of the messages: it grows where a program that reads them must be changed."""
+"""Version of the messages; raised by changes that break programs which read them."""
 FRAME = "right-handed, Z up: the calibration's world, or of a camera that has none its own, X right, Y away from it"
 ROTATIONS = "quaternions x, y, z, w, from the axes of who stands at zero with hanging arms (X forward, Y left, Z up) to the world"
 
 
 def beginning(subject: Subject) -> str:
-    """Who is tracked, and how the frames' lists are to be read."""
+    """The first message: the person, and what the lists in frames mean."""
     return _text({
         "type": "begin", "format": "shadowpuppet", "version": VERSION, "body": subject.body.name, "height": _number(subject.height, 4),
         "joints": subject.names, "parents": subject.parents, "angles": subject.body.skeleton.dof_names,
@@ -26,14 +26,12 @@ def beginning(subject: Subject) -> str:
     })  # fmt: skip
 
 
-def framed(frame: Told) -> str:
-    """One frame; null for what is not known."""
-    turns = None
-    if frame.turns is not None:
-        turns = Rotation.from_matrix(frame.turns).as_quat(canonical=True)
+def framed(frame: StreamFrame) -> str:
+    """One frame; null where unknown."""
+    rotations = None if frame.rotations is None else Rotation.from_matrix(frame.rotations).as_quat(canonical=True)
     return _text({
         "type": "frame", "time": _number(frame.time, 6), "status": frame.status, "overlap": _number(frame.overlap, 4),
-        "age": _number(frame.age, 4), "joints": _numbers(frame.places, 5), "rotations": _numbers(turns, 6),
+        "age": _number(frame.age, 4), "joints": _numbers(frame.positions, 5), "rotations": _numbers(rotations, 6),
         "angles": _numbers(frame.pose, 5),
     })  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Frames as a stream of the lab streaming layer (LSL), with the extra `lsl`."""
+"""Frames as a stream of the lab streaming layer (LSL); needs the extra `lsl`."""
 
 from __future__ import annotations
 
@@ -9,27 +9,26 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.live.stream.outlet import Outlet, Subject, Told
+from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
 
 CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
-"""Of liblsl: how far the stream is announced; and that it logs nothing."""
-TURN = "XYZW"
-KINDS = tuple(f"Position{axis}" for axis in "XYZ") + tuple(f"Orientation{axis}" for axis in TURN)
-"""Channels of a joint, named as XDF's meta-data for motion capture has them."""
-SECONDS = 1
-"""How much liblsl keeps for who is slow, in hundreds of samples, for streams without a rate."""
+"""Configuration of liblsl: how far the stream is announced, no log."""
+KINDS = (*(f"Position{axis}" for axis in "XYZ"), *(f"Orientation{axis}" for axis in "XYZW"))
+"""Channels of a joint, named as in XDF's meta-data for motion capture."""
+MAX_BUFFERED = 1
+"""Samples that liblsl keeps for a slow receiver, in hundreds (for streams without a rate)."""
 
 
 class LslOutlet(Outlet):
-    """A stream of type MoCap: seven channels a joint, place (metres) and quaternion, not numbers where nothing is known.
+    """A stream of type MoCap: seven channels a joint, position (metres) and quaternion, NaN where unknown.
 
-    Samples are stamped with the time at which the picture was captured.
+    A sample's time stamp is when its picture was captured.
     """
 
     name = "lsl"
 
     def __init__(self, stream: str, scope: str = "machine") -> None:
-        """The stream's name, and how far it is announced: machine, link or site.
+        """`stream`: its name; `scope`: how far it is announced (machine, link or site).
 
         Raises `SettingsError` where pylsl or liblsl is missing.
         """
@@ -37,12 +36,12 @@ class LslOutlet(Outlet):
             import pylsl  # pyright: ignore[reportMissingImports]
         except ImportError:
             raise SettingsError("lsl: needs the library pylsl: pip install 'shadowpuppet[lsl]'") from None
-        except (OSError, RuntimeError) as error:  # pylsl has found no liblsl that this machine can load
+        except (OSError, RuntimeError) as error:  # pylsl found no liblsl that this machine can load
             raise SettingsError(f"lsl: the library liblsl cannot be loaded ({' '.join(str(error).split())})") from None
         if not stream.strip():
             raise SettingsError(f"lsl: found {stream!r}, expected the name of the stream")
         self._pylsl, self.stream, self.sent = pylsl, stream, 0
-        with contextlib.suppress(RuntimeError, AttributeError):  # of a liblsl before 1.17, which reads its own file alone
+        with contextlib.suppress(RuntimeError, AttributeError):  # liblsl before 1.17 is configured by its own file only
             pylsl.set_config_content(CONFIG.format(scope=scope, listen="ListenAddress = 127.0.0.1\n" if scope == "machine" else ""))
         self.where = f"LSL as {stream!r}"
         self._outlet: Any = None
@@ -53,7 +52,7 @@ class LslOutlet(Outlet):
         self._outlet = None
 
     def begin(self, subject: Subject) -> None:
-        """Announce the stream; anew only where there are other joints."""
+        """Announce the stream; again only if the joints differ."""
         if self._outlet is not None and self._channels == len(subject.names) * len(KINDS):
             return
         self._channels = len(subject.names) * len(KINDS)
@@ -66,19 +65,19 @@ class LslOutlet(Outlet):
                 for key, value in (("label", f"{joint}_{kind}"), ("marker", joint), ("object", "person"), ("type", kind),
                                    ("unit", "meters" if kind.startswith("P") else "quaternion")):
                     channel.append_child_value(key, value)
-        self._outlet = self._pylsl.StreamOutlet(info, max_buffered=SECONDS)
+        self._outlet = self._pylsl.StreamOutlet(info, max_buffered=MAX_BUFFERED)
 
-    def send(self, frame: Told) -> None:
-        """A sample."""
+    def send(self, frame: StreamFrame) -> None:
+        """Send a frame as a sample."""
         if self._outlet is None:
             return
         sample = np.full((self._channels // len(KINDS), len(KINDS)), np.nan)
-        if frame.places is not None and frame.turns is not None:
-            sample[:, :3], sample[:, 3:] = frame.places, Rotation.from_matrix(frame.turns).as_quat(canonical=True)
+        if frame.positions is not None and frame.rotations is not None:
+            sample[:, :3], sample[:, 3:] = frame.positions, Rotation.from_matrix(frame.rotations).as_quat(canonical=True)
         late = frame.age if np.isfinite(frame.age) else 0.0
         self._outlet.push_sample(sample.ravel().tolist(), self._pylsl.local_clock() - late)
         self.sent += 1
 
     def counts(self) -> dict[str, Any]:
-        """Samples."""
+        """Number of samples sent."""
         return {"sent": self.sent}

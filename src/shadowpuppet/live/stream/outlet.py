@@ -1,8 +1,8 @@
-"""What other programs get of a tracked person, and an outlet that gives nothing away."""
+"""Frames as other programs get them, and the base class of live motion streams (outlets)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,66 +19,67 @@ from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 
 
-class Told(NamedTuple):
-    """A frame as outlets get it; None where there is no honest value."""
+class StreamFrame(NamedTuple):
+    """A frame as outlets send it; None without a trustworthy pose."""
 
     time: float
     """Seconds of the run."""
     status: str
     """One of `motion.STATUSES`."""
     overlap: float
-    """0..1; not a number where it is not known."""
+    """0..1; NaN if unknown."""
     age: float
-    """Seconds since the picture was captured; not a number where that is not known."""
+    """Seconds since the picture was captured; NaN if unknown."""
     pose: Array | None
     """Degrees of freedom (D,), rad or m."""
-    places: Array | None
-    """Of the subject's joints in the world, of shape (N, 3), metres."""
-    turns: Array | None
-    """Their rotations from the axes of who stands at zero (X forward, Y left, Z up) to the world, of shape (N, 3, 3)."""
+    positions: Array | None
+    """Joints in the world, (N, 3), metres."""
+    rotations: Array | None
+    """Joints' rotations from the axes of the zero pose (X forward, Y left, Z up) to the world, (N, 3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """Who is tracked, and where their frame stands."""
+    """The tracked person's body, and the body's frame in the world."""
 
     body: Body
     T_world_base: Array
-    """The body's frame in the world, (4, 4): X forward of who stands at zero, Y to their left, Z up."""
+    """From the body's frame (in the zero pose X forward, Y left, Z up) to the world, (4, 4)."""
     height: float | None = None
     """Metres, shoes on."""
     floor: float | None = None
-    """Of the world: Z of the floor; None where that is not known, as with one camera that was not calibrated."""
+    """Z of the floor in the world, metres; None if unknown, as with one camera that was not calibrated."""
 
     @cached_property
     def tree(self) -> BodyTree:
-        """Joints and landmarks, parents before children, N of them."""
+        """The N joints and landmarks, parents before children."""
         return BodyTree(self.body)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the joints, N of them."""
+        """Names of the N joints."""
         return tuple(node.name for node in self.tree.nodes)
 
     @cached_property
     def parents(self) -> tuple[int, ...]:
-        """Index of the joint above each; -1: none."""
+        """Index of each joint's parent; -1 for none."""
         return tuple(node.parent for node in self.tree.nodes)
 
     @cached_property
     def pelvis_height(self) -> float:
-        """Metres from the floor to the pelvis of who stands upright: by proportions."""
+        """Height of the pelvis over the floor when standing upright, metres, by proportions."""
         sizes = whole_sizes_from_bones(AnatomicalSizes, {}, (self.height or AVERAGE_HEIGHT) - SOLE)
         return sizes.hip_drop + sizes.thigh_length + sizes.shank_length + sizes.ankle_height
 
-    def told(self, frame: MotionFrame, age: float = np.nan) -> Told:
-        """A frame, with the places and rotations of all joints."""
+    def stream_frame(self, frame: MotionFrame, age: float = np.nan) -> StreamFrame:
+        """A frame of a run with the positions and rotations of all joints."""
         if frame.pose is None or frame.status in BLANK or not np.isfinite(frame.pose).all():
-            return Told(frame.time, frame.status, frame.overlap, age, None, None, None)
+            return StreamFrame(frame.time, frame.status, frame.overlap, age, None, None, None)
         pose = np.asarray(frame.pose, float)
         joints = self.body.skeleton.forward(pose[None], self.T_world_base)[0][self._joints]
-        turns = joints[:, :, :3]
-        return Told(frame.time, frame.status, frame.overlap, age, pose, (turns @ self._offsets)[..., 0] + joints[:, :, 3], turns)
+        rotations = joints[:, :, :3]
+        positions = (rotations @ self._offsets)[..., 0] + joints[:, :, 3]
+        return StreamFrame(frame.time, frame.status, frame.overlap, age, pose, positions, rotations)
 
     @cached_property
     def _joints(self) -> list[int]:
@@ -90,12 +91,12 @@ class Subject:
 
 
 class Outlet:
-    """Gives nothing away: derive from it. Used in a `with` block; nothing in it blocks or raises."""
+    """Base class of live motion streams, used in a `with` block; sends nothing. No method may block or raise."""
 
     name = ""
-    """What it is called where it is told of."""
+    """Name in messages and metrics.json."""
     where = ""
-    """Where it leads, in words; empty where nowhere."""
+    """Where it sends to, for messages; empty if nowhere."""
 
     def __enter__(self) -> Self:
         """Open it."""
@@ -105,33 +106,33 @@ class Outlet:
         """Close it."""
 
     def begin(self, subject: Subject) -> None:
-        """Whose frames follow: somebody was measured, perhaps anew."""
+        """Start with a newly measured person, to whom the next frames belong."""
 
-    def send(self, frame: Told) -> None:
-        """A frame of the subject."""
+    def send(self, frame: StreamFrame) -> None:
+        """Send a frame."""
 
     def trouble(self) -> str:
-        """What is wrong, in a sentence, once; empty where nothing is, or nothing new."""
+        """The latest problem as a sentence, reported once; empty if there is none."""
         return ""
 
     def counts(self) -> dict[str, Any]:
-        """What was given away, as metrics.json has it."""
+        """Numbers for metrics.json."""
         return {}
 
 
 class Outlets(Outlet):
-    """Several at once. One that fails, by a mistake of its own, is given up; the session and the others go on."""
+    """Several outlets as one. An outlet that raises is dropped; the session and the others go on."""
 
     def __init__(self, outlets: Iterable[Outlet] = ()) -> None:
-        """Any number of them."""
-        self._all = self._good = list(outlets)
-        self._said = list[str]()
+        """Any number of outlets."""
+        self._all = self._working = list(outlets)
+        self._problems = list[str]()
         self._open = ExitStack()
         self._subject: Subject | None = None
 
     @property
     def where(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Where they lead."""
+        """Where all of them send to."""
         return "; ".join(outlet.where for outlet in self._all if outlet.where)
 
     def __enter__(self) -> Self:
@@ -147,33 +148,32 @@ class Outlets(Outlet):
         self._open.__exit__(*error)
 
     def begin(self, subject: Subject) -> None:
-        """Tell all."""
+        """Start a newly measured person on all."""
         self._subject = subject
         self._each(lambda outlet: outlet.begin(subject))
 
     def follow(self, frame: MotionFrame, age: float = np.nan) -> None:
-        """Give a frame of a run to all; nothing before it is known whose it is."""
-        if self._good and self._subject is not None:
-            told = self._subject.told(frame, age)
-            self._each(lambda outlet: outlet.send(told))
+        """Send a run's frame, `age` seconds after its picture was captured, to all; does nothing before `begin`."""
+        if self._working and self._subject is not None:
+            self.send(self._subject.stream_frame(frame, age))
 
-    def send(self, frame: Told) -> None:
-        """Give it to all."""
+    def send(self, frame: StreamFrame) -> None:
+        """Send a frame to all."""
         self._each(lambda outlet: outlet.send(frame))
 
     def trouble(self) -> str:
-        """The next thing that is wrong with any."""
-        self._said += [said for outlet in self._good if (said := outlet.trouble())]
-        return self._said.pop(0) if self._said else ""
+        """The next problem of any."""
+        self._problems += [problem for outlet in self._working if (problem := outlet.trouble())]
+        return self._problems.pop(0) if self._problems else ""
 
     def counts(self) -> dict[str, Any]:
-        """Of each, by its name."""
+        """Numbers of each outlet by its name."""
         return {outlet.name: counts for outlet in self._all if (counts := outlet.counts())}
 
-    def _each(self, what: Any) -> None:
-        for outlet in self._good:
+    def _each(self, call: Callable[[Outlet], None]) -> None:
+        for outlet in self._working:
             try:
-                what(outlet)
+                call(outlet)
             except Exception as error:  # whatever it is, tracking goes on
-                self._said.append(f"{outlet.name}: {type(error).__name__}: {error}; nothing more is given to it")
-                self._good = [other for other in self._good if other is not outlet]
+                self._problems.append(f"{outlet.name}: {type(error).__name__}: {error}; nothing more is given to it")
+                self._working = [other for other in self._working if other is not outlet]

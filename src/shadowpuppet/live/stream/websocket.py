@@ -1,36 +1,35 @@
-"""Frames as JSON to whoever connects by WebSocket (RFC 6455), with the extra `live`."""
+"""Frames as JSON over WebSocket (RFC 6455); needs the extra `live`."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from typing import Any, Self
 
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, reason
 from shadowpuppet.live.stream.json_messages import beginning, framed
-from shadowpuppet.live.stream.outlet import Outlet, Subject, Told
-from shadowpuppet.network import host_of, is_loopback, known_host, shown_host
+from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
+from shadowpuppet.network import address_family, are_origins_allowed, is_loopback, is_own_host, shown_host
 
-KEPT = 16384
-"""Bytes that may wait in this machine for who is slow, about as the system takes it: a few frames. They get the newest frame after that."""
-MOST = 32
-"""Connections at a time."""
-HASTE = 1.0
-"""Seconds that the end may take."""
+SEND_BUFFER = 16384
+"""Bytes buffered for a slow client, a few frames; after those it gets the newest frame."""
+MAX_CLIENTS = 32
+CLOSE_SECONDS = 1.0
+"""Limit for closing all connections."""
 
 
 class WebSocketOutlet(Outlet):
-    """Serves from its `with` block's beginning to its end, in a thread of its own: who is slow or hangs holds nobody up."""
+    """Serves within its `with` block, in a thread of its own: a client that is slow or hangs delays nothing."""
 
     name = "websocket"
 
     def __init__(self, host: str, port: int, origins: Sequence[str] = ()) -> None:
-        """`origins`: of pages that may listen, too, such as https://example.org; * for all. Programs and this machine's pages always may.
+        """`origins`: web pages that may connect, such as https://example.org, * for all; programs and this machine's pages always may.
 
-        Raises `SettingsError` where the address or port cannot be had, or the library is missing.
+        Raises `SettingsError` where the address or port is not available, or the library is missing.
         """
         try:
             import websockets.asyncio.server  # noqa: F401
@@ -39,54 +38,55 @@ class WebSocketOutlet(Outlet):
         self.origins, self.loopback, self._socket = frozenset(origins), is_loopback(host), _listening(host, port)
         self.port = self._socket.getsockname()[1]
         self.where = f"WebSocket at ws://{shown_host(host)}:{self.port}/"
-        self._begin = ""
-        self._frame: Told | None = None
-        self._text, self._number, self._begun = "", 0, 0
+        self._first_message, self._subject_number = "", 0
+        self._frame: StreamFrame | None = None
+        self._frame_text, self._frame_number = "", 0
         self._clients, self.served, self.refused = 0, 0, 0
-        self._news, self._over = asyncio.Event(), asyncio.Event()
+        self._changed, self._over = asyncio.Event(), asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._run, name="websocket", daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin to serve."""
+        """Start the server's thread."""
         self._loop = asyncio.new_event_loop()
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Say goodbye to whoever listens, and close."""
-        self._soon(self._over.set)
+        """Close all connections and the socket."""
+        self._call(self._over.set)
         if self._loop is not None:
-            self._thread.join(2 * HASTE)
+            self._thread.join(2 * CLOSE_SECONDS)
         self._socket.close()
 
     def begin(self, subject: Subject) -> None:
-        """The first message, for those who are there and those who come."""
+        """Send the first message to all clients, present and future."""
         text = beginning(subject)
-        self._soon(lambda: self._put(text, None))
+        self._call(lambda: self._put(text, None))
 
-    def send(self, frame: Told) -> None:
-        """The newest frame; what was not sent before is left out."""
-        self._soon(lambda: self._put("", frame))
+    def send(self, frame: StreamFrame) -> None:
+        """Set the newest frame; a slow client skips those before it."""
+        self._call(lambda: self._put("", frame))
 
     def counts(self) -> dict[str, Any]:
-        """Connections that were served, and that were refused."""
+        """Number of connections served and refused."""
         return {"served": self.served, "refused": self.refused}
 
-    # In the thread
-
-    def _soon(self, what: Any) -> None:
+    def _call(self, function: Callable[[], None]) -> None:
+        """Call a function in the server's thread."""
         if self._loop is not None and self._thread.is_alive():
-            self._loop.call_soon_threadsafe(what)
+            self._loop.call_soon_threadsafe(function)
 
-    def _put(self, begin: str, frame: Told | None) -> None:
-        if begin:
-            self._begin, self._begun, self._frame = begin, self._begun + 1, None
+    # In the server's thread
+
+    def _put(self, first_message: str, frame: StreamFrame | None) -> None:
+        if first_message:
+            self._first_message, self._subject_number, self._frame = first_message, self._subject_number + 1, None
         else:
-            self._frame, self._text = frame, ""
-        self._number += 1
-        self._news.set()
-        self._news = asyncio.Event()
+            self._frame, self._frame_text = frame, ""
+        self._frame_number += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
 
     def _run(self) -> None:
         assert self._loop is not None
@@ -99,14 +99,14 @@ class WebSocketOutlet(Outlet):
     async def _serve(self) -> None:
         from websockets.asyncio.server import serve
 
-        quiet = {"compression": None, "server_header": None, "logger": _silent()}
-        server = await serve(self._follow, sock=self._socket, process_request=self._admitted, max_size=1024, max_queue=1, write_limit=KEPT,
-                             open_timeout=5, close_timeout=HASTE / 2, **quiet)  # fmt: skip
+        quiet = {"compression": None, "server_header": None, "logger": _silent_logger()}
+        server = await serve(self._follow, sock=self._socket, process_request=self._check, max_size=1024, max_queue=1,
+                             write_limit=SEND_BUFFER, open_timeout=5, close_timeout=CLOSE_SECONDS / 2, **quiet)
         await self._over.wait()
-        self._news.set()
+        self._changed.set()
         closing = asyncio.ensure_future(self._closed(server))
-        await asyncio.wait([closing], timeout=HASTE)
-        for connection in list(server.connections):  # of those who do not even say goodbye
+        await asyncio.wait([closing], timeout=CLOSE_SECONDS)
+        for connection in list(server.connections):  # clients that do not answer
             connection.transport.abort()
         await closing
 
@@ -115,76 +115,70 @@ class WebSocketOutlet(Outlet):
         await server.wait_closed()
 
     async def _follow(self, connection: Any) -> None:
-        """Send frames as they come, to one who connected, until somebody has enough."""
+        """Serve one client until it disconnects or the session ends."""
         from websockets.exceptions import ConnectionClosed
 
         self._clients, self.served = self._clients + 1, self.served + 1
-        listening = asyncio.ensure_future(self._ignored(connection))
+        connected = asyncio.ensure_future(self._read(connection))
         try:
-            await self._send_newest(connection, listening)
+            await self._send_newest(connection, connected)
             if self._over.is_set():
                 await connection.close(1001, "the session is over")
         except ConnectionClosed:  # in the middle of a frame
             pass
         finally:
-            listening.cancel()
+            connected.cancel()
             self._clients -= 1
 
-    async def _send_newest(self, connection: Any, listening: asyncio.Future[None]) -> None:
-        number, begun = 0, 0
-        while not listening.done() and not self._over.is_set():
-            news = self._news
-            if self._begin and begun != self._begun:
-                begun = self._begun
-                await connection.send(self._begin)
-            elif self._frame is not None and number != self._number:
-                number = self._number
-                self._text = self._text or framed(self._frame)
-                await connection.send(self._text)
+    async def _send_newest(self, connection: Any, connected: asyncio.Future[None]) -> None:
+        frame_number, subject_number = 0, 0
+        while not connected.done() and not self._over.is_set():
+            changed = self._changed
+            if self._first_message and subject_number != self._subject_number:
+                subject_number = self._subject_number
+                await connection.send(self._first_message)
+            elif self._frame is not None and frame_number != self._frame_number:
+                frame_number = self._frame_number
+                self._frame_text = self._frame_text or framed(self._frame)
+                await connection.send(self._frame_text)
             else:
-                waiting = asyncio.ensure_future(news.wait())
-                await asyncio.wait([waiting, listening], return_when=asyncio.FIRST_COMPLETED)
+                waiting = asyncio.ensure_future(changed.wait())
+                await asyncio.wait([waiting, connected], return_when=asyncio.FIRST_COMPLETED)
                 waiting.cancel()
 
-    async def _ignored(self, connection: Any) -> None:
-        """What is said to us; ends with the connection."""
+    async def _read(self, connection: Any) -> None:
+        """Read and ignore what a client sends; returns when it disconnects."""
         async for _ in connection:
             pass
 
-    def _admitted(self, connection: Any, request: Any) -> Any:
-        """None for who may listen; else the refusal."""
-        why = self._unfit(request.headers)
+    def _check(self, connection: Any, request: Any) -> Any:
+        """None for a request that is accepted; else the response that refuses it."""
+        why = self._refusal(request.headers)
         if why:
             self.refused += 1
             return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
         return None
 
-    def _unfit(self, headers: Any) -> str:
-        origins, hosts = headers.get_all("Origin"), headers.get_all("Host")
-        if len(hosts) != 1 or not known_host(hosts[0], self.loopback):
+    def _refusal(self, headers: Any) -> str:
+        if not is_own_host(headers, self.loopback):
             return "this is served under the machine's own address only"
-        if not all(self._knows(origin) for origin in origins):
+        if not are_origins_allowed(headers, self.origins):
             return "pages of other sites may not listen; --origin lets one"
-        return "too many listen already" if self._clients >= MOST else ""
-
-    def _knows(self, origin: str) -> bool:
-        """Whether pages of an origin may listen: of this machine, or asked for."""
-        return is_loopback(host_of(origin)) or origin in self.origins or "*" in self.origins
+        return "too many listen already" if self._clients >= MAX_CLIENTS else ""
 
 
 def _listening(host: str, port: int) -> socket.socket:
     try:
-        found = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        found = socket.create_server((host, port), family=address_family(host))
     except (OSError, UnicodeError, OverflowError) as error:
-        why = (getattr(error, "strerror", None) or str(error)).lower()
-        raise SettingsError(f"websocket: {host}:{port}: cannot be listened at ({why}); it takes an address of this machine and a free "
-                            "port") from None  # fmt: skip
-    found.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KEPT)  # those that connect inherit it
+        raise SettingsError(f"websocket: {host}:{port}: cannot be listened at ({reason(error)}); it takes an address of this machine and a "
+                            "free port") from None
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)  # inherited by connections
     return found
 
 
-def _silent() -> Any:
-    """A logger that says nothing: who comes, and goes without a word, is no trouble of the person's before the camera."""
+def _silent_logger() -> Any:
+    """A logger without output: clients that break off are no problem of the session."""
     import logging
 
     logger = logging.getLogger("shadowpuppet.websocket")

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from shadowpuppet.errors import SettingsError, shown
-from shadowpuppet.io.calibration.calibration_files import read_toml
+from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.pipeline.options import PATHS, make_options, settings_in
 from shadowpuppet.settings import merged
 

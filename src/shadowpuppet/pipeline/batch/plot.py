@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.files.text import reason
+from shadowpuppet.errors import ShadowPuppetError, reason
 from shadowpuppet.pipeline.batch.summary import BatchRun
 
 MEASURES = ((("errors", "mean_mm"), "mean joint error, mm"), (("overlap", "mean"), "mean overlap with the silhouettes"))

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, shown
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, reason, shown
 from shadowpuppet.io.files.plain import for_toml
 from shadowpuppet.io.files.table import shorten
-from shadowpuppet.io.files.text import reason, write_whole
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.run import versions
 from shadowpuppet.pipeline.batch.grid import DEFAULT_CASE, Case, Grid
 from shadowpuppet.pipeline.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.io.files.plain import plain
+from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.pipeline.batch.grid import MAX_RUNS, Case
 from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
 from shadowpuppet.pipeline.silhouette_cache import film_of

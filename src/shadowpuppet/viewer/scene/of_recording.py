@@ -10,7 +10,7 @@ import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.motion.truth import read_truth
+from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.pipeline.footage import Footage, footage_of, opened
 from shadowpuppet.pipeline.footage_rig import chosen_views

@@ -15,7 +15,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Evaluation, measure_run
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
-from shadowpuppet.io.motion.motion_table import dof_unit
+from shadowpuppet.io.motion.table import dof_unit
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.body_animation import motion_animation

@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
 from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
-from shadowpuppet.io.motion.motion_files import ENDINGS
+from shadowpuppet.io.motion import READABLE
 from shadowpuppet.io.prior import FORMAT
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.scene.of_file import calibration_scene, motion_scene
@@ -27,7 +27,7 @@ def open_scene(path: str | Path, options: Options | None = None, truth: Path | N
     path = Path(path)
     if not path.exists():
         raise FormatError(f"{path}: no such file or folder; a run, a recording, a film with --fov, a calibration, a prior (.npz) or a "
-                          f"file of motion ({choices(ENDINGS)}) can be shown")
+                          f"file of motion ({choices(READABLE)}) can be shown")
     if (path / "run.toml").exists():
         return run_scene(path, truth, recording)
     for name, value in (("truth", truth), ("recording", recording)):
@@ -37,19 +37,18 @@ def open_scene(path: str | Path, options: Options | None = None, truth: Path | N
         return _of_folder(path, options or Options())
     if path.suffix.lower() == ".npz" and is_prior(path):
         return prior_scene(path)
-    if path.suffix.lower() in ENDINGS:
+    if path.suffix.lower() in READABLE:
         return motion_scene(path)
     return calibration_scene(path) if is_calibration(path) else recording_scene(path, options or Options())
 
 
 def is_prior(path: Path) -> bool:
     """Whether an .npz file is a motion prior."""
-    from shadowpuppet.io.files.npz import BROKEN
+    from shadowpuppet.io.files.npz import read_arrays
 
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            return "format" in data and str(data["format"]) == FORMAT
-    except (OSError, *BROKEN):
+        return str(read_arrays(path, ["format"]).get("format")) == FORMAT
+    except ShadowPuppetError:
         return False
 
 

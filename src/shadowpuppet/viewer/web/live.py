@@ -40,10 +40,10 @@ class ViewerDisplay(Display):
         gui.set_panel_label("shadowpuppet live")
         self.status = gui.add_markdown("getting ready")
         self.image = gui.add_image(np.full((9, 16, 3), 40, np.uint8), format="jpeg", jpeg_quality=QUALITY)
-        for label, wish in BUTTONS.items():
-            gui.add_button(label).on_click(lambda _, wish=wish: self._ask(wish))
+        for label, command in BUTTONS.items():
+            gui.add_button(label).on_click(lambda _, command=command: self._press(command))
         gui.add_markdown(footer)
-        self._wish, self._over = "", False
+        self._command, self._over = "", False
         self._view: View | None = None
         self._phase = ""
         self._changed = threading.Condition()
@@ -71,13 +71,13 @@ class ViewerDisplay(Display):
             self._view, self._phase = view, view.phase
             self._changed.notify_all()
 
-    def wish(self) -> str:
+    def command(self) -> str:
         """The last button that was pressed."""
-        wish, self._wish = self._wish, ""
-        return wish
+        command, self._command = self._command, ""
+        return command
 
-    def _ask(self, wish: str) -> None:
-        self._wish = wish
+    def _press(self, command: str) -> None:
+        self._command = command
 
     def _follow(self) -> None:
         while True:

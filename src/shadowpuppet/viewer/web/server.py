@@ -11,10 +11,9 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.network import is_loopback, known_host
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.network import address_family, is_loopback, is_own_host, is_same_origin, open_page, page_headers, shown_host
 
 if TYPE_CHECKING:
     import viser
@@ -25,8 +24,7 @@ POLICY = ("default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' '
           "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; connect-src 'self' data: blob:; "
           "base-uri 'none'; form-action 'none'")  # fmt: skip
 """What a browser may fetch for the page: what is in it, and from where it came."""
-HEADERS = {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
-           "Cross-Origin-Resource-Policy": "same-origin", "Content-Security-Policy": f"{POLICY}; frame-ancestors 'none'"}  # fmt: skip
+HEADERS = page_headers(POLICY)
 _starting = threading.Lock()
 _leaving: dict[viser.ViserServer, Callable[[], None]] = {}
 """What stops each open server where the program ends before somebody else did."""
@@ -76,9 +74,7 @@ def close_server(server: viser.ViserServer) -> None:
 
 def address_of(server: viser.ViserServer) -> str:
     """Where a browser finds it."""
-    host = server.get_host()
-    shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{server.get_port()}/"
+    return f"http://{shown_host(server.get_host())}:{server.get_port()}/"
 
 
 @contextlib.contextmanager
@@ -103,18 +99,12 @@ def guarded(loopback: bool) -> Iterator[Callable[[], bool]]:
         library.serve = plain
 
 
-def is_ours(headers: Any, loopback: bool) -> bool:
-    """Whether a request is for this machine by its own name, and from no page of another site."""
-    host, origin = headers.get("Host") or "", headers.get("Origin")
-    return known_host(host, loopback) and (origin is None or urlsplit(origin).netloc.lower() == host.lower())
-
-
 def _asking(answer: Any, loopback: bool) -> Any:
     """A function that answers a request, for ours alone."""
     from http import HTTPStatus
 
     def asking(connection: Any, request: Any) -> Any:
-        if not is_ours(request.headers, loopback):
+        if not (is_own_host(request.headers, loopback) and is_same_origin(request.headers)):
             return connection.respond(HTTPStatus.FORBIDDEN, "this page is served under the machine's own address, and to itself only\n")
         response = None if answer is None else answer(connection, request)
         if response is not None:
@@ -126,18 +116,15 @@ def _asking(answer: Any, loopback: bool) -> Any:
 
 
 def _free_port(listen: str, port: int | None) -> int:
-    """The port to be served at; 0: any. Raises `SettingsError` where it cannot be had."""
-    family, why = socket.AF_INET6 if ":" in listen else socket.AF_INET, ""
-    for tried in (PORT, 0) if port is None else (port,):
-        with socket.socket(family, socket.SOCK_STREAM) as probe:
-            try:
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                probe.bind((listen, tried))
-                return probe.getsockname()[1]
-            except (OSError, OverflowError) as error:
-                why = (getattr(error, "strerror", None) or str(error)).lower()
-    of = f"listen: {listen}" if port is None else f"listen: {listen}, port: {port}"
-    raise SettingsError(f"{of}: the page cannot be served there ({why}); --listen takes an address of this machine, --port a free port")
+    """A free port: `port`, or if it is None `PORT` or any. Raises `SettingsError` where there is none."""
+
+    def probed(tried: int) -> int:
+        with socket.socket(address_family(listen), socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((listen, tried))
+            return probe.getsockname()[1]
+
+    return open_page(probed, listen, port, PORT)
 
 
 @contextlib.contextmanager
