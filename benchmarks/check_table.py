@@ -17,9 +17,9 @@ import numpy as np
 from shadowpuppet.calibration.epipolar_tangency import Outlines
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.pipeline.check_calibration import RigCheck, Seen, gather, judge
-from shadowpuppet.pipeline.footage_rig import Rig, open_rig
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.rig import Rig, open_rig
 
 MARGIN = 12
 """Sets at both ends that films are shifted into."""

@@ -171,7 +171,7 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
     again."""
     from shadowpuppet.cli.tables import curves_table, fit_table, measured_table, sizes_table
     from shadowpuppet.cli.terminal import show, terminal
-    from shadowpuppet.pipeline.person import Found
+    from shadowpuppet.pipeline.person import MonocularSubject
     from shadowpuppet.pipeline.track import fit_person
 
     with terminal(quiet) as shown:
@@ -180,10 +180,10 @@ def measure_person(recording: Recording, /, *, file: Annotated[Path, output("Fil
         shown.doubt(look)
     if quiet:
         return
-    if isinstance(found, Found):
+    if isinstance(found, MonocularSubject):
         show(sizes_table(found.person.sizes), curves_table(found.fit.curves), fit_table(found, file))
-    elif found.person is not None:
-        show(sizes_table(found.person.sizes), measured_table(found.told, file))
+    else:
+        show(sizes_table(found.person.sizes), measured_table(found.summary, file))
 
 
 @app.command

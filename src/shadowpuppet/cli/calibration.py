@@ -21,7 +21,7 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     from shadowpuppet.cli.calibration_tables import check_table
     from shadowpuppet.cli.terminal import show, show_json, terminal
     from shadowpuppet.pipeline.check_calibration import check_rig
-    from shadowpuppet.pipeline.footage_rig import open_rig
+    from shadowpuppet.pipeline.rig import open_rig
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.tables import pairs, plain_table
-from shadowpuppet.pipeline.look_rig import CameraLook, RigLook
+from shadowpuppet.pipeline.look import CameraLook, RigLook
 
 
 def rig_look_table(look: RigLook) -> RenderableType:

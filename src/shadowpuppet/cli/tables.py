@@ -18,7 +18,7 @@ from shadowpuppet.motion.metrics import FAR, LOST
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.training import Trained
 from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.person import Found
+from shadowpuppet.pipeline.person import MonocularSubject
 from shadowpuppet.synthetic.spec import Spec
 
 BARS = "▁▂▃▄▅▆▇█"
@@ -123,11 +123,11 @@ def curves_table(curves: Mapping[str, Sequence[Sequence[float]]]) -> RenderableT
     return table
 
 
-def fit_table(found: Found, saved: Path) -> RenderableType:
+def fit_table(found: MonocularSubject, saved: Path) -> RenderableType:
     """How well sizes fit, and where they were saved."""
     overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
-    return pairs([("overlap", f"{overlaps}; film {found.start:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"),
-                  ("source", found.source), ("saved", str(saved))])
+    return pairs([("overlap", f"{overlaps}; film {found.summary['start_overlap']:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"),
+                  ("source", found.person.source), ("saved", str(saved))])
 
 
 def measured_table(told: Mapping[str, Any], saved: Path) -> RenderableType:

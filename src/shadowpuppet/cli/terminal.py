@@ -17,8 +17,7 @@ from shadowpuppet.cli.printing import show
 from shadowpuppet.cli.tables import look_table
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
-from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.look_rig import RigLook
+from shadowpuppet.pipeline.look import Look, RigLook
 
 __all__ = ["Terminal", "show", "show_json", "terminal"]
 

@@ -16,7 +16,7 @@ TRIES = 3
 """How often moving scenes are learnt anew, before they are taken as they are."""
 
 
-class Learner:
+class BackgroundCollector:
     """Counts down and collects the empty scene, from the first picture that it is given."""
 
     def __init__(self, countdown: float, seconds: float) -> None:

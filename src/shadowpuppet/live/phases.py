@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from shadowpuppet.pipeline.footage import Mask
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.silhouette.quality import CONTACT, NEARLY_ALL
 
 NOBODY, TOO_NEAR = 0.015, 0.6
@@ -19,7 +19,7 @@ MEASURED = 6
 """Silhouettes that a person is measured by."""
 
 
-class Waiter:
+class StandStillDetector:
     """Looks at silhouettes until a person can be measured."""
 
     def __init__(self, seconds: float) -> None:

@@ -18,7 +18,7 @@ FALLBACK_RATE = 15.0
 """Frames/s that the film is said to have, where the camera tells none; its pictures have their own times."""
 
 
-class Keeper:
+class Recorder:
     """Writes the recording layout: the empty scene, the pictures that were tracked, the camera, the height."""
 
     def __init__(self, folder: Path, camera: Camera, rate: float) -> None:

@@ -19,17 +19,18 @@ from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.live.background_phase import in_background
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
-from shadowpuppet.live.recorder import Keeper
+from shadowpuppet.live.recorder import Recorder
 from shadowpuppet.live.session import Outcome, Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
 from shadowpuppet.live.stream.outlet import Outlets, Subject
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.warm_up import warm_up
-from shadowpuppet.live.watchdog import Vigil
+from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import Options, plain_options
-from shadowpuppet.pipeline.track import Listener, named_body
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.subject import average_body, joint_names
 from shadowpuppet.settings import validate
 from shadowpuppet.video.capture import Capture
 from shadowpuppet.video.live_source import Feed, open_feed
@@ -65,13 +66,13 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
     outlets = outlets or Outlets()
-    body, joints = named_body(options.tracker.body)
+    body = average_body(options.tracker.body)
     told = validate(LiveSettings, asdict(settings) | {"camera": without_secrets(settings.camera)})
     info = {"camera": told.camera, "method": "Liu 2011, one camera, live", "started": datetime.now().astimezone().isoformat("T", "seconds"),
             "settings": plain_options(options), "live": told}
     folder = Path(folder)
     try:
-        with outlets, RunWriter(folder, options.tracker.body, body.skeleton.dof_names, joints, info) as run:
+        with outlets, RunWriter(folder, options.tracker.body, body.skeleton.dof_names, joint_names(body), info) as run:
             session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
     except _Nobody:
@@ -93,9 +94,9 @@ class _Live:
         self.feed: Feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
         full = lens(options, self.feed.size)
         self.session = Session(full, options, settings, np.random.default_rng(options.seed), clock,
-                               Vigil(self.feed.name, self.feed.size, self.feed.live), Timing(self.feed.rate), in_background, person,
-                               empty_scene(options, full))
-        self.keeper = Keeper(run.folder / "recording", self.session.camera, self.feed.rate) if settings.record else None
+                               CameraWatchdog(self.feed.name, self.feed.size, self.feed.live), Timing(self.feed.rate), in_background,
+                               person, empty_scene(options, full))
+        self.keeper = Recorder(run.folder / "recording", self.session.camera, self.feed.rate) if settings.record else None
         self.capture, self.stop = Capture(self.feed), Stop()
         self.frames, self.breaks, self.broke, self.said = 0, 0, np.nan, ""
 

@@ -5,26 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.display.view import Angle, View
-from shadowpuppet.live.learning_phase import Learner
-from shadowpuppet.live.phases import Waiter, unfit
+from shadowpuppet.live.learning_phase import BackgroundCollector
+from shadowpuppet.live.phases import StandStillDetector, unfit
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
-from shadowpuppet.live.watchdog import Vigil
+from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import BLANK, MotionFrame
-from shadowpuppet.pipeline.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
+from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.track import motion_frame, named_body, next_state
+from shadowpuppet.pipeline.person import MonocularSubject
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_settings
+from shadowpuppet.pipeline.subject import motion_frame
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import Fit, find_person
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.monocular.tracker import State
 from shadowpuppet.tracking.status import LOST
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
@@ -52,7 +55,7 @@ class Session:
     rng: np.random.Generator
     clock: Callable[[], float]
     """Seconds that never go back: those that pictures are stamped with."""
-    vigil: Vigil
+    vigil: CameraWatchdog
     timing: Timing
     work: Callable[[Callable[[], Fit]], Callable[[], Fit | None]] = lambda task: partial(lambda fit: fit, task())
     """Does what takes seconds; the answer is asked for its result until that is not None. As it is here, done at once."""
@@ -71,10 +74,10 @@ class Session:
         self.camera = self.full.resized(worked_size(self.full.size, self.options.max_size))
         self._region = region_of(self.options.region, self.full, self.camera)
         self._began, self._lost_since, self._new = np.nan, np.nan, False
-        self._learner = Learner(self.settings.countdown, self.settings.learn)
-        self._waiter, self._still = Waiter(self.settings.still), list[tuple[Image, Mask]]()
+        self._learner = BackgroundCollector(self.settings.countdown, self.settings.learn)
+        self._waiter, self._still = StandStillDetector(self.settings.still), list[tuple[Image, Mask]]()
         self._recent: list[Image] = []
-        self._tracker: MonocularTracker | None = None
+        self._subject: MonocularSubject | None = None
         self._state: State | None = None
         self._silhouettes: Silhouettes | None = None
         self._clear: Silhouettes | None = None
@@ -103,9 +106,9 @@ class Session:
     def ask(self, wish: str) -> None:
         """`learn` the background anew, or `measure` the person anew; nothing where it is not the time for it."""
         if wish == "learn" and self.phase in ("waiting", "tracking"):
-            self._learner, self.phase = Learner(self.settings.countdown, self.settings.learn), "learning"
+            self._learner, self.phase = BackgroundCollector(self.settings.countdown, self.settings.learn), "learning"
         elif wish == "measure" and self.phase == "tracking":
-            self._waiter, self.phase, self._recent = Waiter(self.settings.still), "waiting", []
+            self._waiter, self.phase, self._recent = StandStillDetector(self.settings.still), "waiting", []
 
     @property
     def measured(self) -> Fit:
@@ -148,20 +151,20 @@ class Session:
         if (fit := self._measured()) is None:
             return Outcome(self._view(image, self._mask(shot, image)))
         if np.median(list(fit.overlaps.values())) < LOST:
-            self._waiter, self.phase = Waiter(self.settings.still), "waiting"
+            self._waiter, self.phase = StandStillDetector(self.settings.still), "waiting"
             self._waiter.message = "no person's shape: stand whole in the picture, facing the camera"
             return Outcome(self._view(image))
         self._learnt(self.scene, self._recent)
         self.fit, self.phase, self._state = fit, "tracking", None
-        self._tracker = MonocularTracker(fit.guess.picture(self.camera, self.options.tracker.body), self.options.tracker)
+        self._subject = MonocularSubject.of(fit, self.camera, self.options.tracker, "live")
         self._new = True
         self.timing.pause()
         return Outcome(self._view(image))
 
     def _track(self, shot: Snapshot, image: Image) -> Outcome:
-        assert self._tracker is not None
+        assert self._subject is not None
         mask = self._mask(shot, image)
-        state = self._state = next_state(self._tracker, self.rng, self._state, mask)
+        state = self._state = self._subject.next_state(self.rng, self._state, mask)
         now = self.clock()
         self.timing.done(shot.captured, now, shot.number)
         status = state.status if state else "absent"
@@ -169,7 +172,7 @@ class Session:
             self._lost_since = np.nan
         elif np.isnan(self._lost_since):
             self._lost_since = shot.captured
-        frame = motion_frame(self._seconds(shot), state, self._tracker.picture, self._columns)
+        frame = motion_frame(self._subject, self._seconds(shot), state)
         return Outcome(self._view(image, mask, state, now - shot.captured), frame)
 
     # Parts
@@ -178,7 +181,7 @@ class Session:
         """The background; with pictures of the person also how blurred outlines are."""
         seen = Silhouettes("live", None, self._region, scene[0] if self._region else None)
         visible = [seen.visible(image) for image in film] if film else None
-        asked, clear = self.options.silhouette, clear_settings(self.options.silhouette)
+        asked, clear = self.options.silhouette, clean_settings(self.options.silhouette)
         self.scene = scene
         self._silhouettes = replace(seen, segmenter=learn_background(scene, asked, film=visible))
         self._clear = self._silhouettes if clear == asked else replace(seen, segmenter=learn_background(scene, clear, film=visible))
@@ -207,12 +210,7 @@ class Session:
         """The silhouette (H, W): that which is tracked in, before that a clean one, in which a person can be measured."""
         silhouettes = self._silhouettes if self.phase == "tracking" else self._clear
         assert silhouettes is not None
-        return silhouettes(Shot(shot.captured, image, None))
-
-    @cached_property
-    def _columns(self) -> list[int]:
-        body, joints = named_body(self.options.tracker.body)
-        return [body.landmark_names.index(name) for name in joints]
+        return silhouettes(CameraFrame(shot.captured, image, None))
 
     # What is shown
 
@@ -220,7 +218,7 @@ class Session:
         tracking = self.phase == "tracking"
         status = (state.status if state else "absent") if tracking and mask is not None else ""
         pose = state.pose if state is not None and state.status not in BLANK else None
-        picture = self._tracker.picture if self._tracker else None
+        picture = self._subject.picture if self._subject else None
         return View(
             phase=self.phase, message=self._message(mask), countdown=self._learner.left if self.phase == "learning" else None,
             trouble=self.trouble, status=status, overlap=state.overlap if state and pose is not None else np.nan,

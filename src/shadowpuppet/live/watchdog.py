@@ -15,7 +15,7 @@ FIRST_PATIENCE, LONGEST_PATIENCE = 3.0, 60.0
 """Seconds before a frozen camera is let go and opened again; each time twice as long."""
 
 
-class Vigil:
+class CameraWatchdog:
     """Watches what a camera gives."""
 
     def __init__(self, name: str, size: Size, live: bool) -> None:

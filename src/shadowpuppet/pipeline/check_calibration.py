@@ -16,12 +16,15 @@ from shadowpuppet.calibration.epipolar_tangency import Outline, Outlines
 from shadowpuppet.calibration.rotation_error import Turn, turned_outline, turning
 from shadowpuppet.calibration.time_offset import Lateness, lateness
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import may_be_person
+from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
-from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Mask, Silhouettes, silhouettes, take_sample
-from shadowpuppet.pipeline.footage_rig import Rig, follow, usable_cores
+from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.survey import brief_length
+from shadowpuppet.threads import usable_cores
 
 SETS, FEWEST, LONGEST = 240, 120, 3000
 """Sets of silhouettes that are compared, so many at least where the films are long enough, and among how many they are looked for."""
@@ -29,8 +32,6 @@ FASTEST = 31.0
 """Sets/s at most: more of them tell no more."""
 COMPARED = 12
 """Sets, spread over them, by which places are judged."""
-BRIEFLY = 240
-"""Frames of each film that are looked at where its background need not be made from it."""
 LATE, MISPLACED, SURE = 0.5, 1.5, 3.0
 """Sets from which on a film is said to be late; the same of a camera that disagrees about places, where time is told less well; and how
 many times its pairs' spread."""
@@ -93,6 +94,8 @@ class Seen(NamedTuple):
 
 def check_rig(rig: Rig, options: Options, listener: Listener | None = None) -> RigCheck:
     """Test the calibration of several cameras. Raises a `ShadowPuppetError` where silhouettes cannot be had, or show nobody."""
+    if not rig.is_multiview:
+        raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
     listener = listener or Listener()
     seen = gather(rig, options, listener)
     listener.begin("comparing")
@@ -168,7 +171,7 @@ def gather(rig: Rig, options: Options, listener: Listener) -> Seen:
     listener.begin("reading", SETS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when a run comes to it
-        for n, each in enumerate(follow(rig, see, ready=options.masks, every=every, threads=usable_cores())):
+        for n, each in enumerate(synchronized_frames(rig, see, ready=options.masks, every=every, threads=usable_cores())):
             here = [mask is not None and may_be_person(mask) for mask in each.masks]
             if seen.outlines or sum(here) > 1:
                 outlines = Outlines()
@@ -181,8 +184,7 @@ def gather(rig: Rig, options: Options, listener: Listener) -> Seen:
 
 
 def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
-    sample = take_sample(footage, options.masks, LOOKED_AT if footage.view.background is None and not options.masks else BRIEFLY)
-    return silhouettes(footage, sample, options)
+    return learn_silhouettes(footage, take_sample(footage, options.masks, brief_length(footage, options)), options)
 
 
 def _spread(rig: Rig, seen: Seen, shifts: Sequence[float] | None = None) -> list[list[Mask | None]]:

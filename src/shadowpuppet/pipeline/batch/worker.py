@@ -43,7 +43,7 @@ def _say(out: TextIO, said: dict[str, Any]) -> None:
 def _work(folder: str, get: Callable[[], dict[str, Any]], say: Callable[..., None]) -> None:
     from shadowpuppet.pipeline.batch.task import do
     from shadowpuppet.pipeline.progress import Listener
-    from shadowpuppet.pipeline.silhouette_cache import Repeats
+    from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
     from shadowpuppet.threads import limit_threads
 
     class Tell(Listener):
@@ -61,7 +61,7 @@ def _work(folder: str, get: Callable[[], dict[str, Any]], say: Callable[..., Non
                 say(doing="tracking", frames=frames, total=self.total)
 
     limit_threads()
-    repeats = Repeats()
+    repeats = SilhouetteCache()
     say(ready=os.getpid())
     while True:
         task = get()

@@ -12,8 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.truth import read_truth
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.pipeline.footage import Footage, footage_of, opened
-from shadowpuppet.pipeline.footage_rig import chosen_views
+from shadowpuppet.pipeline.footage import Footage, camera_footage, chosen_views, open_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.scene.figures import of_table
@@ -23,7 +22,7 @@ from shadowpuppet.viewer.scene.show import Eye, Figure, Show
 
 def show_recording(path: str | Path, options: Options) -> Show:
     """A recording folder, or a film with a field of view. Raises a `ShadowPuppetError` where something cannot be used."""
-    recording = opened(path, options)
+    recording = open_recording(path, options)
     eyes, footage, ready = eyes_of(recording, options)
     figures, lacks = _truth(recording)
     made = "ready, from masks/" if ready else "made as `track` makes them"
@@ -37,7 +36,7 @@ def eyes_of(recording: Recording, options: Options, ready: bool | None = None) -
     views = chosen_views(recording, options.camera)
     ready = all(view.masks is not None for view in views) if ready is None else ready
     options = replace(options, masks=ready)
-    footage = [footage_of(recording, view, options) for view in views]
+    footage = [camera_footage(recording, view, options) for view in views]
     return tuple(Eye(each.camera, FilmSeen(each, options)) for each in footage), footage, ready
 
 
@@ -47,7 +46,7 @@ def times_of(footage: Sequence[Footage]) -> Array:
     n = int(np.argsort(rates)[(len(rates) - 1) // 2])
     count = footage[n].count
     if count is None:  # films that do not tell it are gone through once
-        return np.array([shot.time for shot in footage[n].shots(ready=False)])
+        return np.array([shot.time for shot in footage[n].frames(ready=False)])
     return np.arange(max(count, 1)) / rates[n]
 
 
