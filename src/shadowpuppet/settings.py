@@ -81,6 +81,17 @@ def _merge(*tables: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
+def from_preset(kind: type[Settings], presets: Mapping[str, Mapping[str, Any]], preset: str, overrides: Mapping[str, Any] | None,
+                source: str) -> Settings:
+    """Settings of a `kind` by a named preset, with some values replaced; inner tables may be given in part.
+
+    Raises `SettingsError` for an unknown preset, an unknown name or an impossible value, with what is possible.
+    """
+    if preset not in presets:
+        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(presets)}")
+    return validate(kind, _merge(_plain(kind()), presets[preset], overrides or {}), source)
+
+
 def settings_of(kind: type) -> Iterator[tuple[DataclassField, Any, str]]:
     """Every setting of a settings class: its field, its type, and what its docstring says."""
     hints, told = get_type_hints(kind, include_extras=True), _docstrings(kind)

@@ -38,9 +38,9 @@ class Stage:
 
     def __init__(self, settings=SETTINGS, options=OPTIONS, live=True, size=SIZE, work=None):
         self.clock, self.number = Clock(), 0
-        full, vigil = Camera.from_fov(size, np.radians(60)), CameraWatchdog("cam", size, live)
+        full, dog = Camera.from_fov(size, np.radians(60)), CameraWatchdog("cam", size, live)
         more = {} if work is None else {"work": work}
-        self.session = Session(full, options, settings, np.random.default_rng(1), self.clock, vigil, Timing(RATE), **more)
+        self.session = Session(options, settings, np.random.default_rng(1), self.clock, Timing(RATE), full=full, watchdog=dog, **more)
 
     def give(self, image, after=1 / RATE, cost=0.0):
         """A picture after some seconds, which takes some seconds to work on."""
@@ -196,8 +196,8 @@ def test_in_plain_silhouettes_people_are_tracked_but_not_measured(pictures, silh
 
 def test_a_known_background_is_not_learnt_again(pictures):
     full = Camera.from_fov(SIZE, np.radians(60))
-    parts = np.random.default_rng(1), Clock(), CameraWatchdog("cam", SIZE, True), Timing(RATE)
-    session = Session(full, OPTIONS, SETTINGS, *parts, scene=pictures[0][:5])
+    parts = np.random.default_rng(1), Clock(), Timing(RATE)
+    session = Session(OPTIONS, SETTINGS, *parts, full=full, watchdog=CameraWatchdog("cam", SIZE, True), scene=pictures[0][:5])
     assert session.phase == "waiting"
 
 
@@ -388,16 +388,16 @@ def test_a_frozen_picture_is_said_not_tracked_and_taken_up_when_it_moves(picture
 
 
 def test_a_frozen_camera_is_opened_again_now_and_then():
-    vigil, image = CameraWatchdog("cam", (4, 4), True), np.zeros((4, 4, 3), np.uint8)
+    dog, image = CameraWatchdog("cam", (4, 4), True), np.zeros((4, 4, 3), np.uint8)
     asked = []
     for n in range(1500):
-        vigil.see(n / 15, image)
-        if vigil.asks_again(n / 15):
+        dog.see(n / 15, image)
+        if dog.asks_again(n / 15):
             asked.append(n / 15)
     assert asked[0] == pytest.approx(1.5 + FIRST_PATIENCE, abs=0.2)
     assert np.diff(asked) == pytest.approx([FIRST_PATIENCE * 2**k for k in range(1, len(asked))], abs=0.2)
-    vigil.see(100.0, image + 1)
-    assert not vigil.asks_again(100.0)
+    dog.see(100.0, image + 1)
+    assert not dog.asks_again(100.0)
 
 
 def test_a_film_may_stand_still(pictures):

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import NamedTuple
 
 import made
 import made_rig
 import numpy as np
 import pytest
+from follower import followed
 
-from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.evaluation.evaluation import evaluate_run
 from shadowpuppet.io.calibration.calibration_files import read_calibration
-from shadowpuppet.io.person import Person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
@@ -22,47 +20,15 @@ from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import STAGES, Listener
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.track import MULTIVIEW, look_at, run
-from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import open_frames
-
-
-class Standing(NamedTuple):
-    pose: np.ndarray
-    status: str
-    cost: float = 0.0
-    overlap: float = np.nan
-
-
-class Follower:
-    """Puts a body upright where the surface points are."""
-
-    def __init__(self, body) -> None:
-        self.body, self.calls = body, []
-
-    def start(self, rng, points, masks) -> Standing:
-        self.calls.append("start")
-        return self._there(rng, points, masks)
-
-    def step(self, rng, state, points, masks) -> Standing:
-        self.calls.append("step")
-        return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
-
-    def _there(self, rng, points, masks) -> Standing:
-        pose = np.zeros(len(self.body.skeleton.dofs))
-        pose[:3] = points.points.mean(0) + rng.normal(0, 1e-3, 3)
-        return Standing(pose, "tracked" if sum(mask is not None for mask in masks) > 2 else "uncertain")
-
 
 made_of = []
 
 
 def fit(rng, survey, options) -> MultiviewSubject:
-    sizes = average_sizes("anatomical", 1.7)
-    body = make_body("anatomical", sizes)
-    tracker = Follower(body)
-    made_of.append((tracker, survey.first))
-    return MultiviewSubject(body=body, tracker=tracker, hull=VisualHull(survey.rig.cameras), person=Person(sizes), summary={"height": 1.7},
-                            doubts=("the sizes are a guess",))
+    subject = followed(survey.rig.cameras)
+    made_of.append((subject.tracker, survey.first))
+    return subject
 
 
 def track(recording, folder, options=None, listener=None):

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.display.view import Angle, View
 from shadowpuppet.live.learning_phase import BackgroundCollector
@@ -19,15 +22,14 @@ from shadowpuppet.live.phases import StandStillDetector, unfit
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.watchdog import CameraWatchdog
-from shadowpuppet.motion.motion import BLANK, MotionFrame
+from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.person import MonocularSubject
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_settings
-from shadowpuppet.pipeline.subject import motion_frame
+from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import Fit, find_person
-from shadowpuppet.tracking.monocular.tracker import State
 from shadowpuppet.tracking.status import LOST
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
@@ -37,78 +39,229 @@ GONE = 2.0
 
 
 class Outcome(NamedTuple):
-    """What came of a picture, or of none."""
+    """The result of a picture, or of none."""
 
     view: View
     frame: MotionFrame | None = None
-    """The person's, where somebody is tracked."""
+    """The person's motion, while they are tracked."""
+    images: tuple[Image, ...] = ()
+    """Each camera's picture, of the size that is worked on."""
+
+
+def at_once(task: Callable[[], Any]) -> Callable[[], Any]:
+    """Do a task; the answer gives its result."""
+    return partial(lambda result: result, task())
 
 
 @dataclass(eq=False)
-class Session:
-    """The session's state; `step` is called with every picture, `idle` where none came. The generator is the only chance."""
+class LiveSession(ABC):
+    """State of a session; `step` is called with every picture (or set of pictures), `idle` if none came."""
 
-    full: Camera
-    """The camera as it gives its pictures."""
     options: Options
     settings: LiveSettings
     rng: np.random.Generator
+    """The only source of randomness."""
     clock: Callable[[], float]
-    """Seconds that never go back: those that pictures are stamped with."""
-    vigil: CameraWatchdog
+    """Seconds of a clock that never goes back, by which pictures are stamped."""
     timing: Timing
-    work: Callable[[Callable[[], Fit]], Callable[[], Fit | None]] = lambda task: partial(lambda fit: fit, task())
-    """Does what takes seconds; the answer is asked for its result until that is not None. As it is here, done at once."""
-    person: Person | None = None
-    """Whose sizes are known."""
-    scene: list[Image] = field(default_factory=list)
-    """Pictures of the empty scene, of the worked size; where there are none they are learnt."""
+    work: Callable[[Callable[[], Any]], Callable[[], Any]] = at_once
+    """Runs a long task; its answer is called until it gives a result that is not None."""
     phase: str = "learning"
-    fit: Fit | None = None
-    """Sizes and place, once they are found."""
+    """One of `PHASES`."""
+    subject: TrackedSubject | None = None
+    """The person, once measured."""
     trouble: str = ""
-    """Why no pictures come; empty where they do."""
+    """Why no pictures come; empty while they do."""
 
     def __post_init__(self) -> None:
-        """Make what follows from the settings. Raises `SettingsError` for a region that is none."""
-        self.camera = self.full.resized(worked_size(self.full.size, self.options.max_size))
-        self._region = region_of(self.options.region, self.full, self.camera)
-        self._began, self._lost_since, self._new = np.nan, np.nan, False
-        self._learner = BackgroundCollector(self.settings.countdown, self.settings.learn)
-        self._waiter, self._still = StandStillDetector(self.settings.still), list[tuple[Image, Mask]]()
-        self._recent: list[Image] = []
-        self._subject: MonocularSubject | None = None
-        self._state: State | None = None
-        self._silhouettes: Silhouettes | None = None
-        self._clear: Silhouettes | None = None
-        if self.scene:
-            self._learnt(self.scene)
+        """Nothing has come yet."""
+        self._began, self._lost_since, self._new, self._state = np.nan, np.nan, False, None
+        self._measured: Callable[[], Any] = lambda: None
 
-    # What comes
+    # Input
 
-    def step(self, shot: Snapshot) -> Outcome:
-        """A picture. Raises `SilhouetteError` where the scene cannot be learnt."""
+    def step(self, shot: Any) -> Outcome:
+        """Take a picture. Raises `SilhouetteError` where the scene cannot be learnt."""
         self._began = shot.captured if np.isnan(self._began) else self._began
-        trouble = self.vigil.see(shot.captured, shot.image)
-        if trouble:
+        if trouble := self.check(shot):
             return self._pause(trouble)
         self.trouble = ""
         self.timing.came(shot.captured, shot.number)
-        image = self._scaled(shot.image)
         phases = {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}
-        return phases[self.phase](shot, image)
+        return phases[self.phase](shot, self._scaled(shot))
 
     def idle(self, problem: str = "") -> Outcome:
-        """No picture came for a moment; `problem`: why, where that is known."""
-        trouble = self.vigil.silence(self.clock(), problem, self.timing.interval)
+        """No picture came for a moment; `problem`: why, if that is known."""
+        trouble = self.silence(self.clock(), problem)
         return self._pause(trouble) if trouble else Outcome(self._view())
 
     def ask(self, wish: str) -> None:
-        """`learn` the background anew, or `measure` the person anew; nothing where it is not the time for it."""
+        """`learn` the background again, or `measure` the person again; ignored in other phases than those that can."""
         if wish == "learn" and self.phase in ("waiting", "tracking"):
-            self._learner, self.phase = BackgroundCollector(self.settings.countdown, self.settings.learn), "learning"
+            self.begin_learning()
+            self.phase = "learning"
         elif wish == "measure" and self.phase == "tracking":
-            self._waiter, self.phase, self._recent = StandStillDetector(self.settings.still), "waiting", []
+            self.begin_waiting()
+            self.phase = "waiting"
+
+    def newly_measured(self) -> bool:
+        """Whether the person was measured since this was last asked."""
+        new, self._new = self._new, False
+        return new
+
+    # What depends on the number of cameras
+
+    @property
+    @abstractmethod
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras as they give their pictures."""
+
+    @property
+    @abstractmethod
+    def worked_cameras(self) -> tuple[Camera, ...]:
+        """For pictures of the size that is worked on."""
+
+    @property
+    @abstractmethod
+    def scenes(self) -> Sequence[list[Image]]:
+        """Pictures of each camera's empty scene, of the size that is worked on."""
+
+    @abstractmethod
+    def check(self, shot: Any) -> str:
+        """What is wrong with a picture, in a sentence; empty if nothing is."""
+
+    @abstractmethod
+    def silence(self, now: float, problem: str) -> str:
+        """What is wrong if no picture came until now (s); empty if nothing is."""
+
+    @abstractmethod
+    def asks_again(self, now: float) -> bool:
+        """Whether a frozen camera is to be opened again."""
+
+    @abstractmethod
+    def placed(self) -> tuple[Array, float | None]:
+        """The body's frame in the world (4, 4), and Z of the floor (m), if it is known."""
+
+    @abstractmethod
+    def begin_learning(self) -> None:
+        """Forget what was collected of the empty scene."""
+
+    @abstractmethod
+    def begin_waiting(self) -> None:
+        """Wait for a person."""
+
+    @abstractmethod
+    def _scaled(self, shot: Any) -> tuple[Image, ...]: ...
+
+    @abstractmethod
+    def _masks(self, shot: Any, images: tuple[Image, ...]) -> tuple[Mask, ...]: ...
+
+    @abstractmethod
+    def _learn(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+
+    @abstractmethod
+    def _wait(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+
+    @abstractmethod
+    def _measure(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+
+    @abstractmethod
+    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+        """Image, mask and picture of a view."""
+
+    @abstractmethod
+    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
+        """What the person is to do, and the seconds of a countdown."""
+
+    @abstractmethod
+    def _forget_time(self) -> None:
+        """Begin again what waits for time to pass."""
+
+    # What does not
+
+    def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
+        assert self.subject is not None
+        masks = self._masks(shot, images)
+        observation = self.subject.observe(masks)
+        self._state = self.subject.next_state(self.rng, self._state, observation)
+        now = self.clock()
+        self.timing.done(shot.captured, now, shot.number)
+        frame = motion_frame(self.subject, shot.captured - self._began if shot.shown is None else shot.shown, self._state, observation)
+        if frame.status != "lost":
+            self._lost_since = np.nan
+        elif np.isnan(self._lost_since):
+            self._lost_since = shot.captured
+        return Outcome(self._view(images, masks, frame, now - shot.captured), frame, images)
+
+    def _begin_tracking(self, subject: TrackedSubject) -> None:
+        self.subject, self.phase, self._state, self._new = subject, "tracking", None, True
+        self.timing.pause()
+
+    def _pause(self, trouble: str) -> Outcome:
+        """No usable picture: the person is kept, what waits for time to pass begins again."""
+        self.trouble = trouble
+        self._forget_time()
+        self.timing.pause()
+        return Outcome(self._view())
+
+    def _view(self, images: tuple[Image, ...] = (), masks: tuple[Mask, ...] = (), frame: MotionFrame | None = None,
+              latency: float = np.nan) -> View:
+        pose = None if frame is None or frame.pose is None else np.asarray(frame.pose)
+        message, countdown = self._message(masks)
+        angles = _angles(self.subject.body, pose) if self.phase == "tracking" and self.subject else ()
+        return View(
+            phase=self.phase, message=message, countdown=countdown, trouble=self.trouble, status=frame.status if frame else "",
+            overlap=frame.overlap if frame and pose is not None else np.nan, angles=angles, latency=latency, rate=self.timing.rate,
+            interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, **self._shown(images, masks, frame),
+        )  # fmt: skip
+
+    @property
+    def _gone(self) -> bool:
+        """Whether the person has been lost for long."""
+        return not np.isnan(self._lost_since) and self.clock() - self._lost_since > GONE
+
+
+@dataclass(eq=False, kw_only=True)
+class Session(LiveSession):
+    """A session with one camera."""
+
+    full: Camera
+    """The camera as it gives its pictures."""
+    watchdog: CameraWatchdog
+    person: Person | None = None
+    """The person, if their sizes are known."""
+    scene: list[Image] = field(default_factory=list)
+    """Pictures of the empty scene, of the size that is worked on; learnt if there are none."""
+    fit: Fit | None = None
+    """Sizes and place, once they are found."""
+
+    def __post_init__(self) -> None:
+        """Raises `SettingsError` for a region outside the picture."""
+        super().__post_init__()
+        self.camera = self.full.resized(worked_size(self.full.size, self.options.max_size))
+        self._region = region_of(self.options.region, self.full, self.camera)
+        self._recent: list[Image] = []
+        self._silhouettes: Silhouettes | None = None
+        self._clean: Silhouettes | None = None
+        self.begin_learning()
+        self.begin_waiting()
+        if self.scene:
+            self._learnt(self.scene)
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The camera as it gives its pictures."""
+        return (self.full,)
+
+    @property
+    def worked_cameras(self) -> tuple[Camera, ...]:
+        """The camera for pictures of the size that is worked on."""
+        return (self.camera,)
+
+    @property
+    def scenes(self) -> Sequence[list[Image]]:
+        """Pictures of the empty scene."""
+        return (self.scene,)
 
     @property
     def measured(self) -> Fit:
@@ -116,29 +269,48 @@ class Session:
         assert self.fit is not None
         return self.fit
 
-    def newly_measured(self) -> bool:
-        """Whether the person was measured since this was last asked."""
-        new, self._new = self._new, False
-        return new
+    def check(self, shot: Snapshot) -> str:
+        """What is wrong with a picture."""
+        return self.watchdog.see(shot.captured, shot.image)
 
-    # Phases
+    def silence(self, now: float, problem: str) -> str:
+        """What is wrong if no picture came."""
+        return self.watchdog.silence(now, problem, self.timing.interval)
 
-    def _learn(self, shot: Snapshot, image: Image) -> Outcome:
-        scene = self._learner.see(shot.captured, image)
+    def asks_again(self, now: float) -> bool:
+        """Whether the frozen camera is to be opened again."""
+        return self.watchdog.asks_again(now)
+
+    def placed(self) -> tuple[Array, float | None]:
+        """Where the body's frame stands in the world; the floor is not known."""
+        assert isinstance(self.subject, MonocularSubject)
+        picture = self.subject.picture
+        return inverse(picture.camera.T_camera_world) @ picture.T_camera_base, None
+
+    def begin_learning(self) -> None:
+        """Forget what was collected of the empty scene."""
+        self._collector = BackgroundCollector(self.settings.countdown, self.settings.learn)
+
+    def begin_waiting(self) -> None:
+        """Wait until somebody stands still."""
+        self._still, self._recent = StandStillDetector(self.settings.still), []
+
+    def _learn(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        scene = self._collector.see(shot.captured, images[0])
         if scene is not None:
             self._learnt(scene)
-        return Outcome(self._view(image))
+        return Outcome(self._view(images))
 
-    def _wait(self, shot: Snapshot, image: Image) -> Outcome:
-        mask = self._mask(shot, image)
-        self._recent = [*self._recent[-7:], image]
-        masks = self._waiter.see(shot.captured, mask)
-        if masks is not None:
-            self.phase, self._measured = "measuring", self.work(self._fitting(masks))
-        return Outcome(self._view(image, mask))
+    def _wait(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        (mask,) = masks = self._masks(shot, images)
+        self._recent = [*self._recent[-7:], images[0]]
+        still = self._still.see(shot.captured, mask)
+        if still is not None:
+            self.phase, self._measured = "measuring", self.work(self._fitting(still))
+        return Outcome(self._view(images, masks))
 
     def _fitting(self, masks: list[Mask]) -> Callable[[], Fit]:
-        """Finds sizes and place of who stood still; of whom they are known, the place alone."""
+        """Finds sizes and place of the person who stood still; the place alone if the sizes are known."""
         known = self.fit.guess if self.fit else self.person
         sizes, height = (known.sizes, known.height) if known else (None, None)
         height = height if self.fit else self.options.height or height
@@ -146,99 +318,70 @@ class Session:
         return partial(find_person, self.rng.spawn(1)[0], self.camera, masks, height=height, distance=distance, sizes=sizes,
                        body=self.options.tracker.body, settings=self.options.initialization)
 
-    def _measure(self, shot: Snapshot, image: Image) -> Outcome:
-        """Waits for the fit."""
-        if (fit := self._measured()) is None:
-            return Outcome(self._view(image, self._mask(shot, image)))
+    def _measure(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        """Wait for the fit."""
+        fit: Fit | None = self._measured()
+        if fit is None:
+            return Outcome(self._view(images, self._masks(shot, images)))
         if np.median(list(fit.overlaps.values())) < LOST:
-            self._waiter, self.phase = StandStillDetector(self.settings.still), "waiting"
-            self._waiter.message = "no person's shape: stand whole in the picture, facing the camera"
-            return Outcome(self._view(image))
+            self._still, self.phase = StandStillDetector(self.settings.still), "waiting"
+            self._still.message = "no person's shape: stand whole in the picture, facing the camera"
+            return Outcome(self._view(images))
         self._learnt(self.scene, self._recent)
-        self.fit, self.phase, self._state = fit, "tracking", None
-        self._subject = MonocularSubject.of(fit, self.camera, self.options.tracker, "live")
-        self._new = True
-        self.timing.pause()
-        return Outcome(self._view(image))
-
-    def _track(self, shot: Snapshot, image: Image) -> Outcome:
-        assert self._subject is not None
-        mask = self._mask(shot, image)
-        state = self._state = self._subject.next_state(self.rng, self._state, mask)
-        now = self.clock()
-        self.timing.done(shot.captured, now, shot.number)
-        status = state.status if state else "absent"
-        if status != "lost":
-            self._lost_since = np.nan
-        elif np.isnan(self._lost_since):
-            self._lost_since = shot.captured
-        frame = motion_frame(self._subject, self._seconds(shot), state)
-        return Outcome(self._view(image, mask, state, now - shot.captured), frame)
-
-    # Parts
+        self.fit = fit
+        source = str(self.options.person) if self.options.person else "proportions, refined on who stood still"
+        self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source))
+        return Outcome(self._view(images))
 
     def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
-        """The background; with pictures of the person also how blurred outlines are."""
-        seen = Silhouettes("live", None, self._region, scene[0] if self._region else None)
-        visible = [seen.visible(image) for image in film] if film else None
-        asked, clear = self.options.silhouette, clean_settings(self.options.silhouette)
+        """Learn the background; from pictures of the person also how blurred outlines are."""
+        blank = Silhouettes("live", None, self._region, scene[0] if self._region else None)
+        visible = [blank.visible(image) for image in film] if film else None
+        asked, clean = self.options.silhouette, clean_settings(self.options.silhouette)
         self.scene = scene
-        self._silhouettes = replace(seen, segmenter=learn_background(scene, asked, film=visible))
-        self._clear = self._silhouettes if clear == asked else replace(seen, segmenter=learn_background(scene, clear, film=visible))
+        self._silhouettes = replace(blank, segmenter=learn_background(scene, asked, film=visible))
+        self._clean = self._silhouettes if clean == asked else replace(blank, segmenter=learn_background(scene, clean, film=visible))
         self.phase, self._state = ("tracking" if self.fit else "waiting"), None
 
-    def _pause(self, trouble: str) -> Outcome:
-        """Nothing comes that can be used: the person is kept, what waits for time to pass begins anew."""
-        self.trouble = trouble
-        self._learner.wait()
-        self._waiter.wait()
-        self.timing.pause()
-        return Outcome(self._view())
+    def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
+        return (scaled(shot.image, self.camera),)
 
-    def _seconds(self, shot: Snapshot) -> float:
-        """A picture's time in the run: a film's own, else since the first picture."""
-        return shot.captured - self._began if shot.shown is None else shot.shown
-
-    def _scaled(self, image: Image) -> Image:
-        import cv2
-
-        if image.shape[1::-1] == self.camera.size:
-            return image
-        return np.asarray(cv2.resize(image, self.camera.size, interpolation=cv2.INTER_AREA), np.uint8)
-
-    def _mask(self, shot: Snapshot, image: Image) -> Mask:
-        """The silhouette (H, W): that which is tracked in, before that a clean one, in which a person can be measured."""
-        silhouettes = self._silhouettes if self.phase == "tracking" else self._clear
+    def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
+        """The silhouette (H, W): before tracking a clean one, in which a person can be measured."""
+        silhouettes = self._silhouettes if self.phase == "tracking" else self._clean
         assert silhouettes is not None
-        return silhouettes(CameraFrame(shot.captured, image, None))
+        return (silhouettes(CameraFrame(shot.captured, images[0], None)),)
 
-    # What is shown
+    def _forget_time(self) -> None:
+        self._collector.wait()
+        self._still.wait()
 
-    def _view(self, image: Image | None = None, mask: Mask | None = None, state: State | None = None, latency: float = np.nan) -> View:
-        tracking = self.phase == "tracking"
-        status = (state.status if state else "absent") if tracking and mask is not None else ""
-        pose = state.pose if state is not None and state.status not in BLANK else None
-        picture = self._subject.picture if self._subject else None
-        return View(
-            phase=self.phase, message=self._message(mask), countdown=self._learner.left if self.phase == "learning" else None,
-            trouble=self.trouble, status=status, overlap=state.overlap if state and pose is not None else np.nan,
-            angles=_angles(picture, pose) if tracking else (), latency=latency, rate=self.timing.rate, interval=self.timing.interval,
-            dropped=self.timing.dropped, image=image, mask=mask, picture=picture, pose=pose,
-        )  # fmt: skip
+    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+        picture = self.subject.picture if isinstance(self.subject, MonocularSubject) else None
+        return {"image": images[0] if images else None, "mask": masks[0] if masks else None, "picture": picture}
 
-    def _message(self, mask: Mask | None) -> str:
+    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
         if self.phase == "tracking":
-            hint = unfit(mask) if mask is not None else ""
-            gone = not np.isnan(self._lost_since) and self.clock() - self._lost_since > GONE
-            return hint if hint.startswith("nearly all") else "the body does not fit any more: measure anew" if gone else ""
-        return {"learning": self._learner.message, "waiting": self._waiter.message, "measuring": "measuring: one moment"}[self.phase]
+            hint = unfit(masks[0]) if masks else ""
+            gone = "the body does not fit any more: measure anew" if self._gone else ""
+            return hint if hint.startswith("nearly all") else gone, None
+        if self.phase == "learning":
+            return self._collector.message, self._collector.left
+        return self._still.message if self.phase == "waiting" else "measuring: one moment", None
 
 
-def _angles(picture, pose: np.ndarray | None) -> tuple[Angle, ...]:
+def scaled(image: Image, camera: Camera) -> Image:
+    """A picture of the camera's size."""
+    import cv2
+
+    if image.shape[1::-1] == camera.size:
+        return image
+    return np.asarray(cv2.resize(image, camera.size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _angles(body: Body, pose: Array | None) -> tuple[Angle, ...]:
     """All rotations, degrees."""
-    if picture is None:
-        return ()
-    values = np.full(len(picture.body.skeleton.dofs), np.nan) if pose is None else pose
-    rotations = [(dof, value) for dof, value in zip(picture.body.skeleton.dofs, values.tolist()) if dof.kind == "rotation"]
+    values: Sequence[float] = np.full(len(body.skeleton.dofs), np.nan).tolist() if pose is None else pose.tolist()
+    rotations = [(dof, value) for dof, value in zip(body.skeleton.dofs, values) if dof.kind == "rotation"]
     return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)), round(math.degrees(dof.high)))
                  for dof, value in rotations)

@@ -93,9 +93,9 @@ def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) ->
     return fit_in_views(rng, rig.cameras, survey.first.masks, options, rig.rate / options.every, recording.subject.height, training)
 
 
-def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], options: Options, rate: float,
-                 height: float | None = None, training: JointTable | None = None) -> MultiviewSubject:
-    """The person that the `cameras` show in some `views` (of each time the masks), tracked at `rate` frames/s. Raises as `fit_multiview`."""
+def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], options: Options,
+                 rate: float, height: float | None = None, training: JointTable | None = None) -> MultiviewSubject:
+    """The person that the `cameras` show in some `views` (masks by time), tracked at `rate` frames/s. Raises as `fit_multiview`."""
     settings = options.multiview
     hull = VisualHull(cameras, settings.hull)
     known = familiar(rng, options, training, settings.body, rate)

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, from_preset
 
 
 def pixel_scale(size: tuple[int, int]) -> float:
@@ -95,13 +94,8 @@ PRESETS: dict[str, dict] = {
 
 
 def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None, source: str = "settings") -> MonocularSettings:
-    """A preset with some values replaced; tables (`torso`, `arm`) may be given in part.
-
-    Raises `SettingsError` for an unknown preset, an unknown name or an impossible value, with what is possible.
-    """
-    if preset not in PRESETS:
-        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(PRESETS)}")
-    return validate(MonocularSettings, _merge(_plain(MonocularSettings()), PRESETS[preset], overrides or {}), source)
+    """A preset of the one-camera tracker with some values replaced, as `from_preset`."""
+    return from_preset(MonocularSettings, PRESETS, preset, overrides, source)
 
 
 @checked

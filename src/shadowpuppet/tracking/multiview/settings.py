@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, _merge, _plain, checked, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, from_preset
 
 
 @checked
@@ -152,7 +151,5 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
 
 def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None,
                             source: str = "settings") -> MultiviewSettings:
-    """A preset of `MULTIVIEW_PRESETS` with some values replaced, as `make_settings`."""
-    if preset not in MULTIVIEW_PRESETS:
-        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(MULTIVIEW_PRESETS)}")
-    return validate(MultiviewSettings, _merge(_plain(MultiviewSettings()), MULTIVIEW_PRESETS[preset], overrides or {}), source)
+    """A preset of the tracker of several cameras with some values replaced, as `from_preset`."""
+    return from_preset(MultiviewSettings, MULTIVIEW_PRESETS, preset, overrides, source)
