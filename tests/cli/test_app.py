@@ -74,7 +74,7 @@ def test_public_names_are_loaded_when_used():
 
 
 def test_help_loads_no_kernels_and_fits_a_terminal():
-    code = ("import sys\nfrom shadowpuppet import cli\ncode = cli.run(['track', '--help'])\n"
+    code = ("import sys\nfrom shadowpuppet.cli import app\ncode = app.run(['track', '--help'])\n"
             "print(code, sorted({'numba', 'cv2', 'av', 'matplotlib', 'scipy'} & set(sys.modules)), file=sys.stderr)")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ | {"COLUMNS": "80"})
     assert done.stderr == "0 []\n"

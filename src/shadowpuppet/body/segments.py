@@ -97,13 +97,3 @@ def _coarse(dofs: tuple[Dof, ...]) -> Array:
     out = np.clip(out, [dof.low for dof in dofs], [dof.high for dof in dofs])
     out.setflags(write=False)
     return out
-
-
-BONES = (
-    ("pelvis", "neck"), ("neck", "head"),
-    ("neck", "left_shoulder"), ("left_shoulder", "left_elbow"), ("left_elbow", "left_wrist"), ("left_wrist", "left_hand"),
-    ("neck", "right_shoulder"), ("right_shoulder", "right_elbow"), ("right_elbow", "right_wrist"), ("right_wrist", "right_hand"),
-    ("pelvis", "left_hip"), ("left_hip", "left_knee"), ("left_knee", "left_ankle"),
-    ("pelvis", "right_hip"), ("right_hip", "right_knee"), ("right_knee", "right_ankle"),
-)
-"""Pairs of joints with a bone between them."""

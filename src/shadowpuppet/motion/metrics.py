@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.bones import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.bones import BONES
 from shadowpuppet.errors import FormatError
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.motion.motion import JointTable

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.animation import Animation

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shadowpuppet.body.segments import BONES
+from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
