@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import made
+import made_rig
 import numpy as np
 import pytest
+from follower import followed
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
-from shadowpuppet.pipeline.track import Listener, track_recording
+from shadowpuppet.pipeline.track import MULTIVIEW, Listener, run, track_recording
 
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 
@@ -89,3 +92,18 @@ def test_a_full_store_holds_nothing():
         store.add(0.0, [mask])
     assert not store.sets
     assert store.size > store.limit
+
+
+def test_several_cameras_share_silhouettes_between_seeds(tmp_path, monkeypatch):
+    recording, cache = made_rig.write(tmp_path / "rig"), SilhouetteCache()
+    kind = MULTIVIEW._replace(fit=lambda rng, survey, options: followed(survey.rig.cameras))
+
+    def tracked(seed: int, cache: SilhouetteCache | None = None) -> tuple[bytes, bool]:
+        options = make_options({"seed": seed})
+        result = run(open_rig(recording, options), kind, tmp_path / "run", options, Listener(), cache)
+        return (result.folder / "joints.csv").read_bytes(), result.metrics.get("kept_silhouettes", False)
+
+    alone = [tracked(seed)[0] for seed in (1, 2)]
+    assert tracked(1, cache) == (alone[0], False)
+    monkeypatch.setattr("shadowpuppet.pipeline.rig.CameraReader.advance", None)  # nothing is read again
+    assert tracked(2, cache) == (alone[1], True)

@@ -119,7 +119,7 @@ else:
     """Those that many runs with seeds of their own may share."""
     DemoFlags = flags_of(Options, without=(*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay"))
     """Those that matter where the recording is known."""
-    SessionFlags = flags_of(Options, without=("camera", "masks", "every", "overlay", "prior", "training", "multiview"))
+    SessionFlags = flags_of(Options, without=("camera", "masks", "every", "overlay", "training"))
     """Those that matter where a camera is tracked as it happens."""
     LiveFlags = flags_of(LiveSettings)
     """What can be set about that beside."""

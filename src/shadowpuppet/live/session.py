@@ -380,8 +380,8 @@ def scaled(image: Image, camera: Camera) -> Image:
 
 
 def _angles(body: Body, pose: Array | None) -> tuple[Angle, ...]:
-    """All rotations, degrees."""
+    """All rotations, degrees; one without limits goes from -180 to 180."""
     values: Sequence[float] = np.full(len(body.skeleton.dofs), np.nan).tolist() if pose is None else pose.tolist()
     rotations = [(dof, value) for dof, value in zip(body.skeleton.dofs, values) if dof.kind == "rotation"]
-    return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)), round(math.degrees(dof.high)))
-                 for dof, value in rotations)
+    return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)) if math.isfinite(dof.low) else -180,
+                       round(math.degrees(dof.high)) if math.isfinite(dof.high) else 180) for dof, value in rotations)
