@@ -42,7 +42,8 @@ class NewestSet:
                     return None
                 self._next[n] = shot
         shots = [shot for shot in self._next if shot is not None]
-        self._next, self.put_count = [None] * len(shots), self.put_count + 1
+        self._next = [None] * len(self.captures)
+        self.put_count += 1
         shown = [shot.shown for shot in shots if shot.shown is not None]
         return SnapshotSet(max(shot.captured for shot in shots), tuple(shot.image for shot in shots), max(shown, default=None),
                            self.put_count - 1)
