@@ -16,13 +16,14 @@ from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.live.background_phase import in_background
+from shadowpuppet.live.base_session import LiveSession, Outcome
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.recorder import Recorder
 from shadowpuppet.live.rig_capture import RigCapture
 from shadowpuppet.live.rig_session import RigSession
 from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
-from shadowpuppet.live.session import LiveSession, Outcome, Session
+from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
 from shadowpuppet.live.stream.outlet import Outlets, Subject
