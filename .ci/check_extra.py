@@ -25,10 +25,14 @@ def formats(folder: Path) -> None:
 
 def report(folder: Path) -> None:
     """A plot is drawn."""
-    from shadowpuppet.cli.plots import AXES, COLOURS, plot_curves
+    from shadowpuppet.pipeline.batch.grid import make_grid
+    from shadowpuppet.pipeline.batch.plot import plot_batch
+    from shadowpuppet.pipeline.batch.summary import BatchRun
+    from shadowpuppet.pipeline.batch.tasks import make_tasks
 
-    plot_curves({axis: {"values": [1, 2]} | {body: [3.0, 4.0] for body in COLOURS} for axis in AXES}, folder / "curves.png")
-    assert (folder / "curves.png").stat().st_size > 1000
+    (task,) = make_tasks([folder], make_grid().cases, [0])
+    plot_batch([BatchRun(task, "done", metrics={"overlap": {"mean": 0.9}})], folder / "summary.png")
+    assert (folder / "summary.png").stat().st_size > 1000
 
 
 def live(folder: Path) -> None:

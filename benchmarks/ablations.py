@@ -22,6 +22,7 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
+import smallest
 from distance_cost import by_distance
 from multiview import made as made_rings
 from proving_ground import made as made_one
@@ -296,6 +297,13 @@ def _se(one: Result, first: Result) -> float:
     return float(apart.std(ddof=1) / np.sqrt(len(apart))) if len(apart) > 1 else float("nan")
 
 
+def _smallest(folder: Path) -> list[object]:
+    for name, parent in ((ONE[0], "one"), (RINGS[0], "rings")):
+        smallest.make(folder / parent / name, smallest.RING if parent == "rings" else smallest.ONE)
+    return ["cost", "noise", "rings_cameras", "--seeds", 1, "--workers", 0, "--recordings", 1, "--one", folder / "one",
+            "--rings", folder / "rings", "--output", folder / "out", "--page", smallest.copy(PAGE, folder)]
+
+
 def main() -> None:
     """Parse, run, write the page."""
     names = [study.name for study in STUDIES]
@@ -306,17 +314,19 @@ def main() -> None:
     parser.add_argument("--one", type=Path, default=BUILD / "proving_ground", help="where recordings of one camera are, or are made")
     parser.add_argument("--rings", type=Path, default=BUILD / "rings", help="where those of several are, or are made")
     parser.add_argument("-o", "--output", type=Path, default=BUILD / "ablations")
-    args = parser.parse_args()
+    parser.add_argument("--recordings", type=int, default=len(ONE), help="how many of each at most")
+    parser.add_argument("--page", type=Path, default=PAGE, help="where the tables are written")
+    args = smallest.parse(parser, _smallest)
     if unknown := set(args.studies) - set(names):
         parser.error(f"found {min(unknown)!r}, expected some of {', '.join(names)}")
     results = {}
     for study in STUDIES:
         if args.studies and study.name not in args.studies:
             continue
-        recordings = made_rings(args.rings, RINGS) if study.rings else made_one(args.one, ONE)
+        recordings = made_rings(args.rings, RINGS[: args.recordings]) if study.rings else made_one(args.one, ONE[: args.recordings])
         results[study.name] = run(study, recordings, args.output, args.seeds, args.workers)
         print(f"{study.title}\n\n{table(results[study.name], study.axis)}\n\n{said(results[study.name])}\n", flush=True)
-    write_page(results)
+    write_page(results, args.page)
     for rings, name in ((False, "one"), (True, "rings")):
         if all(study.name in results for study in STUDIES if study.rings == rings):
             draw(results, rings, ASSETS / f"ablations_{name}.png")

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import smallest
 from cases import COLUMNS, Case, means
 
 from shadowpuppet.body.sizes import CardboxSizes
@@ -38,6 +39,8 @@ ROWS: dict[str, dict[str, Any]] = {
     "liu2011, SRS, plain masks (eq. 1)": {"preset": "liu2011", "tracker": {"resampling": "stratified"},
                                           "silhouette": {"method": "averaging"}},
 }
+
+
 class Row:
     """A choice of settings."""
 
@@ -90,6 +93,11 @@ def markdown(results: Sequence[tuple[str, str, dict[str, float]]]) -> str:
     return "\n".join(lines)
 
 
+def _smallest(folder: Path) -> list[object]:
+    rows = "default;liu2011, DRS, exact masks;default, exact masks, true arms"
+    return [smallest.make(folder / "tiny"), "--seeds", 1, "--rows", rows, "--markdown", folder / "table.md"]
+
+
 def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -97,7 +105,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--rows", default=";".join(ROWS), help="names, with ; between them: " + "; ".join(ROWS))
     parser.add_argument("--markdown", type=Path, help="write the table there too")
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     unknown = [row for row in args.rows.split(";") if row not in ROWS]
     if unknown:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")

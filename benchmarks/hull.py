@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+import smallest
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
@@ -103,12 +104,16 @@ def timed(cases: dict[str, Callable[[], object]], rounds: int) -> dict[str, floa
     return best
 
 
+def _smallest(folder: Path) -> list[object]:
+    return ["--recording", smallest.make(folder / "ring", smallest.RING), "--rounds", 1]
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recording", type=Path)
     parser.add_argument("--rounds", type=int, default=30)
-    told = parser.parse_args()
+    told = smallest.parse(parser, _smallest)
     cases = {f"{n} cameras": made(n) for n in (2, 4, 6, 8)}
     cases["7 cameras"] = recorded(told.recording) if told.recording else made(7)
     hulls = {f"{name}, {rays} rays": (VisualHull(cameras, HullSettings(rays=rays)), masks) for name, (cameras, masks) in cases.items()

@@ -7,11 +7,12 @@ SHARED: a folder with recordings/*/truth.csv and mocap/*.amc.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from pathlib import Path
 
 import numpy as np
+import smallest
 
 from shadowpuppet import JointTable, fit_poses, read_joints
 from shadowpuppet.io.motion.amc import read_mocap
@@ -26,8 +27,16 @@ def tables(shared: Path) -> dict[str, JointTable]:
     return found | {path.stem: read_mocap(path).joints(RATES.get(path.stem, 120.0)) for path in sorted(shared.glob("mocap/*.amc"))}
 
 
-def main(shared: Path) -> None:
-    every = tables(shared)
+def _smallest(folder: Path) -> list[object]:
+    smallest.make(folder / "recordings" / "ring", smallest.RING)
+    return [folder]
+
+
+def main() -> None:
+    """Parse, fit, print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("shared", type=Path)
+    every = tables(smallest.parse(parser, _smallest).shared)
     fit_poses(next(iter(every.values())))  # compiles
     print("| joints of | body | limbs, RMSE mm | largest of a frame | ms a frame |\n|---|---|---|---|---|")
     for name, table in every.items():
@@ -41,4 +50,4 @@ def main(shared: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -13,8 +13,10 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import smallest
 
 from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 
 
@@ -35,13 +37,22 @@ def distances(run: Path, landmarks: Path, mapping: dict[str, str]) -> dict[str, 
     return out
 
 
+def _smallest(folder: Path) -> list[object]:
+    recording, run = smallest.track(folder)
+    truth, (camera, *_) = read_joints(recording / "truth.csv"), read_calibration(run / "calibration.toml")
+    pixels = camera.project(truth.select(["left_hand"]).positions[:, 0])
+    rows = [f"{time},{u},{v}" for time, (u, v) in zip(truth.times, pixels)]
+    (folder / "landmarks.csv").write_text("\n".join(["time,left_glove_u,left_glove_v", *rows]) + "\n", encoding="utf-8")
+    return [run, folder / "landmarks.csv", "left_glove=left_hand"]
+
+
 def main() -> None:
     """Parse, measure, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("run", type=Path)
     parser.add_argument("landmarks", type=Path)
     parser.add_argument("mapping", nargs="*", help="NAME=JOINT")
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     found = distances(args.run, args.landmarks, dict(pair.split("=", 1) for pair in args.mapping))
     mapped = [pair.split("=", 1)[0] for pair in args.mapping]
     if mapped:

@@ -29,8 +29,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import smallest
 
-from shadowpuppet.evaluation.bench.chain import ONE_EACH
+from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import Recording, read_recording
@@ -179,7 +180,7 @@ def measures(table: JointTable, truth: JointTable) -> dict[str, Any]:
 
 def run_all(paths: Sequence[Path], rows: Sequence[str], seeds: int, folder: Path, workers: int, again: bool) -> None:
     """All runs that are not there yet; one that fails is told, and the others go on."""
-    os.environ |= ONE_EACH
+    os.environ |= ONE_THREAD_EACH
     wanted = [(path, row, seed) for row in rows for path in paths for seed in range(seeds)
               if again or not (folder / "results" / path.name / slug(row) / f"{seed}.json").exists()]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
@@ -265,6 +266,11 @@ def write_tables(folder: Path, page: Path) -> None:
     page.write_text(text, encoding="utf-8")
 
 
+def _smallest(folder: Path) -> list[object]:
+    return [smallest.make(folder / "walking", smallest.RING), "--rows", "default;exact masks, true bones and first pose", "--seeds", 1,
+            "--workers", 1, "--folder", folder / "out", "--page", smallest.copy(PAGE, folder)]
+
+
 def main() -> None:
     """Parse, run, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -278,7 +284,7 @@ def main() -> None:
     parser.add_argument("--made", type=Path, default=BUILD / "rings", help="where the proving ground is, or is made")
     parser.add_argument("--page", type=Path, default=PAGE, help="where the tables are written")
     parser.add_argument("--tables", action="store_true", help="only write the tables of what is there")
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     rows = [row.strip() for row in args.rows.split(";") if row.strip()] or SETS[args.set]
     unknown = [row for row in rows if row not in ROWS]
     if unknown:

@@ -14,15 +14,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import smallest
 from cases import Case
 from proving_ground import HERE, made
 
+from shadowpuppet.body.segments import dofs_of
 from shadowpuppet.body.upper_body import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import UPPER
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.tracking.monocular.pose_search import arm_dofs
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
@@ -73,7 +74,7 @@ def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose
     skeleton, pose = picture.body.skeleton, pose.copy()
     observation, places = Observation.without_legs(mask, picture, pose), {}
     for sweep, side in ((sweep, side) for sweep in range(SWEEPS) for side in SIDES):
-        dofs = arm_dofs(skeleton, side)
+        dofs = dofs_of(skeleton, f"{side}_arm")
         silhouette = PartialCost(picture, dofs).costs(observation, pose)
 
         def put(arms: Array, dofs=dofs) -> Array:
@@ -95,7 +96,7 @@ def posterior_mean(rng: np.random.Generator, picture: Picture, mask: Array, pose
 
 
 def compare(path: Path, every: int, temperature: float, seed: int) -> tuple[float, float]:
-    """Mean errors, mm, of the tracker and of the posterior means in every so manieth frame."""
+    """Mean errors, mm, of the tracker and of the posterior means in every `every`-th frame."""
     case, options = Case.read(path, masks=True), Options(masks=True)
     for_fit, for_track, for_sample = np.random.default_rng(seed).spawn(3)
     picture = case.person(options, for_fit).picture(case.camera, options.tracker.body)
@@ -112,6 +113,10 @@ def compare(path: Path, every: int, temperature: float, seed: int) -> tuple[floa
     return float(own), float(mean)
 
 
+def _smallest(folder: Path) -> list[object]:
+    return [smallest.make(folder / "tiny"), "--every", 20]
+
+
 def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -119,7 +124,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=9, help="frames from one that is sampled to the next")
     parser.add_argument("--temperature", type=float, default=20.0, help="pixels: of the last level")
     parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     print("| recording | tracker | posterior mean |\n|---|---|---|")
     found = []
     for path in args.recordings or made(HERE):

@@ -22,10 +22,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import smallest
 from multiview import BUILD, made, measures
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.evaluation.bench.chain import ONE_EACH
+from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
@@ -152,6 +153,12 @@ def each(found: Mapping[str, Mapping[str, list[dict[str, Any]]]]) -> str:
     return "\n".join(lines)
 
 
+def _smallest(folder: Path) -> list[object]:
+    smallest.make(folder / "rings_jog", smallest.RING)
+    return ["--rows", "default;8 particles", "--recordings", "rings_jog", "--masks", "--workers", 1, "--folder", folder,
+            "--markdown", folder / "table.md"]
+
+
 def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -163,14 +170,14 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=BUILD / "rings", help="where the recordings are, or are made")
     parser.add_argument("--markdown", type=Path, help="write the tables there too")
     parser.add_argument("--workers", type=int, default=2)
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     chosen = [row.strip() for row in args.rows.split(";") if row.strip()] or list(ROWS)
     unknown = [row for row in chosen if row not in ROWS]
     if unknown:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
     paths = made(args.folder, filter(None, args.recordings.split(";")))
     rows, n = {row: ROWS[row] for row in chosen}, len(paths)
-    os.environ |= ONE_EACH
+    os.environ |= ONE_THREAD_EACH
     with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
         results = pool.map(run, paths, [rows] * n, [args.seeds] * n, [args.masks] * n, [args.frames] * n)
         found = {path.name: one for path, one in zip(paths, results)}

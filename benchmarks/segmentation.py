@@ -16,6 +16,7 @@ from typing import get_args
 
 import cv2
 import numpy as np
+import smallest
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
@@ -86,12 +87,16 @@ def rows(recording: Path, methods: list[str], every: int) -> Iterator[list[str]]
                 yield [*name, str(error).split(";")[0], *[""] * 6]
 
 
+def _smallest(folder: Path) -> list[object]:
+    return [smallest.make(folder / "tiny"), "--methods", "auto,averaging", "--every", 5]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("--methods", default=",".join(get_args(Method)), help="separated by commas")
     parser.add_argument("--every", type=int, default=1, help="take every n-th frame")
-    arguments = parser.parse_args()
+    arguments = smallest.parse(parser, _smallest)
     table = Table(*COLUMNS)
     for recording in arguments.recordings:
         for row in rows(recording, arguments.methods.split(","), arguments.every):

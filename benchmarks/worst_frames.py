@@ -14,6 +14,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import smallest
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.rasterize import Picture
@@ -83,6 +84,11 @@ def draw(recording: Recording, folder: Path, count: int, cameras: int) -> np.nda
     return np.vstack([np.hstack(tiles(view, fitted.body, poses)) for view in recording.views[:cameras]])
 
 
+def _smallest(folder: Path) -> list[object]:
+    recording, run = smallest.track(folder, smallest.RING)
+    return [recording, run, "--output", folder / "worst.png", "--frames", 2, "--cameras", 2]
+
+
 def main() -> None:
     """Parse, draw, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -91,7 +97,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("worst.png"))
     parser.add_argument("--frames", type=int, default=5)
     parser.add_argument("--cameras", type=int, default=4)
-    args = parser.parse_args()
+    args = smallest.parse(parser, _smallest)
     write_image(args.output, draw(read_recording(args.recording), args.run, args.frames, args.cameras))
 
 

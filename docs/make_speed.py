@@ -1,4 +1,4 @@
-"""Make the table of docs/speed.md and its picture: python docs/make_speed.py [FIGURES.json]; without figures, they are measured first."""
+"""Make the tables of docs/speed.md: python docs/make_speed.py [FIGURES.json]; without a file of figures, they are measured first."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.cli.plots import plot_curves
 from shadowpuppet.cli.tables import BENCHED, BENCHED_SEVERAL
 from shadowpuppet.evaluation.bench.run import run_bench
 
 PAGE = Path(__file__).parent / "speed.md"
-PICTURE = PAGE.parent / "assets" / "speed.png"
 PLACE = re.compile(r"(<!-- figures -->\n).*?(<!-- end of figures -->)", re.DOTALL)
 KEYS = {
     "mono.ratio_opencv_full": ("OpenCV's time over ours, all cards", ".1f"),
@@ -60,13 +58,12 @@ def tables(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Write the tables into the page, and the picture beside it."""
+    """Write the tables into the page."""
     found = json.loads(Path(sys.argv[1]).read_text("utf-8")) if len(sys.argv) > 1 else run_bench()
     text, number = PLACE.subn(lambda match: match[1] + tables(found) + match[2], PAGE.read_text("utf-8"))
     if number != 1:
         sys.exit(f"{PAGE}: found no place for the figures")
     PAGE.write_text(text, encoding="utf-8")
-    plot_curves(found["curves"], PICTURE)
 
 
 if __name__ == "__main__":

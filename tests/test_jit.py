@@ -13,8 +13,8 @@ from numba.core import caching
 from shadowpuppet.jit import compiled
 
 FIRST_RUN = """
-from shadowpuppet.evaluation.bench.multi_cases import Around
-around = Around(cameras=3, points=300, particles=4, size=(160, 120))
+from shadowpuppet.evaluation.bench.multi_cases import MultiCase
+around = MultiCase(cameras=3, points=300, particles=4, size=(160, 120))
 print(around.run_forces(3).tobytes().hex(), around.run_gauss_newton(2).tobytes().hex())
 """
 

@@ -1,1 +1,1 @@
-"""What the experiments of both papers share: what is asked, many runs, pictures and tables, claims that are judged, the command line."""
+"""Shared by the experiments of both papers: requests, parallel runs, pictures and tables, claims, the command line."""

@@ -1,4 +1,4 @@
-"""An experiment: what is asked of it, what it is, what comes out."""
+"""An experiment, its request and its outcome."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from papers.common.claims import Verdict
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked on the command line."""
+    """What the command line asks for."""
 
     output: Path
-    """Folder for all that is written."""
+    """Folder of all output."""
     recordings: tuple[Path, ...] = ()
-    """Recordings to be used instead of made ones; none: they are made, in the folder."""
+    """Recordings in place of made ones, which are made in the folder."""
     runs: int = 1
-    """How often what has chance in it is repeated; the runs' seeds are `seed`, `seed` + 1, ..."""
+    """Repetitions of what is random, with the seeds `seed`, `seed` + 1, ..."""
     seed: int = 0
     short: bool = False
-    """A small version, to see that it works: smaller pictures, fewer frames, runs and settings. Its figures mean little."""
+    """A small version, to see that it works: smaller pictures, fewer frames, runs and settings."""
     workers: int = 1
-    """Processes; 1: all is done in this one."""
+    """Processes; 1 for this one alone."""
     tell: Callable[[str], None] = print
-    """Is told what is being done, a line each."""
+    """Called with a line for each step."""
     more: Mapping[str, Any] = field(default_factory=dict)
-    """What the paper's own options are set to."""
+    """Values of the paper's own options."""
     flags: tuple[str, ...] = ()
-    """Those that are not as they would be, as on the command line."""
+    """Those that differ from their defaults, as on the command line."""
 
     @property
     def seeds(self) -> range:
@@ -40,40 +40,40 @@ class Request:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under names; kept as CSV, and shown where it is short."""
+    """A table, kept as CSV."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
-    """Numbers, text, or None where there is none."""
+    """Numbers, text, or None."""
     shown: bool = False
-    """Whether it is printed, and stands in the documentation."""
+    """Whether it is printed, and part of the documentation."""
 
 
 @dataclass
 class Outcome:
-    """What an experiment found."""
+    """Results of an experiment."""
 
     settings: dict[str, Any] = field(default_factory=dict)
-    """What it was done with: plain values."""
+    """Settings of its runs, plain values."""
     pictures: dict[str, Any] = field(default_factory=dict)
-    """Figures of Matplotlib, or images (H, W, 3), blue green red, by the name of their file without ending."""
+    """Figures of Matplotlib, or images (H, W, 3), blue green red, by file name without ending."""
     tables: dict[str, Table] = field(default_factory=dict)
-    """By the name of their file without ending."""
+    """By file name without ending."""
     verdicts: list[Verdict] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
-    """Sentences for whoever looks at the pictures, made from the figures where they have any."""
+    """Sentences that explain the pictures."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A figure or table of a paper, or something that it says without showing it."""
+    """A figure or table of a paper, or another claim of it."""
 
     name: str
-    """On the command line, and of the files."""
+    """Name on the command line, and of the files."""
     title: str
-    """What it is in the paper, and what it shows."""
+    """Its place in the paper, and what it shows."""
     takes: str
-    """How long it takes as it is, on two cores, all recordings made already."""
+    """Time in full, on two cores, with all recordings at hand."""
     make: Callable[[Request], Outcome]
     runs: int = 1
     """Repetitions as in the paper."""

@@ -1,4 +1,4 @@
-"""Many runs at once: the one place that knows how, so that it can be done otherwise."""
+"""Parallel runs."""
 
 from __future__ import annotations
 
@@ -19,23 +19,22 @@ Result = TypeVar("Result")
 
 
 def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], workers: int = 1) -> list[Result]:
-    """`task` of every job, in their order; `what` they are is shown while they run.
+    """Results of `task` for every job, in order; `what` labels the progress bar.
 
-    With several workers, in processes that are spawned, each with one thread: `task` must be a function of a module, and jobs and
-    results must be picklable and small; what is large is read from files that the job names. Raises what a task raises, and
-    `ShadowPuppetError` where a process is killed.
+    With several workers, in spawned processes of one thread each: `task` must be a function of a module, jobs and results must be
+    picklable and small. Raises what a task raises, and `ShadowPuppetError` where a process is killed.
     """
     with shown_progress() as progress:
         bar = progress.add_task(what, total=len(jobs))
         if workers <= 1 or len(jobs) <= 1:
             return [_counted(progress, bar, task(job)) for job in jobs]
-        waiting = [_crew(workers).submit(task, job) for job in jobs]
+        waiting = [_pool(workers).submit(task, job) for job in jobs]
         try:
             for done in as_completed(waiting):
                 _counted(progress, bar, done.result())
             return [done.result() for done in waiting]
         except BrokenProcessPool:
-            _crew.cache_clear()
+            _pool.cache_clear()
             raise ShadowPuppetError(f"{what}: a process was killed (is there enough memory?); try again with fewer --workers") from None
         finally:
             for left in waiting:
@@ -43,13 +42,13 @@ def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], worke
 
 
 @lru_cache(maxsize=1)
-def _crew(workers: int) -> ProcessPoolExecutor:
-    """Processes that stay for the next time: each takes seconds to start."""
-    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_alone)
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Processes, kept for the next call: each takes seconds to start."""
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_one_thread)
 
 
-def _alone() -> None:
-    """One thread: there are other processes."""
+def _one_thread() -> None:
+    """Limit a process to one thread."""
     import cv2
     from threadpoolctl import threadpool_limits
 
@@ -58,7 +57,7 @@ def _alone() -> None:
 
 
 def shown_progress() -> Progress:
-    """A bar of what is done, where there is a terminal."""
+    """A progress bar, shown on a terminal only."""
     console = Console(stderr=True)
     return Progress(TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeRemainingColumn(), console=console,
                     transient=True, disable=not console.is_terminal)

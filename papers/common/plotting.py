@@ -1,4 +1,4 @@
-"""How plots and pictures look and are written."""
+"""Style of plots, and writing of pictures."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""That people who see colours differently tell apart (Okabe & Ito 2008)."""
+"""Distinct for colour-blind readers too (Okabe & Ito 2008)."""
 LARGEST = 150_000
-"""Bytes of a picture that the documentation can show."""
+"""Most bytes of a picture in the documentation."""
 DPI = 110
 
 
 def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 3.2, **how: Any) -> tuple[Figure, np.ndarray]:
-    """A figure of so many panels, `height` inches a row, and the panels (rows, columns); `how` as for `Figure.subplots`."""
+    """A figure, `height` inches a row, and its panels (rows, columns); `how` as for `Figure.subplots`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -33,7 +33,7 @@ def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: floa
 
 
 def label(axes: Axes, x: str, y: str, title: str = "", legend: bool = True) -> None:
-    """Names of the axes, a quiet grid, and a legend without a frame, where one is wanted."""
+    """Set the names of the axes, a light grid, and a legend without a frame."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize=9)
@@ -44,7 +44,7 @@ def label(axes: Axes, x: str, y: str, title: str = "", legend: bool = True) -> N
 
 
 def save_picture(picture: Any, path: Path) -> None:
-    """Write a figure, or an image (H, W, 3), blue green red, as PNG, with as many colours as `LARGEST` bytes allow.
+    """Write a figure, or an image (H, W, 3), blue green red, as PNG, in as many colours as `LARGEST` bytes allow.
 
     Raises `ShadowPuppetError` where it cannot be written.
     """
@@ -58,7 +58,7 @@ def save_picture(picture: Any, path: Path) -> None:
         image = Image.fromarray(np.asarray(picture.canvas.buffer_rgba())[..., :3])
     part = path.with_name(f"{path.name}.part")
     try:
-        for colours in (0, 256, 128, 64, 32, 16):  # few thin lines of a colour must keep it: hence the way to choose them
+        for colours in (0, 256, 128, 64, 32, 16):  # MAXCOVERAGE keeps the colour of thin lines
             some = image.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE) if colours else image
             some.save(part, "PNG", optimize=True)
             if part.stat().st_size <= LARGEST:

@@ -1,10 +1,10 @@
-"""Make docs/reproduction.md of what experiments left behind.
+"""Make docs/reproduction.md from the files of experiments.
 
     python -m papers.common.reproduction FOLDER...
 
 Folders are those that `python -m papers.liu2011 all -o FOLDER` and `python -m papers.ni2008 all -o FOLDER` wrote. A paper's first folder
-gives its pictures and tables; what further ones of the same paper, such as those of another recording, say of its claims stands beside.
-The part of a paper of which no folder is named stays as it is.
+gives its pictures and tables; further ones of the same paper, such as of another recording, add columns to the table of claims. The part of
+a paper without a folder stays as it is.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ KEYS = ("paper", "number", "name", "title", "command", "short", "recordings", "r
         "pictures")  # fmt: skip
 
 Summary = dict[str, Any]
-"""What an experiment's NAME.json holds."""
+"""Contents of an experiment's NAME.json."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Parse, build; the exit code."""
+    """Parse and build; the exit code."""
     parser = argparse.ArgumentParser(prog="python -m papers.common.reproduction", description="Make docs/reproduction.md of results.")
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
     parser.add_argument("--docs", type=Path, default=DOCS, help="the folder of the page, with assets/ in it")
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def build(folders: Sequence[Path], docs: Path) -> None:
-    """Replace the parts of all papers that the folders have results of. Raises `ShadowPuppetError`."""
+    """Replace the parts of the papers whose results are in the folders. Raises `ShadowPuppetError`."""
     results = [(folder, read_results(folder)) for folder in folders]
     page = read_text(docs / PAGE)
     for paper in dict.fromkeys(result["paper"] for _, found in results for result in found):
@@ -94,14 +94,14 @@ def short_warning(results: Sequence[Summary]) -> str:
 
 
 def count(results: Sequence[Summary]) -> str:
-    """How many claims hold."""
+    """A sentence on how many claims hold."""
     same = [claim["same"] for result in results for claim in result["claims"]]
     return (f"Of {len(same)} conclusions {same.count(True)} are the same here, {same.count(False)} are not, and for {same.count(None)} the "
             "runs do not tell. What counts as the same is said in each row, and computed.")
 
 
 def claims(folders: Sequence[Sequence[Summary]]) -> str:
-    """The table of all claims; of further folders a pair of columns each."""
+    """The table of all claims, with a pair of columns for each folder."""
     rows: dict[tuple[str, str], list[list[Summary]]] = {}
     for k, results in enumerate(folders):
         for claim in (claim for result in results for claim in result["claims"]):
@@ -114,31 +114,31 @@ def claims(folders: Sequence[Sequence[Summary]]) -> str:
 
 
 def judged(found: Sequence[Summary]) -> tuple[str, str]:
-    """What was got for a claim, of one or several recordings, and whether it holds for all of them."""
+    """Our results for a claim, and whether it holds for all of them."""
     if not found:
         return "", ""
     return "; ".join(claim["got"] for claim in found), ANSWERS[all_of([claim["same"] for claim in found])]
 
 
 def recordings(results: Sequence[Summary]) -> str:
-    """What they were done on."""
+    """Names of the recordings."""
     return ", ".join(dict.fromkeys(name for result in results for name in result["recordings"]))
 
 
 def contradictions(results: Sequence[Summary]) -> str:
-    """What is not as the paper says, and what shows it."""
+    """List of the claims that our runs contradict."""
     lines = [f"- *{claim['claim']}* ({claim['where']}): {claim['got']}; see [`{result['name']}`](#{anchor(result)})."
              for result in results for claim in result["claims"] if claim["same"] is False]  # fmt: skip
     return "\n\n".join(["**Where our runs contradict the paper:**", "\n".join(lines)]) if lines else ""
 
 
 def anchor(result: Summary) -> str:
-    """Where an experiment stands in the page."""
+    """Anchor of an experiment in the page."""
     return f"{result['paper']}-{result['name']}".replace("_", "-")
 
 
 def experiment(result: Summary) -> str:
-    """An experiment's part: how it is made, what it says, pictures, tables."""
+    """An experiment's section: command, pictures, sentences, tables."""
     runs = f", {result['runs']} runs" if result["runs"] > 1 else ""
     parts = [f"### {result['title']} {{ #{anchor(result)} }}", f"`{result['command']}`{runs}, {result['seconds']:.0f} s."]
     pictures = [f"![{Path(name).stem.replace('_', ' ')}](assets/{result['paper']}_{name})" for name in result["pictures"]]
@@ -147,7 +147,7 @@ def experiment(result: Summary) -> str:
 
 
 def copy_pictures(folder: Path, results: Sequence[Summary], assets: Path) -> None:
-    """The pictures, under the paper's name. Raises `ShadowPuppetError` where one is missing or too large."""
+    """Copy the pictures, named after the paper. Raises `ShadowPuppetError` where one is missing or too large."""
     for result in results:
         for name in result["pictures"]:
             source, goal = folder / name, assets / f"{result['paper']}_{name}"

@@ -18,9 +18,9 @@ from shadowpuppet.io.files.text import reason
 
 def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequence[str] | None = None,
          add: Callable[[argparse.ArgumentParser], object] | None = None) -> int:
-    """Run what is named, one after another, or list what there is; the exit code: 2 where something cannot be used.
+    """Run the named experiments, or list them all; the exit code, 2 for input that cannot be used.
 
-    `add` adds the paper's own options to the parser; they are in `Request.more`.
+    `add` adds the paper's own options to the parser; their values are in `Request.more`.
     """
     parser = _parser(paper, about, experiments)
     own = set(vars(parser.parse_args([])))
@@ -50,7 +50,7 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
 
 
 def run(paper: str, experiment: Experiment, request: Request, number: int = 0) -> Outcome:
-    """One experiment, the `number`-th: what it is done with is said first, what it found last. Raises `ShadowPuppetError`."""
+    """Run the `number`-th experiment, and print seeds and results. Raises `ShadowPuppetError`."""
     takes = "some seconds" if request.short else experiment.takes
     repeated = "" if request.runs == 1 else f" to {request.seeds[-1]}"
     print(f"{experiment.name}: {experiment.title}\nseed {request.seed}{repeated}; takes {takes}", flush=True)
@@ -63,7 +63,7 @@ def run(paper: str, experiment: Experiment, request: Request, number: int = 0) -
 
 
 def text(experiment: Experiment, request: Request, outcome: Outcome, seconds: float) -> str:
-    """What is printed at the end: short tables, sentences, files, claims."""
+    """The report printed at the end: short tables, sentences, files, claims."""
     tables = [markdown(table.columns, table.rows) for table in outcome.tables.values() if table.shown]
     names = [*(f"{name}.png" for name in outcome.pictures), *(f"{name}.csv" for name in outcome.tables), f"{experiment.name}.json"]
     parts = [*tables, *outcome.said, f"{seconds:.0f} s; in {request.output}: {', '.join(names)}"]
@@ -105,7 +105,7 @@ def _tell(line: str) -> None:
 
 
 def _flag(name: str, value: object) -> str:
-    """An option of the paper's own as it is given; of a folder its name alone."""
+    """An option of the paper as on the command line; of a folder the name alone."""
     said = f"--{name.replace('_', '-')}"
     return said if value is True else f"{said} {value.name if isinstance(value, Path) else value}"
 

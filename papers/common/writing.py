@@ -1,4 +1,4 @@
-"""What an experiment leaves behind: pictures, tables as CSV, and NAME.json with all that it found and was done with."""
+"""Files of an experiment: pictures, tables as CSV, and NAME.json with settings and results."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from shadowpuppet.pipeline.progress import json_text
 
 
 def write_outcome(paper: str, experiment: Experiment, request: Request, outcome: Outcome, seconds: float, number: int = 0) -> None:
-    """Write all of it into the request's folder; the JSON last, so that where it is, all is. `number`: the experiment's, in the paper's
-    order. Raises `ShadowPuppetError`."""
+    """Write all files into the request's folder, the JSON last. `number`: of the experiment, in the paper's order. Raises
+    `ShadowPuppetError`."""
     for name, picture in outcome.pictures.items():
         save_picture(picture, request.output / f"{name}.png")
     for name, table in outcome.tables.items():
@@ -28,7 +28,7 @@ def write_outcome(paper: str, experiment: Experiment, request: Request, outcome:
 
 
 def summary(paper: str, experiment: Experiment, request: Request, outcome: Outcome, seconds: float) -> dict[str, Any]:
-    """What NAME.json holds."""
+    """Contents of NAME.json."""
     return {
         "paper": paper, "name": experiment.name, "title": experiment.title, "command": command(paper, experiment, request),
         "short": request.short, "recordings": [path.name for path in request.recordings] or ["made"], "seed": request.seed,
@@ -41,7 +41,7 @@ def summary(paper: str, experiment: Experiment, request: Request, outcome: Outco
 
 
 def command(paper: str, experiment: Experiment, request: Request) -> str:
-    """What does the same again, in folders of the reader's own."""
+    """The command that repeats the experiment."""
     words = ["python -m", f"papers.{paper}", experiment.name]
     words += ["--recording", *(path.name for path in request.recordings)] if request.recordings else []
     words += ["--short"] if request.short else []

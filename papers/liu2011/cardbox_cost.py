@@ -11,7 +11,7 @@ from papers.liu2011.material import case, made_recording
 from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import told
 from papers.liu2011.sweeps import Measured, measured
-from shadowpuppet.evaluation.bench.mono_cases import Case as Drawn
+from shadowpuppet.evaluation.bench.mono_cases import MonoCase as Drawn
 from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
 from shadowpuppet.evaluation.bench.timing import Contender, in_turns
 from shadowpuppet.threads import one_blas_thread

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 LIMIT = "SHADOWPUPPET_THREADS"
 """Environment variable: cores that a process may use, where several share a machine."""
 POOLS = (LIMIT, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
 """Variables that libraries read when they are loaded."""
+
+
+def child_environment(variables: Mapping[str, str]) -> dict[str, str]:
+    """Environment of a Python process that imports from where this one does, with `variables` set. Start the process with `-P`, or else
+    modules of the current folder come first."""
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    return {**os.environ, "PYTHONPATH": path, "PYTHONUTF8": "1", **variables}
 
 
 @contextmanager

@@ -8,9 +8,9 @@ import made
 import numpy as np
 import pytest
 
-from shadowpuppet.cli.plots import plot_curves
-from shadowpuppet.evaluation.bench import multi, multi_film, naive_multi
-from shadowpuppet.evaluation.bench.multi_cases import Around, RingFollower
+from shadowpuppet.evaluation.bench import multi, naive_multi
+from shadowpuppet.evaluation.bench.chain import long_recording, walking
+from shadowpuppet.evaluation.bench.multi_cases import MultiCase, MultiFollower
 from shadowpuppet.evaluation.bench.timing import Times, in_turns
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
@@ -25,7 +25,7 @@ compiled = pytest.mark.skipif(not hasattr(push, "signatures"), reason="kernels a
 @pytest.fixture(scope="module")
 def small():
     """Few cameras, points and particles."""
-    return Around(cameras=3, points=300, particles=2, size=(320, 240))
+    return MultiCase(cameras=3, points=300, particles=2, size=(320, 240))
 
 
 # The same on both sides -----------------------------------------------------------------------------------------------
@@ -52,7 +52,7 @@ def test_what_is_timed_fits_and_gets_better(small):
 
 def test_there_are_as_many_points_as_asked_for():
     for points in (50, 5000):
-        case = Around(cameras=2, points=points, size=(160, 120))
+        case = MultiCase(cameras=2, points=points, size=(160, 120))
         assert len(case.surface.points) == points
         assert case.cloud.total == pytest.approx(case.surface.weights.sum(), rel=1e-4)
 
@@ -68,7 +68,7 @@ def test_frames_go_to_and_fro(small):
 
 @pytest.mark.parametrize("preset", ["ni2008", "default"])
 def test_what_is_followed_is_not_lost(preset):
-    follower = RingFollower(Around(cameras=5, size=(320, 240)), make_multiview_settings(preset))
+    follower = MultiFollower(MultiCase(cameras=5, size=(320, 240)), make_multiview_settings(preset))
     follower.run(12)
     assert follower.state.status == "tracked"
     assert follower.tracker.prior is not None
@@ -78,8 +78,9 @@ def test_what_is_followed_is_not_lost(preset):
 
 
 def test_ratios_are_of_the_least_times_and_all_else_of_medians():
-    raw = {name: Times(2.0 * k, 1.0 / k, 3) for k, name in enumerate(multi.contenders(Around(cameras=3, points=100, size=(160, 120))), 1)}
-    found = multi.figures(raw)
+    names = multi.contenders(MultiCase(cameras=3, points=100, size=(160, 120)))
+    raw = {name: Times(2.0 * k, 1.0 / k, 3) for k, name in enumerate(names, 1)}
+    found = multi.FIGURES.of(raw)
     assert found["multi.hull_ms"] == 2e3
     assert found["multi.force_us"] == 4e6
     assert found["multi.fps"] == pytest.approx(1 / 14)
@@ -90,7 +91,7 @@ def test_ratios_are_of_the_least_times_and_all_else_of_medians():
 @compiled
 def test_refinement_is_many_times_faster_than_plain_numpy():
     """Some 140 times where AVX-512 is, with 2,000 points; the guard is what is promised."""
-    sides = {name: one for name, one in multi.contenders(Around(particles=4)).items() if not name.endswith("_frame")}
+    sides = {name: one for name, one in multi.contenders(MultiCase(particles=4)).items() if not name.endswith("_frame")}
     with one_blas_thread():
         spent = in_turns(sides, 3)
     assert spent["naive_forces"].least > 20 * spent["forces"].least, spent
@@ -100,50 +101,32 @@ def test_refinement_is_many_times_faster_than_plain_numpy():
 @compiled
 @pytest.mark.parametrize(("what", "few", "many"), [("particles", 10, 40), ("points", 1000, 4000)])
 def test_cost_grows_in_proportion(what, few, many):
-    cases = {n: Around(**{"particles": 10, "points": 1000} | {what: n}) for n in (few, many)}
+    cases = {n: MultiCase(**{"particles": 10, "points": 1000} | {what: n}) for n in (few, many)}
     for kind in ("forces", "gauss_newton"):
-        spent = {n: min(_thread_time(multi._ten(case, kind)) for _ in range(6)) for n, case in cases.items()}
+        spent = {n: min(_thread_time(getattr(case, f"run_{kind}")) for _ in range(6)) for n, case in cases.items()}
         assert spent[many] < 2 * many / few * spent[few], (kind, spent)
 
 
 def _thread_time(run) -> float:
     """Seconds of this thread's own work: a short call may slip between what else the machine does, a long one does not."""
     start = time.thread_time()
-    run()
+    run(10)
     return time.thread_time() - start
-
-
-def test_curves_have_a_time_for_every_value(monkeypatch, tmp_path):
-    monkeypatch.setattr(multi, "Around", lambda **said: Around(**{"points": 100, "particles": 3} | said, size=(160, 120)))
-    for name in ("PARTICLES", "POINTS", "CAMERAS"):
-        monkeypatch.setattr(multi, name, getattr(multi, name)[:2])
-    found = multi.curves(1)
-    for axis in found.values():
-        assert all(len(line) == len(axis["values"]) == 2 and min(line) > 0 for line in axis.values())
-    row = {"values": (1, 2), "cardbox": [1.0, 2.0]}
-    plot_curves({"particles": row, "width": row, "cards": row, "multi": found}, tmp_path / "c.svg")
-    plot_curves({"particles": row, "width": row, "cards": row}, tmp_path / "d.svg")
-    assert (tmp_path / "c.svg").read_text().count("<path") > (tmp_path / "d.svg").read_text().count("<path") + 20
-
-
-def test_the_exponent_of_a_line_is_one():
-    assert multi.linearity([1, 2, 4], [3, 6, 12]) == pytest.approx(1)
-    assert multi.linearity([1, 2, 4], [1, 4, 16]) == pytest.approx(2)
 
 
 # The film -------------------------------------------------------------------------------------------------------------
 
 
 def test_the_films_of_a_ring_go_on_and_on(tmp_path):
-    recording = read_recording(multi_film.ring_recording(tmp_path, 9, multi_film.ring_spec((80, 60), 2), drawn=3))
+    recording = read_recording(long_recording(walking((80, 60), 2, 3), tmp_path, 9))
     assert len(recording.views) == 2
     assert recording.truth is None
     for view in recording.views:
         images = [frame.image.astype(float) for frame in open_frames(view.video)]
         assert len(images) == 9
         assert view.masks is None
-        assert len(made.images(view.background)) == 6
+        assert len(made.images(view.background)) == 12
         still = np.abs(images[2] - images[3]).mean()  # the same picture, but for compression
         assert np.abs(images[0] - images[5]).mean() < 2 * still + 1
     assert recording.subject.height == pytest.approx(1.75)
-    assert len(read_joints(recording.training).times) > 200
+    assert len(read_joints(recording.training).times) > 150

@@ -250,7 +250,7 @@ def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:
 
 
 @app.command
-def bench(*, json: Path | None = None, picture: Path | None = None,
+def bench(*, json: Path | None = None,
           quick: Annotated[bool, Parameter(negative=(), show_default=False)] = False, quiet: Quiet = False) -> None:
     """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
@@ -258,25 +258,19 @@ def bench(*, json: Path | None = None, picture: Path | None = None,
     ----------
     json
         File that gets all figures, by flat keys such as "mono.particle_us".
-    picture
-        File that gets cost against particles, picture size, points and cameras (.png, .pdf or .svg; needs matplotlib).
     quick
         Fewer rounds, a shorter film, nothing compiled anew.
     """
     from shadowpuppet.cli.tables import bench_tables
     from shadowpuppet.cli.terminal import show, terminal
-    from shadowpuppet.evaluation.bench.files import check_plans, write_figures
-    from shadowpuppet.evaluation.bench.run import run_bench
+    from shadowpuppet.evaluation.bench.run import check_writable, run_bench, write_figures
 
-    check_plans(json, picture)
+    if json is not None:
+        check_writable(json)
     with terminal(quiet) as shown:
         found = run_bench(quick, shown)
     if json is not None:
         write_figures(json, found)
-    if picture is not None:
-        from shadowpuppet.cli.plots import plot_curves
-
-        plot_curves(found["curves"], picture)
     if not quiet:
         show(*bench_tables(found))
 

@@ -27,7 +27,7 @@ from shadowpuppet.cli.terminal import Terminal
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.pipeline.batch import Batch, BatchListener, make_grid, run_batch
-from shadowpuppet.pipeline.batch import workers as crews
+from shadowpuppet.pipeline.batch import workers as pools
 from shadowpuppet.pipeline.batch.run import _claimed
 from shadowpuppet.pipeline.batch.task import _put, do
 from shadowpuppet.pipeline.batch.tasks import make_tasks, named
@@ -313,7 +313,7 @@ class Kills(Notes):
 def hired(monkeypatch) -> list[subprocess.Popen]:
     """The worker processes, as they are begun."""
     begun, popen = [], subprocess.Popen
-    monkeypatch.setattr(crews.subprocess, "Popen", lambda *args, **more: begun.append(popen(*args, **more)) or begun[-1])
+    monkeypatch.setattr(pools.subprocess, "Popen", lambda *args, **more: begun.append(popen(*args, **more)) or begun[-1])
     return begun
 
 
@@ -347,7 +347,7 @@ def test_a_workers_threads_are_limited(tmp_path, monkeypatch):
     with pytest.raises(ShadowPuppetError):
         run_batch([tmp_path / "gone"], tmp_path / "out", QUICK, workers=1, threads=3)
     found = dict(line.split("=", 1) for line in seen.read_text().splitlines() if "=" in line)
-    assert {found[name] for name in crews.POOLS} == {"3"}
+    assert {found[name] for name in pools.POOLS} == {"3"}
 
 
 def test_a_folder_with_other_things_in_it_is_refused(recording, tmp_path):

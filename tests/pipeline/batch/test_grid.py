@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -165,6 +168,16 @@ def test_a_task_is_known_by_recording_settings_and_seed(recording, tmp_path):
     assert [task.id for task in renamed] == first
     moved = recording.rename(tmp_path / "walk")
     assert ids(moved) == first
+
+
+@pytest.mark.parametrize("salt", ["1", "2"])
+def test_another_process_knows_the_same_task(recording, salt):
+    """As a second start must, whatever the seed of Python's own hashes is; and another machine."""
+    said = "import sys; from test_grid import ids; from pathlib import Path; print(*ids(Path(sys.argv[1]), {'height': 1.8}, (0, 1)))"
+    path = {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    done = subprocess.run([sys.executable, "-c", said, recording], env={**os.environ, **path, "PYTHONHASHSEED": salt}, text=True,
+                          stdout=subprocess.PIPE, check=True)
+    assert done.stdout.split() == ids(recording, {"height": 1.8}, (0, 1))
 
 
 @pytest.mark.parametrize("change", ["video/a.mp4", "calibration.toml", "truth.csv", "recording.toml", "masks/a.png"])

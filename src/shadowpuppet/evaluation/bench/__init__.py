@@ -1,4 +1,4 @@
-"""How fast it is on this machine, beside what one would write otherwise: all that `shadowpuppet bench` measures.
+"""Speed on this machine, beside plain versions of the same: what `shadowpuppet bench` measures.
 
-`whole.run_bench` gives flat keys: `mono.*` are the one-camera tracker's, `multi.*` those of several cameras; each has a module.
+`run.run_bench` returns flat keys: `mono.*` for the one-camera tracker, `multi.*` for several cameras; each has a module.
 """

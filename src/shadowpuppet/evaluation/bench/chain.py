@@ -1,15 +1,17 @@
-"""From a film to poses: a long film tracked in a process of its own, its speed and its memory.
+"""From film to poses, each in a process of its own: speed and memory of a long film, and the time to a first pose.
 
-`python -m shadowpuppet.evaluation.bench.chain RECORDING RUN [CORES]` does it and prints JSON.
+`python -P -m shadowpuppet.evaluation.bench.chain track RECORDING RUN CORES` prints JSON; `... start` tracks one frame.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
+import tempfile
+import time
+from collections.abc import Mapping
 from itertools import chain, cycle, islice
 from pathlib import Path
 from typing import Any
@@ -19,67 +21,103 @@ import numpy as np
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import Listener, track_recording
-from shadowpuppet.synthetic import Gesture, Scene, Spec, synthesize
+from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, synthesize
+from shadowpuppet.threads import child_environment
 from shadowpuppet.video import open_frames, write_frames
 
-EARLY = 0.2
+WARM_UP = 0.2
 """Share of the film after which memory should grow no more."""
-ONE_EACH = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+ONE_THREAD_EACH: dict[str, str] = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+WAVING = Spec(name="bench", motion=tuple(Gesture(motion=name, seconds=2.0) for name in ("wave_hands", "reach")),
+              scene=Scene(empty_seconds=1.0))  # fmt: skip
+"""One camera."""
 
 
-def long_recording(folder: Path, frames: int, seconds: float = 2.0) -> Path:
-    """A made recording whose film (H.264) goes to and fro until it has so many frames."""
-    gestures = tuple(Gesture(motion=name, seconds=seconds) for name in ("wave_hands", "reach"))
-    spec = Spec(name="bench", motion=gestures, scene=Scene(empty_seconds=1.0))
+def walking(size: tuple[int, int] = (640, 480), cameras: int = 7, frames: int = 12) -> Spec:
+    """A ring of cameras around a person who walks: a few frames from the middle of a stride, and training motion."""
+    ring = Ring(count=cameras, radius=4.5, jitter=0.5, size=size, distortion=(-0.09, 0.05, 0.0, 0.0))
+    return Spec(name="bench", body=Mannequin(), motion=(Gesture(motion="walk", seconds=2.5),), begin=1.2, frames=frames, ring=ring,
+                scene=Scene(clothing=8, room=3, empty_seconds=0.2), rate=60)  # fmt: skip
+
+
+def long_recording(spec: Spec, folder: Path, frames: int) -> Path:
+    """A made recording whose films (H.264) go to and fro until they have `frames` frames; without exact masks and truth."""
     recording = synthesize(spec, folder, np.random.default_rng(1))
     for name in ("masks", "truth.csv", "truth.trc"):  # of the short film
         shutil.rmtree(path) if (path := recording / name).is_dir() else path.unlink()
-    film = next((recording / "video").iterdir())
-    images = [frame.image for frame in open_frames(film)]
-    with write_frames(film, spec.rate) as longer:
-        for image in islice(cycle(chain(images, images[::-1])), frames):
-            longer.write(image)
+    for film in (recording / "video").iterdir():
+        images = [frame.image for frame in open_frames(film)]
+        with write_frames(film, spec.rate) as longer:
+            for image in islice(cycle(chain(images, images[::-1])), frames):
+                longer.write(image)
     return recording
 
 
-def measure_chain(folder: Path, frames: int) -> dict[str, Any]:
-    """What `track_long` tells of one camera's film; the recording is made in `folder`. Raises `ShadowPuppetError` where it fails."""
-    return apart(long_recording(folder / "recording", frames), folder / "run")
+def measure_chain(spec: Spec, frames: int, cores: int = 1) -> dict[str, Any]:
+    """What `track_long` finds on a long recording, in a new process. Raises `ShadowPuppetError` where it fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        recording = long_recording(spec, Path(folder) / "recording", frames)
+        out = _child("tracking the made film failed", ONE_THREAD_EACH, "track", str(recording), str(Path(folder) / "run"), str(cores))
+    return json.loads(out.splitlines()[-1])
 
 
-def apart(recording: Path, run: Path, cores: int = 1) -> dict[str, Any]:
-    """What `track_long` tells, from a new process. Raises `ShadowPuppetError` where it fails."""
-    done = subprocess.run([sys.executable, "-m", "shadowpuppet.evaluation.bench.chain", str(recording), str(run), str(cores)],
-                          capture_output=True, text=True, env=os.environ | ONE_EACH)
-    if done.returncode:
-        raise ShadowPuppetError(f"bench: tracking the made film failed: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
-    return json.loads(done.stdout.splitlines()[-1])
+def chain_figures(prefix: str, found: Mapping[str, Any], cores: str) -> dict[str, Any]:
+    """Flat keys of what `measure_chain` returned; `cores`: the key that says how many cores it had."""
+    named = {f"{stage}_ms": spent for stage, spent in found["ms"].items()}
+    named |= {"chain_fps": found["fps"], "chain_frames": found["frames"], "peak_mb": found["peak_mb"], "growth_mb": found["growth_mb"],
+              cores: found["cores"]}
+    return {f"{prefix}.{name}": value for name, value in named.items()}
 
 
 class _Memory(Listener):
-    """Notes what the process holds after every frame."""
+    """Notes the resident memory after every frame."""
 
     def __init__(self) -> None:
-        self.held: list[float] = []
+        self.megabytes: list[float] = []
 
     def advance(self, frames: int) -> None:
         from shadowpuppet.evaluation.bench.machine import resident_mb
 
-        self.held.append(resident_mb() or np.nan)
+        self.megabytes.append(resident_mb() or np.nan)
 
 
-def track_long(recording: str, run: str, cores: str = "1") -> dict[str, Any]:
-    """Frames/s of the whole chain with the default preset, ms a frame by stage, peak memory and its growth (10^6 bytes), and how so many
-    cores were kept to."""
+def track_long(recording: str, run: str, cores: str) -> dict[str, Any]:
+    """Track a recording with the default preset: frames/s, ms a frame by stage, peak memory and its growth (10^6 bytes), and how the
+    process was held to `cores`."""
     from shadowpuppet.evaluation.bench.machine import peak_mb, use_cores
 
     how, memory = use_cores(int(cores)), _Memory()
     metrics = track_recording(recording, run, make_options({"seed": 1}), memory).metrics
-    early = memory.held[round(EARLY * len(memory.held))]
-    growth = memory.held[-1] - early
+    growth = memory.megabytes[-1] - memory.megabytes[round(WARM_UP * len(memory.megabytes))]
     return {"frames": metrics["frames"], "fps": metrics["frames_per_s"], "ms": metrics["ms_per_frame"], "status": metrics["status"],
             "peak_mb": peak_mb(), "growth_mb": growth if np.isfinite(growth) else None, "cores": how}
 
 
+def start_times() -> tuple[float, float]:
+    """Seconds from the start of a process to its first pose: with all kernels compiled anew, and with compiled kernels at hand."""
+    with tempfile.TemporaryDirectory() as cache:
+        return _start(cache), _start(cache)
+
+
+def _start(cache: str) -> float:
+    begin = time.perf_counter()
+    _child("the process that starts anew failed", {"NUMBA_CACHE_DIR": cache}, "start")
+    return time.perf_counter() - begin
+
+
+def _child(failure: str, variables: Mapping[str, str], *arguments: str) -> str:
+    """Standard output of this module as a program. Raises `ShadowPuppetError` with the last line of its errors."""
+    done = subprocess.run([sys.executable, "-P", "-m", "shadowpuppet.evaluation.bench.chain", *arguments], capture_output=True, text=True,
+                          encoding="utf-8", env=child_environment(variables))
+    if done.returncode:
+        raise ShadowPuppetError(f"bench: {failure}: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
+    return done.stdout
+
+
 if __name__ == "__main__":
-    print(json.dumps(track_long(*sys.argv[1:4])))
+    if sys.argv[1] == "track":
+        print(json.dumps(track_long(*sys.argv[2:5])))
+    else:
+        from shadowpuppet.evaluation.bench.mono_cases import MonoFollower
+
+        MonoFollower("default").run(1)

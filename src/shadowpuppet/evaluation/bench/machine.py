@@ -1,4 +1,4 @@
-"""What this machine is, as far as it matters for speed."""
+"""This machine, as far as it matters for speed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def environment() -> dict[str, Any]:
 
 
 def resident_mb() -> float | None:
-    """Memory that this process holds now, 10^6 bytes; None where the system does not tell."""
+    """Resident memory of this process, 10^6 bytes; None where the system does not say."""
     try:
         pages = int(Path("/proc/self/statm").read_text("ascii").split()[1])
     except (OSError, ValueError, IndexError):
@@ -32,7 +32,7 @@ def resident_mb() -> float | None:
 
 
 def peak_mb() -> float | None:
-    """The most that this process held at a time, 10^6 bytes; None where the system does not tell."""
+    """Peak resident memory of this process, 10^6 bytes; None where the system does not say."""
     try:
         import resource
     except ImportError:  # Windows
@@ -42,7 +42,7 @@ def peak_mb() -> float | None:
 
 
 def use_cores(count: int = 1) -> str:
-    """Keep this process to so many cores where the system can; says what was done. To be called before anything counts the cores."""
+    """Hold this process to `count` cores where the system can, and say what was done. Call it before anything counts the cores."""
     import cv2
 
     cv2.setNumThreads(1)

@@ -1,4 +1,4 @@
-"""What is timed: a person, poses around theirs, and eq. 2 of these poses."""
+"""What is timed with one camera: eq. 2 of poses around a person's, and a tracker on ready masks."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost
 
 SIZE = (320, 240)
-"""Liu 2011's pictures, pixels."""
+"""Pictures of Liu 2011, pixels."""
 SPREAD = 0.1
-"""Deviation of the poses that are timed from the person's, rad."""
+"""Standard deviation of the timed poses around the person's, rad."""
 
 
 def make_picture(body: str, size: tuple[int, int] = SIZE) -> Picture:
-    """A person of 1.75 m, 2.5 m before a camera that sees 60 degrees."""
+    """A person of 1.75 m, 2.5 m before a camera with a field of view of 60 degrees."""
     camera = Camera.from_fov(size, np.radians(60))
     return Picture(BODIES[body](sizes_from_height(1.75)), camera, place(camera, 2.5, -0.1))
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class MonoCase:
     """Costs of many poses: of the whole body, or of one arm over the rest."""
 
     body: str = "cardbox"
@@ -43,12 +43,12 @@ class Case:
 
     @cached_property
     def picture(self) -> Picture:
-        """The person as the camera sees them."""
+        """The body in the camera's picture."""
         return make_picture(self.body, self.size)
 
     @cached_property
     def dofs(self) -> NDArray[np.int64]:
-        """What varies: all DOF, or the left arm's."""
+        """DOF that vary: all, or the left arm's."""
         names = self.picture.body.skeleton.dof_names
         return np.flatnonzero([self.stage == "full" or name.startswith("left_") for name in names])
 
@@ -59,24 +59,24 @@ class Case:
 
     @cached_property
     def poses(self) -> Array:
-        """Those that are timed, of shape (N, D)."""
+        """The poses that are timed (N, D)."""
         poses = np.repeat(self.pose[None], self.particles, axis=0)
         poses[:, self.dofs] += SPREAD * np.random.default_rng(0).standard_normal((self.particles, len(self.dofs)))
         return poses
 
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
-        """The silhouette (H, W): of a pose like theirs."""
+        """The silhouette (H, W), of a pose near the person's."""
         return self.picture.mask(0.9 * self.pose)
 
     @cached_property
     def partial(self) -> PartialCost:
-        """Which shapes move."""
+        """The moving and the still shapes."""
         return PartialCost(self.picture, self.dofs)
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
-        """What is drawn once for all poses, of shape (H, W)."""
+        """The still shapes, drawn once for all poses (H, W)."""
         return unpack(self.picture.draw(self.pose, self.partial.still), self.size[0])
 
     @cached_property
@@ -85,27 +85,26 @@ class Case:
         return self.partial.costs(Observation.of(self.mask), self.pose)
 
     def run(self) -> Array:
-        """Costs of all poses, as the filter gets them."""
+        """Costs of all poses (N,), as the filter computes them."""
         return self.costs(self.poses)
 
 
-class Follower:
-    """A tracker that follows a made motion to and fro, frame by frame without end; masks are there already."""
+class MonoFollower:
+    """A tracker on ready masks of a motion to and fro, without end."""
 
     def __init__(self, preset: str, frames: int = 20) -> None:
-        """`preset`: the tracker's settings."""
+        """`preset`: the tracker's settings; `frames`: of the motion from one end to the other."""
         settings = make_settings(preset)
         picture = make_picture(settings.body)
         ends = ({"left_shoulder_abduction": 0.8, "right_shoulder_abduction": 1.0},
                 {"left_shoulder_abduction": 1.8, "right_shoulder_abduction": 0.5, "left_elbow_flexion": 1.2, "torso_bend": 0.2})
         start, end = (picture.body.skeleton.pose(**angles) for angles in ends)
-        poses = np.linspace(start, end, frames)
-        there = [picture.mask(pose) for pose in poses]
+        there = [picture.mask(pose) for pose in np.linspace(start, end, frames)]
         self.masks: Iterator[NDArray[np.bool_]] = cycle(there + there[::-1])
         self.tracker, self.rng = MonocularTracker(picture, settings), np.random.default_rng(0)
         self.state = self.tracker.start(self.rng, next(self.masks))
 
     def run(self, frames: int = 10) -> None:
-        """Some more frames."""
+        """Track some more frames."""
         for _ in range(frames):
             self.state = self.tracker.step(self.rng, self.state, next(self.masks))

@@ -1,4 +1,4 @@
-"""What is timed with several cameras: a made person in a ring of them, their silhouettes, and surface points of these."""
+"""What is timed with several cameras: a person in a ring of cameras, the silhouettes, and surface points from these."""
 
 from __future__ import annotations
 
@@ -26,29 +26,29 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, V
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 HEIGHT = 1.75
-"""Of the person, metres."""
+"""Stature, metres."""
 SIZE = (640, 480)
-"""HumanEva's pictures, pixels."""
+"""Pictures of HumanEva, pixels."""
 SPREAD = 0.05
-"""Deviation of the poses that are timed from the person's, rad and m."""
-WAYS = ({"left_shoulder_y": -0.5, "right_shoulder_y": 0.5, "left_hip_y": 0.4, "right_hip_y": -0.4, "left_knee_flexion": 0.3},
-        {"left_shoulder_y": 0.5, "right_shoulder_y": -0.5, "left_hip_y": -0.4, "right_hip_y": 0.4, "right_knee_flexion": 0.3})
-"""The ends of the motion that is followed: a stride, about."""
+"""Standard deviation of the timed poses around the person's, rad and m."""
+STRIDE = ({"left_shoulder_y": -0.5, "right_shoulder_y": 0.5, "left_hip_y": 0.4, "right_hip_y": -0.4, "left_knee_flexion": 0.3},
+          {"left_shoulder_y": 0.5, "right_shoulder_y": -0.5, "left_hip_y": -0.4, "right_hip_y": 0.4, "right_knee_flexion": 0.3})
+"""Both ends of the motion that is followed."""
 
 
 @dataclass(frozen=True, eq=False)
-class Around:
+class MultiCase:
     """A person of 1.75 m in a ring of cameras 4.5 m away."""
 
     cameras: int = 7
     points: int = 2000
-    """Surface points, about."""
+    """Surface points."""
     particles: int = 40
     size: tuple[int, int] = SIZE
 
     @cached_property
     def body(self) -> Body:
-        """The person's."""
+        """The person's body."""
         return make_body("anatomical", average_sizes("anatomical", HEIGHT))
 
     @cached_property
@@ -60,57 +60,57 @@ class Around:
     def pose(self, share: float) -> Array:
         """A pose (D,) between the ends of the motion: 0 to 1."""
         skeleton = self.body.skeleton
-        start, end = (skeleton.pose(root_z=0.94 * HEIGHT / 1.75, **way) for way in WAYS)
+        start, end = (skeleton.pose(root_z=0.94 * HEIGHT / 1.75, **way) for way in STRIDE)
         return (1 - share) * start + share * end
 
     def masks(self, pose: Array) -> list[Mask]:
-        """What the cameras see of it."""
+        """Silhouettes of a pose in all cameras."""
         return [Picture(self.body, camera, camera.T_camera_world).mask(pose) for camera in self.views]
 
     @cached_property
     def hull(self) -> VisualHull:
-        """Of these cameras, with the usual settings."""
+        """The visual hull of these cameras, with the default settings."""
         return VisualHull(self.views)
 
     @cached_property
-    def seen(self) -> list[Mask]:
-        """Silhouettes of the pose that is timed."""
+    def silhouettes(self) -> list[Mask]:
+        """Silhouettes of the person's pose."""
         return self.masks(self.pose(0.3))
 
     @cached_property
     def surface(self) -> SurfacePoints:
-        """As many of the hull's points as there are to be, evenly taken; points there are too few of are taken again."""
-        found = self.hull.points(self.seen)
+        """`points` of the hull's points, evenly taken; where there are fewer, some are taken more than once."""
+        found = self.hull.points(self.silhouettes)
         chosen = np.linspace(0, len(found.points), self.points, endpoint=False).astype(int)
         return SurfacePoints(found.points[chosen], found.normals[chosen], found.weights[chosen], found.cameras[chosen])
 
     @cached_property
     def cloud(self) -> Cloud:
-        """The same for the kernels."""
+        """The surface points as the kernels take them."""
         return make_cloud(self.surface.points, self.surface.normals, self.surface.weights)
 
     @cached_property
     def poses(self) -> Array:
-        """Those that are timed, of shape (N, D)."""
+        """The poses that are timed (N, D)."""
         rng = np.random.default_rng(0)
         pose = self.pose(0.3)
         return self.body.skeleton.clamp(pose + SPREAD * rng.standard_normal((self.particles, len(pose))))
 
     @cached_property
     def refiner(self) -> Refiner:
-        """The kernels on this body."""
+        """The refinement kernels on this body."""
         return Refiner(self.body)
 
     def run_hull(self) -> SurfacePoints:
-        """Silhouettes to points."""
-        return self.hull.points(self.seen)
+        """Silhouettes to surface points."""
+        return self.hull.points(self.silhouettes)
 
     def run_forces(self, iterations: int) -> Array:
-        """All poses after so many iterations of simulated force."""
+        """All poses after some iterations of simulated forces."""
         return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations))
 
     def run_gauss_newton(self, iterations: int) -> Array:
-        """All poses after so many of Gauss-Newton."""
+        """All poses after some iterations of Gauss-Newton."""
         held = np.full(self.poses.shape[1], 1e-6)
         return self.refiner.gauss_newton(self.poses, ((self.cloud, iterations, self.refiner.settings.tau),), self.poses, held)
 
@@ -119,23 +119,23 @@ class Around:
         return np.array([self.pose(share) for share in np.linspace(0, 1, count)])
 
     def prior(self, body: str) -> MotionPrior:
-        """Of the motion, for a body by name."""
+        """A prior learnt from the motion, for a body by name."""
         poses = self.motion(100)
         joints = JointTable(np.arange(len(poses)) / RATE, self.body.landmark_names, self.body.points(poses))
         return train_prior(np.random.default_rng(0), {"the motion": joints}, body=body, rate=RATE).prior
 
     def frames(self, count: int = 20) -> Iterator[list[Mask]]:
-        """Silhouettes of the motion, to and fro without end; they are drawn before the first is given."""
+        """Silhouettes of the motion, to and fro without end; all are drawn before the first is returned."""
         there = [self.masks(pose) for pose in self.motion(count)]
         return cycle(there + there[::-1])
 
 
-class RingFollower:
-    """A tracker that follows the made motion to and fro, frame by frame without end: hull, proposals, refinement, weights. Masks are there
-    already, and so is a prior, learnt from the same motion."""
+class MultiFollower:
+    """A tracker with hull, proposals, refinement and weights, on ready masks of a motion to and fro, without end; its prior is learnt from
+    the same motion."""
 
-    def __init__(self, case: Around, settings: MultiviewSettings, count: int = 20) -> None:
-        """Learns, and searches for the first pose."""
+    def __init__(self, case: MultiCase, settings: MultiviewSettings, count: int = 20) -> None:
+        """Learn the prior, and search for the first pose."""
         self.rng, self.frames, self.hull = np.random.default_rng(0), case.frames(count), VisualHull(case.views, settings.hull)
         body = make_body(settings.body, average_sizes(settings.body, HEIGHT))
         self.tracker = MultiviewTracker(body, tuple(case.views), settings, case.prior(settings.body))
@@ -143,7 +143,7 @@ class RingFollower:
         self.state = self.tracker.start(self.rng, self.hull.points(first), first)
 
     def run(self, frames: int = 5) -> None:
-        """Some more frames."""
+        """Track some more frames."""
         for _ in range(frames):
             masks = next(self.frames)
             self.state = self.tracker.step(self.rng, self.state, self.hull.points(masks), masks)

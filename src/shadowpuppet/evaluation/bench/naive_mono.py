@@ -1,6 +1,6 @@
-"""The filter as one would write it first, in NumPy and Python: pose by pose and card by card, without this package's kernels.
+"""A naive version of Liu 2011's filter in NumPy and Python: pose by pose and card by card, without the kernels but with their costs.
 
-For bodies of quads before a pinhole camera, all of them in front of it. Its costs are those of the kernels.
+For bodies of quads that lie wholly before a pinhole camera.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def joint_transforms(skeleton: Skeleton, pose: Array, root: Array) -> dict[str, 
 
 
 def fill(drawn: Mask, corners: Array) -> None:
-    """Set the pixels of a convex polygon (K, 2) in a mask (H, W): those on one side of all its edges, looked for in its box."""
+    """Set the pixels of a convex polygon (K, 2) in a mask (H, W): those within its box that lie on one side of all its edges."""
     height, width = drawn.shape
     x0, y0 = np.maximum(np.floor(corners.min(0)), 0).astype(int)
     x1, y1 = np.minimum(np.ceil(corners.max(0)), (width - 1, height - 1)).astype(int)
@@ -47,7 +47,7 @@ def fill(drawn: Mask, corners: Array) -> None:
 
 
 def cost(picture: Picture, pose: Array, shapes: NDArray[np.int64], mask: Mask) -> int:
-    """Eq. 2 of one pose (D,), pixels: its cards are placed, projected and drawn, and what differs from the mask (H, W) is counted."""
+    """Eq. 2 of one pose (D,), pixels: its cards are placed, projected and drawn, and pixels that differ from the mask (H, W) counted."""
     body, matrix = picture.body, picture.camera.matrix
     joints = joint_transforms(body.skeleton, pose, picture.T_camera_base)
     drawn = np.zeros_like(mask)
@@ -60,7 +60,7 @@ def cost(picture: Picture, pose: Array, shapes: NDArray[np.int64], mask: Mask) -
 
 
 def frame(rng: np.random.Generator, picture: Picture, settings: MonocularSettings, pose: Array, mask: Mask, particles: int) -> Array:
-    """The pose (D,) after one frame of Liu 2011's filter, with so many particles in every stage."""
+    """The pose (D,) after one frame of Liu 2011's filter, with `particles` in every stage."""
     for name in settings.stages:
         stage = FilterStage(picture, settings, name)
         shapes = np.concatenate([stage.partial.moving, stage.partial.still])

@@ -1,7 +1,7 @@
-"""Ni 2008's refinement (V-B) as one would write it first, in NumPy: point sets at once, part by part, one degree of freedom after another.
+"""A naive version of Ni 2008's refinement (V-B) in NumPy: all points at once, part by part, one degree of freedom after another.
 
 The distance of a point to a part is of first order, as in the kernels: the level of the part's own function over the length of its
-gradient. What is computed from it are the paper's eqs. 29-41, and the normal equations of the distances to tangent planes.
+gradient. From it come the paper's eqs. 29-41, and the normal equations of the distances to tangent planes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FLAT = 1e-4
 
 
 class Surface(NamedTuple):
-    """Where points are nearest to a part, or each to its own part."""
+    """Closest points of points to one part, or of each to its own part."""
 
     distance: Array
     """Signed, negative inside, of shape (P,), metres."""
@@ -32,23 +32,23 @@ class Surface(NamedTuple):
 
 
 class Motions(NamedTuple):
-    """How each degree of freedom of a pose moves what hangs on its joint."""
+    """How each degree of freedom of a pose moves the joints below its own."""
 
     axes: Array
-    """Direction of the turn or the shift, world, of shape (D, 3); a turn is of as many radians for a unit of the DOF as this is long."""
+    """Axis of the rotation, or direction of the shift, world (D, 3); its length is the radians or metres for a unit of the DOF."""
     centres: Array
-    """A point that a turn leaves where it is, of shape (D, 3), metres."""
+    """A point on the axis of rotation (D, 3), metres."""
     shifts: NDArray[np.bool_]
-    """Whether it is a shift, of shape (D,)."""
+    """Whether it is a shift (D,)."""
     moved: NDArray[np.bool_]
-    """Whether a joint is moved, of shape (D, J)."""
+    """Whether a joint moves with it (D, J)."""
 
 
 # Kinematics
 
 
 def place(skeleton: Skeleton, pose: Array) -> tuple[Array, Motions]:
-    """Transforms (J, 4, 4) of the joints of a pose (D,), joint to world, and how its DOF move them."""
+    """Transforms (J, 4, 4) of a pose's (D,) joints, joint to world, and how its DOF move them."""
     T = np.zeros((len(skeleton.joints), 4, 4))
     axes, centres = np.zeros((2, len(skeleton.dofs), 3))
     for j, joint in enumerate(skeleton.joints):
@@ -83,7 +83,7 @@ def left_jacobian(v: Array) -> Array:
 
 
 def _moved(skeleton: Skeleton) -> NDArray[np.bool_]:
-    """Which joints (D, J) move with each DOF: its own and all that hang on it."""
+    """Joints (D, J) that move with each DOF: its own and all below it."""
     below = np.zeros((len(skeleton.joints),) * 2, bool)
     for j, joint in enumerate(skeleton.joints):
         below[j, j] = True
@@ -96,7 +96,7 @@ def _moved(skeleton: Skeleton) -> NDArray[np.bool_]:
 
 
 def closest(limbs: Limbs, s: int, T: Array, points: Array) -> Surface:
-    """Where points (P, 3), world, are nearest to part `s`, whose joint stands at T (4, 4)."""
+    """Closest points of points (P, 3), world, to part `s`, whose joint has the transform T (4, 4)."""
     R = T[:3, :3] @ limbs.rotations[s]
     origin = T[:3, :3] @ limbs.starts[s] + T[:3, 3]
     distance, feet, normals = _closest((points - origin) @ R, limbs.lengths[s], limbs.shears[s], limbs.radii[s], limbs.caps[s])
@@ -127,7 +127,7 @@ def _closest(p: Array, length: float, shear: Array, radii: Array, caps: Array) -
 
 
 def _to_disc(found: Surface, p: Array, sign: float, depth: Array, middle: Array, level: Array, z: float) -> Surface:
-    """`found` with a flat end's points instead where these are nearer: beyond the end, or inside and not so deep below it."""
+    """`found`, with points on a flat end instead where these are nearer: beyond the end, or inside and close below it."""
     rho = np.linalg.norm(level, axis=1)
     beyond, below = depth < 0, (depth >= 0) & (rho < 1) & (depth < -found.distance)
     feet = np.column_stack([middle + (p[:, :2] - middle) / np.maximum(rho, 1)[:, None], np.full(len(p), z)])
@@ -142,7 +142,7 @@ def _to_disc(found: Surface, p: Array, sign: float, depth: Array, middle: Array,
 
 
 def nearest(limbs: Limbs, T: Array, points: Array, normals: Array, epsilon: float) -> tuple[NDArray[np.int64], Array, Surface]:
-    """The part (P,) to which each point is nearest by d (1 - eps cos) (eq. 31), that distance (P,), and where it is so."""
+    """The part (P,) nearest to each point by d (1 - eps cos) (eq. 31), that distance (P,), and the closest points."""
     parts = [closest(limbs, s, T[joint], points) for s, joint in enumerate(limbs.joints)]
     apart = np.array([np.abs(part.distance) * (1 - epsilon * (part.normals * normals).sum(1)) for part in parts])
     which, every = apart.argmin(0), np.arange(len(points))
@@ -168,8 +168,8 @@ def move_by_forces(
 ) -> Array:
     """The pose (D,) after one iteration of simulated force and moment (eqs. 32-41).
 
-    Forces are divided by how many points there are, moments by these points' inertia about the axis, so that the step does not depend
-    on their number: what the paper leaves to its weights lambda and rho.
+    Forces are divided by the number of points, moments by the points' inertia about the axis, so that the step does not depend on their
+    number, which the paper leaves to its weights lambda and rho.
     """
     limbs, (T, motions) = _limbs(body), place(body.skeleton, pose)
     which, _, found = nearest(limbs, T, points, normals, surface.epsilon)
@@ -180,7 +180,7 @@ def move_by_forces(
     forces = (weights * size / apart)[:, None] * pull  # eq. 32
     owner, step = np.asarray(limbs.joints)[which], np.zeros(len(pose))
     for d, dof in enumerate(body.skeleton.dofs):
-        felt = motions.moved[d, owner]  # eqs. 38-40: all that hangs on it
+        felt = motions.moved[d, owner]  # eqs. 38-40: the joint and all below it
         if motions.shifts[d]:
             step[d] = settings.translation * (forces[felt] @ motions.axes[d]).sum() / (weights[felt].sum() + 1e-9)  # eq. 36
             continue
@@ -196,9 +196,9 @@ def move_by_forces(
 def normal_equations(
     body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings
 ) -> tuple[Array, Array]:
-    """H (D, D) and g (D,) of the distances along the points' normals to the body: H step = g moves a pose (D,) toward them.
+    """H (D, D) and g (D,) of the distances to the body along the points' normals: H step = g moves a pose (D,) toward the points.
 
-    A point's weight fades with its distance (Geman & McClure 1987) and is none where the normals disagree; both are means over the points.
+    A point's weight falls with its distance (Geman & McClure 1987), to zero where the normals are opposed; both are means over the points.
     """
     limbs, (T, motions) = _limbs(body), place(body.skeleton, pose)
     which, apart, found = nearest(limbs, T, points, normals, surface.epsilon)
@@ -216,8 +216,8 @@ def move_by_gauss_newton(
     body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings, pull: float = 1e-6,
     damping: float = 0.03,
 ) -> Array:
-    """The pose (D,) after one damped step of Gauss-Newton within limits, held by `pull` where it is; a DOF that is at its limit and would
-    go beyond stays there, and the others know."""
+    """The pose (D,) after one damped Gauss-Newton step, pulled by `pull` to where it is; a DOF at its limit that would go beyond is left
+    out of the system."""
     H, g = normal_equations(body, pose, points, normals, weights, surface)
     low, high = body.skeleton.limits
     free = ~(((pose <= low) & (g < 0)) | ((pose >= high) & (g > 0)))

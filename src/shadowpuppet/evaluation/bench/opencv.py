@@ -1,4 +1,4 @@
-"""Eq. 2 by OpenCV: the same polygons of the same poses, ready-made, at whole pixels."""
+"""Eq. 2 by OpenCV: the same polygons of the same poses, made beforehand, with corners at whole pixels."""
 
 from __future__ import annotations
 
@@ -6,27 +6,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shadowpuppet.evaluation.bench.mono_cases import Case
+from shadowpuppet.evaluation.bench.mono_cases import MonoCase
 from shadowpuppet.geometry import Array
-
-Polygons = list[list[NDArray[np.int32]]]
-"""For each pose, polygons (K, 2) with whole corners."""
-
-
-def whole_polygons(case: Case) -> Polygons:
-    """What the case draws for every pose."""
-    corners, counts = case.picture.polygons(case.picture.transforms(case.poses), case.partial.moving)
-    return [[np.rint(c[:m]).astype(np.int32) for c, m in zip(*pair) if m] for pair in zip(corners, counts)]
 
 
 class OpenCV:
-    """`fillConvexPoly`, `bitwise_xor` and `countNonZero`, with everything ready beforehand but the drawing."""
+    """Costs by `fillConvexPoly`, `bitwise_xor` and `countNonZero`; polygons, masks and buffers are made beforehand and not timed."""
 
-    def __init__(self, case: Case) -> None:
-        """Polygons, masks and buffers are made here and not timed."""
-        self.polygons, self.mask, self.fixed = whole_polygons(case), case.mask.astype(np.uint8), case.fixed.astype(np.uint8)
+    def __init__(self, case: MonoCase) -> None:
+        """Make all but the drawing ready."""
+        corners, counts = case.picture.polygons(case.picture.transforms(case.poses), case.partial.moving)
+        self.polygons = [[np.rint(c[:m]).astype(np.int32) for c, m in zip(*pair) if m] for pair in zip(corners, counts)]
+        self.mask, self.fixed = case.mask.astype(np.uint8), case.fixed.astype(np.uint8)
         self.empty = not self.fixed.any()
         self.drawn, self.differs = np.empty_like(self.fixed), np.empty_like(self.fixed)
 
@@ -49,7 +41,7 @@ class OpenCV:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """OpenCV works in one thread here."""
+    """Inside, OpenCV works in one thread."""
     import cv2
 
     threads = cv2.getNumThreads()

@@ -1,4 +1,4 @@
-"""Times of things that are to be compared: measured in turns, so that a busy machine slows all alike."""
+"""Times of contenders, measured in turns, so that a busy machine slows all alike."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Times(NamedTuple):
-    """How long one thing took, seconds a unit (a particle, a frame)."""
+    """Seconds a unit (a particle, a frame) of one contender."""
 
     median: float
     least: float
@@ -18,18 +18,16 @@ class Times(NamedTuple):
 
 
 class Contender(NamedTuple):
-    """Something to be timed."""
+    """A function to be timed."""
 
     run: Callable[[], object]
     units: float = 1
-    """Units that one call works off."""
+    """Units of work in one call."""
 
 
 def in_turns(contenders: Mapping[str, Contender], rounds: int) -> dict[str, Times]:
-    """Times of each, by name: every round calls all, one after another.
-
-    Each call that is timed follows one that is not, so that none pays for what the one before it left in the caches.
-    """
+    """Times by name. Every round calls all contenders, one after another; each timed call follows an untimed one, so that none pays for
+    the caches that the one before it left."""
     spent: dict[str, list[float]] = {name: [] for name in contenders}
     for _ in range(rounds):
         for name, (run, units) in contenders.items():
@@ -37,4 +35,21 @@ def in_turns(contenders: Mapping[str, Contender], rounds: int) -> dict[str, Time
             start = time.perf_counter()
             run()
             spent[name].append((time.perf_counter() - start) / units)
-    return {name: Times(float(np.median(took)), float(min(took)), rounds) for name, took in spent.items()}
+    return {name: Times(float(np.median(seconds)), float(min(seconds)), rounds) for name, seconds in spent.items()}
+
+
+class Figures(NamedTuple):
+    """Which figures follow from the times of contenders, by key."""
+
+    times: Mapping[str, tuple[float, str]]
+    """Units in a second (1e3 for ms) and contender: median time."""
+    rates: Mapping[str, str]
+    """Contender: units a second, by the median."""
+    ratios: Mapping[str, tuple[str, str]]
+    """Two contenders: the first's time over the second's, by the least times, which other work on the machine hardly changes."""
+
+    def of(self, raw: Mapping[str, Times]) -> dict[str, float]:
+        """The figures."""
+        return {key: scale * raw[name].median for key, (scale, name) in self.times.items()} | {
+            key: 1 / raw[name].median for key, name in self.rates.items()} | {
+            key: raw[slow].least / raw[fast].least for key, (slow, fast) in self.ratios.items()}  # fmt: skip

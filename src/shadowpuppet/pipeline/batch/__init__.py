@@ -1,4 +1,4 @@
-"""Many recordings, seeds and settings: what is to be run, who runs it, what came of it."""
+"""Many runs: grids of settings, tasks, worker pools, summaries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _HOMES = {"Batch": "run", "BatchListener": "run", "run_batch": "run", "Case": "g
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name's home (PEP 562): a worker needs none of them."""
+    """Import a public name when it is first used (PEP 562): a worker needs none of them."""
     from importlib import import_module
 
     if name not in _HOMES:

@@ -1,4 +1,4 @@
-"""Who does the tasks on other machines: the workers of a Dask cluster, for which the extra `batch` is needed."""
+"""Tasks on other machines, by the workers of a Dask cluster; needs the extra `batch`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.batch.tasks import Task
-from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome
+from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome, WorkerPool
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 PATIENCE = 20
 """Seconds that a scheduler may take to answer."""
 _kept = threading.local()
-"""What a worker's thread keeps from task to task, and of which batch."""
+"""Silhouettes that a worker's thread keeps from task to task, and the batch they are of."""
 
 
 def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome:
-    """One task, on a worker of a cluster; `start`: of the batch, at which recordings may have changed."""
+    """Run a task on a worker of the cluster. `start` identifies the batch: between two batches recordings may have changed."""
     from shadowpuppet.pipeline.batch.task import do
     from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
     from shadowpuppet.threads import limit_threads
@@ -31,17 +31,17 @@ def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome
     return do(task, out, _kept.repeats if reuse else None)
 
 
-class Cluster:
-    """The workers of a Dask cluster. They must see the same files under the same names, and have this package."""
+class Cluster(WorkerPool):
+    """The workers of a Dask cluster, which must have this package and see the same files under the same names."""
 
     def __init__(self, address: str, out: Path, start: str, reuse: bool, listener: BatchListener) -> None:
-        """`address`: of the scheduler, or of a scheduler file; `out`: the batch's folder."""
+        """`address`: of the scheduler, or a scheduler file; `out`: the batch's folder; `start` as in `do_there`."""
         self._address, self._out, self._start, self._reuse, self._listener = address, out, start, reuse, listener
         self._tasks: dict[Future, Task] = {}
         self._tries: dict[str, int] = {}
 
     def __enter__(self) -> Self:
-        """Reach the scheduler."""
+        """Connect to the scheduler."""
         try:
             from distributed import Client, as_completed
         except ImportError:
@@ -60,13 +60,13 @@ class Cluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let go of what is not done; a run that a worker is at comes to its end, and is found by the next start."""
+        """Cancel what is not done. A run that a worker has begun goes on to its end, and the next start finds it."""
         if self._client.status == "running":
             self._client.cancel(list(self._tasks), force=True)
         self._client.close()
 
     def put(self, task: Task) -> None:
-        """One more, for whoever is free."""
+        """Add a task, for any free worker."""
         tried = self._tries[task.id] = self._tries.get(task.id, 0) + 1
         future = self._client.submit(do_there, task.wire(), str(self._out), self._start, self._reuse, pure=False,
                                      key=f"shadowpuppet-{self._start}-{task.id}-{tried}")
@@ -74,7 +74,7 @@ class Cluster:
         self._ended.add(future)
 
     def next(self) -> tuple[Task, Outcome]:
-        """Wait for one."""
+        """Wait for the next task that is done or failed."""
         future = next(self._ended)
         task = self._tasks.pop(future)
         if future.status == "finished":

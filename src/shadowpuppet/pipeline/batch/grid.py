@@ -1,4 +1,4 @@
-"""Settings to be tried: a file of settings with lists of values, and named cases.
+"""Grids of settings: a file of settings with lists of values, and named cases.
 
     seeds = "0:10"                                           # or a list of numbers
     preset = "liu2011"                                       # settings of all runs, as in any file of settings
@@ -25,12 +25,12 @@ from shadowpuppet.errors import SettingsError, shown
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.pipeline.options import PATHS, make_options, over, settings_in
 
-MOST = 100_000
+MAX_RUNS = 100_000
 """Combinations, or seeds, beyond which a grid is taken for a mistake."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}")
-"""Of a case: it becomes part of a folder's name."""
-PLAIN = "default"
-"""The case of a grid without cases."""
+"""Name of a case; it becomes part of a folder's name."""
+DEFAULT_CASE = "default"
+"""Name of the only case of a grid without cases."""
 
 
 class Case(NamedTuple):
@@ -40,26 +40,26 @@ class Case(NamedTuple):
     values: dict[str, Any]
     """Plain values, as `make_options` takes them."""
     varied: dict[str, Any]
-    """Those that the grid or the case sets, by dotted name."""
+    """Settings of the case or the grid, by dotted name."""
     tried: tuple[str, ...] = ()
-    """Names of those that the grid sets."""
+    """Names of the grid's settings."""
 
     @property
     def label(self) -> str:
-        """In words: its name, where it has one, and the grid's values."""
+        """The case's name, where it has one, and the grid's values."""
         values = (f"{name.rpartition('.')[2]} {short(self.varied[name])}" for name in self.tried)
-        return ", ".join([*([self.name] if self.name != PLAIN else []), *values])
+        return ", ".join([*([self.name] if self.name != DEFAULT_CASE else []), *values])
 
 
 class Grid(NamedTuple):
-    """All choices of settings, and the seeds that a file names; None where it names none."""
+    """All choices of settings, and the file's seeds; None where it has none."""
 
     cases: tuple[Case, ...]
     seeds: tuple[int, ...] | None = None
 
 
 def read_grid(path: str | Path, flags: Mapping[str, Any] | None = None) -> Grid:
-    """A grid from a TOML file; `flags`: settings that hold in place of the file's. Raises `SettingsError`, naming file and field."""
+    """A grid from a TOML file; `flags`: settings in place of the file's. Raises `SettingsError`, naming file and field."""
     path = Path(path)
     values = read_toml(path, SettingsError)
     plus = {key: values.pop(key) for key in ("seeds", "grid", "case") if key in values}
@@ -74,21 +74,20 @@ def make_grid(settings: Mapping[str, Any] | None = None, *, cases: Mapping[str, 
               seeds: object = None, flags: Mapping[str, Any] | None = None, source: str = "grid") -> Grid:
     """A grid from plain values: settings of all runs, named `cases` of settings, and `grid`, lists of values by dotted name.
 
-    Later ones hold over earlier ones: settings, a case, the grid. `flags` hold over the settings and may not be varied. Raises
-    `SettingsError`.
+    The grid's values replace a case's, and these the settings. `flags` replace the settings and may not be varied. Raises `SettingsError`.
     """
     make_options(dict(settings or {}), source)
     common = over(settings or {}, flags or {})
     seed = common.pop("seed", None)
     make_options(common, "flags")
-    told = seeds if seeds is not None else seed
-    named = _table(cases or {}, f"{source}: case") or {PLAIN: {}}
+    chosen_seeds = seeds if seeds is not None else seed
+    named = _table(cases or {}, f"{source}: case") or {DEFAULT_CASE: {}}
     lists = [list(_choices(f"{source}: grid.{name}", name, listed)) for name, listed in _flat(_table(grid or {}, f"{source}: grid"))]
-    if (count := math.prod(map(len, lists)) * len(named)) > MOST:
-        raise SettingsError(f"{source}: grid: found {count} combinations, expected at most {MOST}")
+    if (count := math.prod(map(len, lists)) * len(named)) > MAX_RUNS:
+        raise SettingsError(f"{source}: grid: found {count} combinations, expected at most {MAX_RUNS}")
     made = [_case(source, name, table, common, chosen) for name, table in named.items() for chosen in product(*lists)]
     _check_flags(dict(_flat(flags or {})), made)
-    return Grid(tuple(made), None if told is None else seeds_of(told, f"{source}: seeds"))
+    return Grid(tuple(made), None if chosen_seeds is None else seeds_of(chosen_seeds, f"{source}: seeds"))
 
 
 def seeds_of(said: object, source: str = "seeds") -> tuple[int, ...]:
@@ -101,19 +100,19 @@ def seeds_of(said: object, source: str = "seeds") -> tuple[int, ...]:
         found = list(said)
     else:
         found = [said]
-    if not found or len(found) > MOST or not all(type(n) is int and n >= 0 for n in found) or len(set(found)) < len(found):
+    if not found or len(found) > MAX_RUNS or not all(type(n) is int and n >= 0 for n in found) or len(set(found)) < len(found):
         raise SettingsError(f"{source}: found {shown(said)[:80]}, {expected}")
     return tuple(found)  # pyright: ignore[reportReturnType]
 
 
 def _numbers(part: str) -> range | None:
-    """`4`, `0:10` or `0:10:2`; None where it is none of them."""
+    """The numbers of `4`, `0:10` or `0:10:2`; None for any other text."""
     match = re.fullmatch(r"\s*(\d{1,18})(?::(\d{1,18})(?::(\d{1,9}))?)?\s*", part)
     if match is None or match[3] == "0" or (match[3] and not int(match[3])):
         return None
     first = int(match[1])
     found = range(first, int(match[2]) if match[2] else first + 1, int(match[3] or 1))
-    return found if len(found) <= MOST else None
+    return found if len(found) <= MAX_RUNS else None
 
 
 def _table(found: object, place: str) -> dict[str, Any]:
@@ -123,12 +122,12 @@ def _table(found: object, place: str) -> dict[str, Any]:
 
 
 def _beside(path: Path, name: str, value: object) -> object:
-    """A value of the grid; a file is told from the grid's folder on, as elsewhere."""
+    """A value of the grid; paths are relative to the grid's folder, as elsewhere."""
     return str(path.parent / value) if name in PATHS and isinstance(value, str) else value
 
 
 def _choices(place: str, name: str, listed: object) -> Iterator[tuple[str, Any]]:
-    """A setting's values in the grid."""
+    """Pairs of a setting's name and each of its values in the grid."""
     if not isinstance(listed, list) or not listed:
         raise SettingsError(f"{place}: found {shown(listed)[:80]}, expected a list of values to be tried")
     if name == "seed":
@@ -154,12 +153,12 @@ def _case(source: str, name: str, table: object, common: Mapping[str, Any], chos
 
 
 def short(value: Any) -> str:
-    """A value as a label shows it: files by their names."""
+    """A value for a label; paths by the file's name."""
     return Path(value).name if isinstance(value, str) else "-".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _check_flags(flags: Mapping[str, Any], cases: Sequence[Case]) -> None:
-    """A setting cannot be held and varied at once."""
+    """Raises `SettingsError` where a flag sets what the grid varies."""
     for case in cases:
         for name in set(flags) & set(case.varied):
             raise SettingsError(f"flags: {name}: found {shown(flags[name])}, but the grid varies it; expected one of them")

@@ -1,4 +1,4 @@
-"""What came of a batch, as a plot, for which the extra `report` is needed."""
+"""A plot of a batch's errors and overlaps; needs the extra `report`."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from shadowpuppet.io.files.text import reason
 from shadowpuppet.pipeline.batch.summary import BatchRun
 
 MEASURES = ((("errors", "mean_mm"), "mean joint error, mm"), (("overlap", "mean"), "mean overlap with the silhouettes"))
-"""What is drawn, where it was measured: places in metrics.json, and words."""
+"""Measures that are drawn: keys in metrics.json, and labels."""
 COLOURS = ("#1b6ca8", "#d1495b", "#3a7d44", "#b07d12", "#6a4c93", "#4d4d4d")
-MOST = 60
-"""Rows beyond which a plot cannot be read: those after them are left out, and that is said."""
+MAX_ROWS = 60
+"""Rows of a plot that can be read; further ones are left out, and the title says so."""
 
 
 def can_plot() -> bool:
-    """Whether Matplotlib is there."""
+    """Whether Matplotlib is installed."""
     return find_spec("matplotlib") is not None
 
 
 def rows_of(runs: Sequence[BatchRun]) -> dict[tuple[str, str], list[BatchRun]]:
-    """Runs by recording and choice of settings: those that differ by their seed."""
+    """Runs by recording and choice of settings; those of a row differ in their seed."""
     rows: dict[tuple[str, str], list[BatchRun]] = {}
     for run in runs:
         rows.setdefault((run.task.name, run.task.choice), []).append(run)
@@ -34,7 +34,7 @@ def rows_of(runs: Sequence[BatchRun]) -> dict[tuple[str, str], list[BatchRun]]:
 
 
 def measured(run: BatchRun, place: Sequence[str]) -> float:
-    """A number of a run's metrics; not a number where there is none."""
+    """A number of a run's metrics, by its keys; NaN where there is none."""
     value: Any = run.metrics
     for key in place:
         value = value.get(key) if isinstance(value, Mapping) else None
@@ -42,7 +42,7 @@ def measured(run: BatchRun, place: Sequence[str]) -> float:
 
 
 def plot_batch(runs: Sequence[BatchRun], path: Path) -> None:
-    """Error and overlap, a point a run, a row a recording and choice of settings, with median and quartiles; .png, .pdf or .svg.
+    """Draw error and overlap: a row for each recording and choice of settings, a point for each run, median, quartiles; .png, .pdf or .svg.
 
     Raises `ShadowPuppetError` where it cannot be written.
     """
@@ -50,7 +50,7 @@ def plot_batch(runs: Sequence[BatchRun], path: Path) -> None:
     from matplotlib.figure import Figure
 
     rows = rows_of(runs)
-    shown = dict(list(rows.items())[:MOST])
+    shown = dict(list(rows.items())[:MAX_ROWS])
     measures = [m for m in MEASURES if any(np.isfinite(measured(run, m[0])) for run in runs)] or [MEASURES[-1]]
     figure = Figure(figsize=(2.5 + 4.2 * len(measures), 1.3 + 0.3 * len(shown)), layout="constrained")
     FigureCanvasAgg(figure)
@@ -65,7 +65,8 @@ def plot_batch(runs: Sequence[BatchRun], path: Path) -> None:
         axes.tick_params(axis="y", length=0)
         axes.set_yticks(range(len(shown)), [_label(key, of, len(names) > 1) for key, of in shown.items()], fontsize=8)
     panels[0].set_ylim(len(shown) - 0.4, -0.6)
-    done, left_out = sum(run.status == "done" for run in runs), f"; {len(rows) - MOST} more rows in the table" if len(rows) > MOST else ""
+    done = sum(run.status == "done" for run in runs)
+    left_out = f"; {len(rows) - MAX_ROWS} more rows in the table" if len(rows) > MAX_ROWS else ""
     of = f" of {names[0]}" if len(names) == 1 else ""
     figure.suptitle(f"{done} of {len(runs)} runs{of}; a point each, line: median, bar: quartiles{left_out}", fontsize=9)
     try:
@@ -79,8 +80,8 @@ def _row(axes: Any, y: int, values: np.ndarray, colour: str) -> None:
     if not len(values):
         axes.plot([], [])
         return
-    spread = 0.5 * (0.618034 * np.arange(len(values)) % 1) - 0.25  # aside from one another, and the same each time
-    axes.plot(values, y + spread, "o", color=colour, ms=3.5, alpha=0.45 if len(values) > 20 else 0.7, mew=0)
+    offsets = 0.5 * (0.618034 * np.arange(len(values)) % 1) - 0.25  # so that points do not hide each other
+    axes.plot(values, y + offsets, "o", color=colour, ms=3.5, alpha=0.45 if len(values) > 20 else 0.7, mew=0)
     low, middle, high = np.percentile(values, (25, 50, 75))
     axes.barh(y, high - low, 0.62, low, color=colour, alpha=0.18, lw=0)
     axes.plot([middle, middle], [y - 0.36, y + 0.36], color=colour, lw=2)

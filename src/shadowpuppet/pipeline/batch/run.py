@@ -1,4 +1,4 @@
-"""A batch from beginning to end: what is missing is done, what fails is tried again, and all that came of it is told."""
+"""A batch from beginning to end: runs what is missing, tries again what failed, and summarises all runs."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from shadowpuppet.io.files.plain import for_toml
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import reason, write_whole
 from shadowpuppet.io.run import versions
-from shadowpuppet.pipeline.batch.grid import PLAIN, Case, Grid
+from shadowpuppet.pipeline.batch.grid import DEFAULT_CASE, Case, Grid
 from shadowpuppet.pipeline.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
 from shadowpuppet.pipeline.batch.task import PART, PLAN, RUNS
 from shadowpuppet.pipeline.batch.tasks import Task, Track, make_tasks
-from shadowpuppet.pipeline.batch.workers import Alone, BatchListener, Crew, Outcome, Processes
+from shadowpuppet.pipeline.batch.workers import BatchListener, InProcess, LocalProcesses, Outcome, WorkerPool
 from shadowpuppet.threads import usable_cores
 
 LOCK, FAILURES = ".lock", "failed"
-"""The file that is held while a batch is at work; the folder that gets what programmers want to know of runs that failed of a bug."""
+"""The file that is locked while a batch works; the folder of tracebacks of runs that failed of a bug."""
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """A batch that came to its end."""
+    """A batch that has ended."""
 
     folder: Path
     runs: tuple[BatchRun, ...]
@@ -37,11 +37,11 @@ class Batch:
 
     @property
     def failed(self) -> list[BatchRun]:
-        """Those that failed."""
+        """Runs that failed or are missing."""
         return [run for run in self.runs if run.status != "done"]
 
     def of(self, recording: str | None = None, case: str | None = None, **varied: Any) -> list[BatchRun]:
-        """The runs that are done of a recording's name, a case, and values of settings (`particles=200`: by the end of their name)."""
+        """Runs that are done, of a recording's name, a case, and values of settings (`particles=200`: by the last part of their name)."""
         return [run for run in self.runs if run.status == "done" and recording in (None, run.task.name) and case in (None, run.task.case)
                 and varied.items() <= {name.rpartition(".")[2]: value for name, value in run.task.varied.items()}.items()]
 
@@ -51,21 +51,24 @@ def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | No
               table: str = "csv", listener: BatchListener | None = None, track: Track | None = None) -> Batch:
     """Track recordings with all settings of a grid (`make_grid`, `read_grid`) and all seeds; a run folder each in `out`/runs.
 
-    `seeds` holds over those of the grid; with neither there is one, 0. `workers`: processes, if left out one a core; 0 for none but
-    this. `threads`: that each may use. `retries`: how often a run is tried again that failed of its machine: a worker that was killed, a
-    full disk; what cannot be used is not. `scheduler`: address of a Dask cluster, whose workers do it. `reuse`: runs of the same film
-    take the survey and silhouettes of the one before, with the same result; leave it out to measure speed. `table`: csv or parquet.
-    `track`: what makes a run folder, in place of `track_recording` and called as that is: a function of a module that the workers have too.
+    Args:
+        seeds: in place of the grid's; without either, 0.
+        workers: processes, by default one a core; 0 runs all in this process. `threads`: of each.
+        retries: further tries of a run that failed because of its machine (a killed worker, a full disk).
+        scheduler: address of a Dask cluster, whose workers then run the tasks.
+        reuse: keep a film's survey and silhouettes for its next run, with the same result; off to measure speed.
+        table: csv or parquet.
+        track: a function in place of `track_recording`, called like it, of a module that the workers can import.
 
-    Runs that `out` has already are not done again: those of the same recording, settings and seed. A run that fails does not stop the
-    others. Raises a `ShadowPuppetError` where nothing can be begun; `KeyboardInterrupt` goes on after the summary was written.
+    Complete runs in `out` with the same recording, settings and seed are kept. A run that fails does not stop the others. Raises
+    `ShadowPuppetError` where nothing can be begun; `KeyboardInterrupt` passes through after the summary was written.
     """
     listener, out = listener or BatchListener(), Path(out).resolve()
     check_table(table)
     for name, number, least in (("workers", workers, 0), ("retries", retries, 0), ("threads", threads, 1)):
         if number is not None and not least <= number <= 1000:
             raise SettingsError(f"{name}: found {shown(number)}, expected {least} to 1000")
-    grid = grid or Grid((Case(PLAIN, {}, {}),))
+    grid = grid or Grid((Case(DEFAULT_CASE, {}, {}),))
     chosen = tuple(seeds) if seeds is not None else grid.seeds or (0,)
     tasks = make_tasks(recordings, grid.cases, chosen, track)
     with _claimed(out):
@@ -75,19 +78,19 @@ def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | No
         _write_plan(out, tasks, chosen)
         try:
             if work.todo:
-                with _crew(out, scheduler, min(count, len(work.todo)), threads, reuse, listener) as crew:
-                    work.all(crew)
+                with _pool(out, scheduler, min(count, len(work.todo)), threads, reuse, listener) as pool:
+                    work.all(pool)
         except KeyboardInterrupt:
-            done = sum(run.status == "done" for run in _told(work, table).runs)
+            done = sum(run.status == "done" for run in _summarised(work, table).runs)
             raise KeyboardInterrupt(f"{done} of {len(tasks)} runs are done and in {out}; the same command does the rest") from None
         except BaseException:
-            _told(work, table)
+            _summarised(work, table)
             raise
-        return _told(work, table)
+        return _summarised(work, table)
 
 
-def _told(work: _Work, table: str) -> Batch:
-    """What there is now, with its summary."""
+def _summarised(work: _Work, table: str) -> Batch:
+    """The runs as they are now; writes the summary."""
     _clean(work.out)
     batch = Batch(work.out, work.runs())
     write_summary(batch.runs, work.out / f"summary.{table}")
@@ -95,17 +98,17 @@ def _told(work: _Work, table: str) -> Batch:
 
 
 class _Work:
-    """Tasks, and what came of them."""
+    """The tasks of a batch, and their outcomes."""
 
     def __init__(self, out: Path, tasks: Sequence[Task], listener: BatchListener, retries: int) -> None:
         self.out, self.tasks, self.listener, self.retries = out, tasks, listener, retries
         self.tries, self.failed = Counter[str](), dict[str, Outcome]()
         found = found_runs(out)
         self.todo = [task for task in tasks if task.id not in found]
-        self._tell_of(found)
+        self._note_others(found)
 
-    def _tell_of(self, found: Mapping[str, tuple[Path, Mapping[str, Any]]]) -> None:
-        """Say what of an earlier start is in the way of being misread."""
+    def _note_others(self, found: Mapping[str, tuple[Path, Mapping[str, Any]]]) -> None:
+        """Note runs of other tasks, or of another version, in the folder."""
         others, ours = found.keys() - {task.id for task in self.tasks}, [found[t.id][1] for t in self.tasks if t.id in found]
         if others:
             self.listener.note(f"{self.out}: {len(others)} of its runs are of other recordings, settings or seeds than now: they stay, and "
@@ -115,19 +118,19 @@ class _Work:
             self.listener.note(f"{self.out}: some of its runs were made by shadowpuppet {', '.join(sorted(old))}, not by this one; take a "
                                "new folder to make them again")
 
-    def all(self, crew: Crew) -> None:
-        """Do what is to be done."""
+    def all(self, pool: WorkerPool) -> None:
+        """Run all tasks that are to be done."""
         self.listener.begin(len(self.tasks), len(self.tasks) - len(self.todo))
         for task in self.todo:
-            crew.put(task)
+            pool.put(task)
         left = len(self.todo)
         while left:
-            task, outcome = crew.next()
+            task, outcome = pool.next()
             self.tries[task.id] += 1
             again = outcome["status"] != "done" and outcome["again"] and self.tries[task.id] <= self.retries
             self.listener.ended(task, outcome, again)
             if again:
-                crew.put(task)
+                pool.put(task)
                 continue
             left -= 1
             if outcome["status"] != "done":
@@ -141,7 +144,7 @@ class _Work:
                 write_whole(self.out / FAILURES / f"{task.folder}.txt", outcome["trace"])
 
     def runs(self) -> tuple[BatchRun, ...]:
-        """What there is of each task."""
+        """The run of each task, as far as there is one."""
         found = found_runs(self.out)
         return tuple(self._run(task, found) for task in self.tasks)
 
@@ -155,17 +158,17 @@ class _Work:
         return BatchRun(task, "failed", None, outcome["seconds"], tries, outcome["message"])
 
 
-def _crew(out: Path, scheduler: str | None, workers: int, threads: int, reuse: bool, listener: BatchListener) -> Crew:
+def _pool(out: Path, scheduler: str | None, workers: int, threads: int, reuse: bool, listener: BatchListener) -> WorkerPool:
     if scheduler is not None:
         from shadowpuppet.pipeline.batch.cluster import Cluster
 
         return Cluster(scheduler, out, f"{time.time():.6f}", reuse, listener)
-    return Processes(out, workers, threads, reuse, listener) if workers else Alone(out, reuse, listener)
+    return LocalProcesses(out, workers, threads, reuse, listener) if workers else InProcess(out, reuse, listener)
 
 
 @contextlib.contextmanager
 def _claimed(out: Path) -> Iterator[None]:
-    """A folder for this batch alone. Raises `ShadowPuppetError` for one that has other files in it, or another batch at work."""
+    """Lock the folder for this batch. Raises `ShadowPuppetError` where other files are in it, or another batch works there."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         names = sorted({path.name for path in out.iterdir()} - {RUNS, LOCK})
@@ -183,7 +186,7 @@ def _claimed(out: Path) -> Iterator[None]:
 
 
 def _lock(file: int, out: Path) -> None:
-    """Hold a file as long as it is open, where the system knows how."""
+    """Lock a file as long as it is open, where the system can."""
     try:
         import fcntl
     except ImportError:
@@ -197,13 +200,13 @@ def _lock(file: int, out: Path) -> None:
 
 
 def _clean(out: Path) -> None:
-    """Remove what is left of runs that were broken off."""
+    """Remove unfinished run folders."""
     for path in (out / RUNS).glob(f".*{PART}"):
         shutil.rmtree(path, ignore_errors=True)
 
 
 def _forget_failures(out: Path) -> None:
-    """Remove what an earlier start told of failures: they are begun anew."""
+    """Remove an earlier start's tracebacks."""
     with contextlib.suppress(OSError):
         for path in (out / FAILURES).glob("*.txt"):
             path.unlink()
@@ -211,7 +214,7 @@ def _forget_failures(out: Path) -> None:
 
 
 def _write_plan(out: Path, tasks: Sequence[Task], seeds: Sequence[int]) -> None:
-    """What was asked for at the last start, for people."""
+    """Write what this start was asked for, for people."""
     import tomli_w
 
     cases = {(task.case, str(task.varied)): {"case": task.case, "settings": for_toml(task.varied)} for task in tasks}

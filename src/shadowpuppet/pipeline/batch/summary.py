@@ -1,4 +1,4 @@
-"""What came of a batch: a row a run, as a table file."""
+"""The summary of a batch: a table with a row for each run."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class BatchRun:
     status: str
     """done, failed or missing."""
     folder: Path | None = None
-    """The run folder, which `read_run` reads; None where there is none."""
+    """The run folder; None where there is none."""
     seconds: float | None = None
-    """That it took."""
+    """Duration."""
     tries: int | None = None
-    """How often it was begun; None where that was in an earlier start."""
+    """Tries in this start; None for a run of an earlier start."""
     message: str = ""
     """Why it failed."""
     warnings: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ class BatchRun:
     """Its metrics.json."""
 
     def row(self) -> dict[str, Any]:
-        """By column: recording, case, seed, settings that vary, status, what came of it, and all metrics, dotted."""
+        """Values by column: recording, case, seed, settings that vary, status and outcome, and all metrics by dotted name."""
         task = self.task
         varied = {name: json.dumps(value) if isinstance(value, list) else value for name, value in task.varied.items()}
         end = {"status": self.status, "tries": self.tries, "seconds": self.seconds, "message": self.message,
@@ -49,21 +49,21 @@ class BatchRun:
 
 
 def found_runs(out: Path) -> dict[str, tuple[Path, dict[str, Any]]]:
-    """Whole runs in a batch's folder by the task they are of: folder, and what it says of itself."""
+    """Folder and mark (`read_mark`) of the complete runs in a batch's folder, by task id."""
     folders = sorted(path for path in (out / RUNS).iterdir() if path.is_dir() and not path.name.startswith("."))
     marks = [(path, read_mark(path)) for path in folders]
     return {mark["id"]: (path, mark) for path, mark in marks if mark is not None}
 
 
 def done_run(task: Task, folder: Path, mark: Mapping[str, Any], tries: int | None) -> BatchRun:
-    """A run that is whole, as its folder tells it."""
+    """The run of a complete folder."""
     seconds, said = mark.get("seconds"), mark.get("warnings")
     return BatchRun(task, "done", folder, seconds if isinstance(seconds, (int, float)) else None, tries,
                     warnings=tuple(map(str, said)) if isinstance(said, list) else (), metrics=_metrics(folder))
 
 
 def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
-    """The rows as .csv or .parquet. Raises `ShadowPuppetError` where that cannot be written."""
+    """Write the rows as .csv or .parquet. Raises `ShadowPuppetError` where that fails."""
     rows = [run.row() for run in runs]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     if path.suffix == ".parquet":
@@ -73,7 +73,7 @@ def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
 
 
 def check_table(table: str) -> None:
-    """Raise `ShadowPuppetError` where a summary cannot be written so: before hours of work."""
+    """Raise `ShadowPuppetError` where a summary cannot have this format: before hours of work."""
     if table not in TABLES:
         raise ShadowPuppetError(f"table: found {table!r}, expected one of {', '.join(TABLES)}")
     if table == "parquet" and find_spec("pyarrow") is None:
@@ -81,7 +81,7 @@ def check_table(table: str) -> None:
 
 
 def _column(rows: Sequence[Mapping[str, Any]], name: str) -> list[Any]:
-    """A column of one kind of values: numbers of two kinds as the wider, else text."""
+    """A column of values of one type, as Parquet needs: floats for integers and floats, else text."""
     values = [row.get(name) for row in rows]
     kinds = {type(value) for value in values if value is not None}
     if len(kinds) < 2:

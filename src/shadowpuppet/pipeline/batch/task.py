@@ -1,4 +1,4 @@
-"""One run of a batch, as a worker does it: a folder that is whole or not there."""
+"""One run of a batch: its folder is complete or does not exist."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 
 MARK, PART, PLAN, RUNS = "task.json", ".part", "batch.toml", "runs"
-"""The file that says which task a run folder is of, written last; the end of the name of one that grows; what makes a folder a batch's;
-where in it the runs are."""
+"""In a run folder: the file with its task's id, written last. In a batch's folder: the ending of unfinished run folders, the file that
+every batch has, and the folder of the runs."""
 PERMANENT = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EEXIST, errno.EINVAL, errno.ENAMETOOLONG}
-"""What a system refuses and will refuse again."""
+"""Errors of the system that another try would meet again."""
 
 
 def do(task: Mapping[str, Any], out: str | Path, repeats: SilhouetteCache | None = None,
        listener: Listener | None = None) -> dict[str, Any]:
-    """Do one task (`Task.wire`) into its folder in `out`, unless it is done; what came of it, plain values.
+    """Run a task (`Task.wire`) into its folder in `out`, unless that is complete. Returns the outcome as plain values.
 
-    `status` done or failed, `seconds`, `message`: why it failed, in a sentence; `again`: whether another try may do; `trace`: of a bug.
-    Nothing is left of a run that failed. `KeyboardInterrupt` goes on.
+    `status`: done or failed; `seconds`; of a failure `message`, a sentence, `again`, whether a further try may succeed, `trace`, of a bug.
+    Nothing is left of a failed run. `KeyboardInterrupt` passes through.
     """
     began = time.perf_counter()
     try:
@@ -43,8 +43,7 @@ def do(task: Mapping[str, Any], out: str | Path, repeats: SilhouetteCache | None
     except Exception as error:
         if repeats is not None:
             repeats.forget()
-        told = _told(error)
-        return {"status": "failed", "seconds": round(time.perf_counter() - began, 3), **told}
+        return {"status": "failed", "seconds": round(time.perf_counter() - began, 3), **_failure(error)}
     return {"status": "done", "seconds": round(time.perf_counter() - began, 3)}
 
 
@@ -70,7 +69,7 @@ def _run(task: Mapping[str, Any], out: Path, repeats: SilhouetteCache | None, li
 
 
 def _put(part: Path, folder: Path) -> None:
-    """Give a whole run its name; where another machine was first, its run stays, which is the same."""
+    """Give a complete run its name; where another machine was first, its run, which is the same, stays."""
     with contextlib.suppress(OSError):
         os.rename(part, folder)
         return
@@ -80,7 +79,7 @@ def _put(part: Path, folder: Path) -> None:
 
 
 def read_mark(folder: Path) -> dict[str, Any] | None:
-    """What a run folder says of its task; None where it is not whole."""
+    """The file `MARK` of a run folder; None where the run is not complete."""
     try:
         mark = json.loads(read_text(folder / MARK)) if (folder / MARK).exists() else None
     except (FormatError, ValueError, RecursionError):
@@ -88,8 +87,8 @@ def read_mark(folder: Path) -> dict[str, Any] | None:
     return mark if isinstance(mark, dict) and isinstance(mark.get("id"), str) else None
 
 
-def _told(error: Exception) -> dict[str, Any]:
-    """Why a task failed, and whether it may not fail again."""
+def _failure(error: Exception) -> dict[str, Any]:
+    """The outcome's `message`, `again` and `trace` for an error."""
     system = _system(error)
     if isinstance(error, ShadowPuppetError):
         return {"message": str(error), "again": system is not None and system.errno not in PERMANENT}
@@ -100,7 +99,7 @@ def _told(error: Exception) -> dict[str, Any]:
 
 
 def _system(error: BaseException | None) -> OSError | None:
-    """The system's own error behind one, where there is one."""
+    """The `OSError` that caused an error; None where there is none."""
     while error is not None and not isinstance(error, OSError):
         error = error.__cause__ or error.__context__
     return error

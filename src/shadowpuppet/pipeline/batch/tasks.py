@@ -1,4 +1,4 @@
-"""What a batch is to run: a task for every recording, choice of settings and seed, known by a hash of all that it depends on."""
+"""Tasks of a batch: one for every recording, choice of settings and seed, identified by a hash of all that it depends on."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.io.calibration.calibration_files import read_toml
 from shadowpuppet.io.files.plain import plain
-from shadowpuppet.pipeline.batch.grid import MOST, Case
+from shadowpuppet.pipeline.batch.grid import MAX_RUNS, Case
 from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
 from shadowpuppet.pipeline.silhouette_cache import film_of
 
@@ -22,54 +22,54 @@ Track = Callable[..., Any]
 """Makes a run folder, as `pipeline.track_recording` does: of a recording, a folder, `Options`, a `Listener` and a `SilhouetteCache`
 or None."""
 TRACK = "shadowpuppet.pipeline.track:track_recording"
-"""What makes a run unless something else is to."""
-PARTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
-"""What of a recording's folder a run depends on; other files may come and go."""
-ENDS = 65536
-"""Bytes at a file's start and end that tell it from others of its size: films are too long to be read for that."""
+"""The default `Track`, by name."""
+RUN_INPUTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
+"""Parts of a recording's folder that a run depends on."""
+END_BYTES = 65536
+"""Bytes hashed at a file's start and end: films are too long to be read whole."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One run; plain values, so that it can be sent to a worker."""
+    """One run, in plain values that can be sent to a worker."""
 
     id: str
     """Hash of the recording's name and content, the settings and the seed."""
     recording: str
-    """Its whole path."""
+    """Its absolute path."""
     name: str
-    """Of the recording: its folder's, with those above it where two are called the same."""
+    """Name of the recording's folder, with folders above it where two have the same name."""
     case: str
     seed: int
     settings: dict[str, Any]
-    """All of them, plain values, with the seed."""
+    """All settings, with the seed."""
     varied: dict[str, Any]
-    """Those that differ from task to task, by dotted name."""
+    """Settings that differ between tasks, by dotted name."""
     film: str
-    """Equal for tasks whose silhouettes are."""
+    """Hash that tasks with the same silhouettes share."""
 
     choice: str
-    """Case and values of the grid, in words; empty where nothing varies."""
+    """Label of case and grid values; empty where nothing varies."""
     label: str
-    """In words: recording, case, values of the grid, seed."""
+    """Recording, case, grid values and seed, for people."""
     folder: str
-    """Name of the run's folder: the label, and the id, so that it is one of its own."""
+    """Name of the run's folder: label and id."""
     track: str
-    """What makes the run, `module:function`."""
+    """Name of the `Track` function, `module:function`."""
 
     def wire(self) -> dict[str, Any]:
-        """For JSON."""
+        """The fields, for JSON."""
         return asdict(self)
 
 
 def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: Sequence[int], track: Track | None = None) -> list[Task]:
     """A task for each recording, case and seed, in this order. Raises `SettingsError` where two would be the same run, or where workers
-    could not find `track` by its name."""
+    cannot import `track`."""
     if not recordings:
         raise SettingsError("recordings: found none, expected one or more")
-    if len(recordings) * len(cases) * len(seeds) > MOST:
+    if len(recordings) * len(cases) * len(seeds) > MAX_RUNS:
         raise SettingsError(f"batch: found {len(recordings)} recordings x {len(cases)} choices of settings x {len(seeds)} seeds, "
-                            f"expected at most {MOST} runs")
+                            f"expected at most {MAX_RUNS} runs")
     paths = [Path(recording).resolve() for recording in recordings]
     for n, path in enumerate(paths):
         if path in paths[:n]:
@@ -84,7 +84,7 @@ def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: S
 
 
 def name_of(track: Track | None) -> str:
-    """The `module:function` by which workers find a function; None: `TRACK`. Raises `SettingsError` where they could not."""
+    """The `module:function` by which workers import a function; `TRACK` for None. Raises `SettingsError` where they cannot."""
     if track is None:
         return TRACK
     module, name = getattr(track, "__module__", "__main__"), getattr(track, "__qualname__", "")
@@ -104,7 +104,7 @@ def named(name: str) -> Track:
 
 
 class _Chosen:
-    """A case's settings, complete."""
+    """A case with all of its settings."""
 
     def __init__(self, case: Case, varied: Sequence[str], track: str) -> None:
         self.case, self.track = case, track
@@ -134,27 +134,27 @@ def _check_different(chosen: Sequence[_Chosen]) -> None:
 def fingerprint(path: Path) -> str:
     """A hash of a file, or of the parts of a folder that a run depends on: names, sizes, and each file's first and last bytes.
 
-    It stays the same where a recording is moved or copied, and is that of nothing where there is none.
+    It is the same after a recording was moved or copied; a missing one has the hash of nothing.
     """
     digest = hashlib.sha256()
     for name, file in sorted(set(_files(path))):
         try:
             digest.update(f"{name}\0{file.stat().st_size}\0".encode())
             with file.open("rb") as data:
-                digest.update(data.read(ENDS))
-                data.seek(max(0, file.stat().st_size - ENDS))
-                digest.update(data.read(ENDS))
+                digest.update(data.read(END_BYTES))
+                data.seek(max(0, file.stat().st_size - END_BYTES))
+                digest.update(data.read(END_BYTES))
         except OSError:
             digest.update(b"unreadable")
     return digest.hexdigest()
 
 
 def _files(path: Path) -> Iterator[tuple[str, Path]]:
-    """Files by the names that do not change when all is moved."""
+    """Files, each with a name that does not change when the recording is moved."""
     if path.is_file():
         yield "", path
     elif path.is_dir():
-        parts = [part for pattern in PARTS for part in path.glob(pattern)]
+        parts = [part for pattern in RUN_INPUTS for part in path.glob(pattern)]
         for part in [*parts, *_elsewhere(path)] or [path]:  # a folder of pictures is one part
             inside = part.rglob("*") if part.is_dir() else [part]
             yield from ((f"{part.name}/{file.relative_to(part)}", file) for file in inside if file.is_file())
@@ -171,7 +171,7 @@ def _elsewhere(folder: Path) -> Iterator[Path]:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Short names of recordings, with folders above them as far as two are called the same."""
+    """Short names of recordings, with folders above them as far as needed to tell them apart."""
     for depth in range(1, max(len(path.parts) for path in paths) + 1):
         names = ["-".join(path.parts[-depth:]) for path in paths]
         if len(set(names)) == len(names):

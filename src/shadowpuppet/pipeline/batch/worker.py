@@ -1,4 +1,4 @@
-"""A worker process: `python -m shadowpuppet.pipeline.batch.worker OUT`. Tasks come as lines of JSON, and what comes of them goes so."""
+"""A worker process: `python -P -m shadowpuppet.pipeline.batch.worker OUT`. Tasks, progress and outcomes are lines of JSON."""
 
 from __future__ import annotations
 
@@ -9,63 +9,58 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
-from typing import Any, TextIO
+from typing import Any
+
+from shadowpuppet.pipeline.batch.task import do
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
+from shadowpuppet.threads import limit_threads
 
 PACE = 0.25
 """Seconds between two messages about frames."""
 
 
-def main() -> None:
-    """Work until the standard input ends, as it does when whoever started this is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C goes to all; who started this ends it
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever else prints is not to be taken for a message
-    tasks: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(sys.stdin, tasks), daemon=True).start()
-    _work(sys.argv[1], tasks.get, lambda **said: _say(out, said))
+class _Pipe(Listener):
+    """Writes messages to the pool, the progress of runs among them; ends this process where nobody reads them any more."""
+
+    def __init__(self) -> None:
+        self.out, self.total, self.last = os.fdopen(os.dup(1), "w", encoding="utf-8"), None, 0.0
+        os.dup2(2, 1)  # other output must not be taken for messages
+
+    def send(self, **message: Any) -> None:
+        try:
+            self.out.write(json.dumps(message) + "\n")
+            self.out.flush()
+        except OSError:
+            os._exit(0)
+
+    def begin(self, what: str, total: int | None = None) -> None:
+        self.total = total
+        self.send(doing=what, frames=0, total=total)
+
+    def advance(self, frames: int) -> None:
+        if (now := time.monotonic()) - self.last > PACE:
+            self.last = now
+            self.send(doing="tracking", frames=frames, total=self.total)
 
 
-def _listen(lines: TextIO, tasks: queue.SimpleQueue[dict[str, Any]]) -> None:
-    for line in lines:
+def _read(tasks: queue.SimpleQueue[dict[str, Any]]) -> None:
+    """Read tasks; when standard input ends, as it does with the pool's process, end at once, also in the middle of a task."""
+    for line in sys.stdin:
         tasks.put(json.loads(line))
-    os._exit(0)  # at once, in the middle of a task
+    os._exit(0)
 
 
-def _say(out: TextIO, said: dict[str, Any]) -> None:
-    try:
-        out.write(json.dumps(said) + "\n")
-        out.flush()
-    except OSError:
-        os._exit(0)
-
-
-def _work(folder: str, get: Callable[[], dict[str, Any]], say: Callable[..., None]) -> None:
-    from shadowpuppet.pipeline.batch.task import do
-    from shadowpuppet.pipeline.progress import Listener
-    from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-    from shadowpuppet.threads import limit_threads
-
-    class Tell(Listener):
-        """Sends what a run says, now and then."""
-
-        total, last = None, 0.0
-
-        def begin(self, what: str, total: int | None = None) -> None:
-            self.total = total
-            say(doing=what, frames=0, total=total)
-
-        def advance(self, frames: int) -> None:
-            if (now := time.monotonic()) - self.last > PACE:
-                self.last = now
-                say(doing="tracking", frames=frames, total=self.total)
-
+def main() -> None:
+    """Run tasks until standard input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all processes; the pool ends this one
+    pipe, tasks, repeats = _Pipe(), queue.SimpleQueue[dict[str, Any]](), SilhouetteCache()
+    threading.Thread(target=_read, args=(tasks,), daemon=True).start()
     limit_threads()
-    repeats = SilhouetteCache()
-    say(ready=os.getpid())
+    pipe.send(ready=True)
     while True:
-        task = get()
-        say(outcome=do(task, folder, repeats if task["reuse"] else None, Tell()))
+        task = tasks.get()
+        pipe.send(outcome=do(task, sys.argv[1], repeats if task["reuse"] else None, pipe))
 
 
 if __name__ == "__main__":

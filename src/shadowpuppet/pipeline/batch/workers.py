@@ -1,234 +1,217 @@
-"""Who does the tasks on this machine: worker processes, each begun afresh, which stay for the next task; or this process itself."""
+"""What runs the tasks of a batch on this machine: worker processes that stay for the next task, or this process itself."""
 
 from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
+from abc import ABC, abstractmethod
 from collections import deque
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-from shadowpuppet.threads import POOLS
+from shadowpuppet.threads import POOLS, child_environment
 
 Outcome = dict[str, Any]
-"""What came of a task, as `batch.task.do` tells it."""
+"""What `batch.task.do` returned for a task."""
 GRACE = 2.0
-"""Seconds that a worker which is told to end is waited for."""
+"""Seconds that a terminated worker may take to end."""
 
 
 class BatchListener:
-    """Is told how a batch goes, and does nothing: derive from it."""
+    """Progress of a batch. Every method does nothing: override those of interest."""
 
     def begin(self, total: int, before: int) -> None:
-        """Of `total` runs `before` were done when it began."""
+        """The batch begins: `before` of its `total` runs were done by an earlier start."""
 
     def working(self, worker: int, task: Task, doing: str, frames: int, total: int | None) -> None:
-        """A worker is at a task: `looking` or `tracking`, so many of its frames."""
+        """Worker number `worker` is `looking` or `tracking`: `frames` of `total`."""
 
     def resting(self, worker: int) -> None:
-        """A worker has nothing to do any more."""
+        """A worker has no task."""
 
     def ended(self, task: Task, outcome: Outcome, again: bool) -> None:
-        """A task is done, or failed; `again`: it is tried once more."""
+        """A task is done or failed; `again`: it will be tried again."""
 
     def note(self, message: str) -> None:
-        """Something that is to be known."""
+        """A message for the user."""
 
 
-class Crew(Protocol):
-    """Does tasks: `with crew: crew.put(task); task, outcome = crew.next()`."""
+class WorkerPool(ABC):
+    """Runs tasks: `with pool: pool.put(task); task, outcome = pool.next()`."""
 
     def __enter__(self) -> Self:
-        """Be ready. Raises a `ShadowPuppetError` where that cannot be."""
-        ...
+        """Make ready. Raises `ShadowPuppetError` where that fails."""
+        return self
 
-    def __exit__(self, *_: object) -> None:
-        """Stop at once, whatever is being done."""
-        ...
+    def __exit__(self, *_: object) -> None:  # noqa: B027 - there may be nothing to do
+        """Stop at once, also in the middle of tasks."""
 
+    @abstractmethod
     def put(self, task: Task) -> None:
-        """One more to be done."""
-        ...
+        """Add a task."""
 
+    @abstractmethod
     def next(self) -> tuple[Task, Outcome]:
-        """Wait for the next that is done or failed."""
-        ...
+        """Wait for the next task that is done or failed."""
 
 
-class Alone:
-    """Does tasks one after another in this process."""
+class InProcess(WorkerPool):
+    """Runs tasks one after another in this process."""
 
     def __init__(self, out: Path, reuse: bool, listener: BatchListener) -> None:
-        """`out`: the batch's folder; `reuse`: keep silhouettes for the next task."""
+        """`out`: the batch's folder; `reuse`: keep a film's silhouettes for the next task."""
         self._out, self._repeats, self._listener = out, SilhouetteCache() if reuse else None, listener
         self._waiting: deque[Task] = deque()
 
-    def __enter__(self) -> Self:
-        """Nothing is to be done."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Nothing is to be done."""
-
     def put(self, task: Task) -> None:
-        """One more."""
+        """Add a task."""
         self._waiting.append(task)
 
     def next(self) -> tuple[Task, Outcome]:
-        """Do one."""
+        """Run the next task."""
         from shadowpuppet.pipeline.batch.task import do
 
         task = self._waiting.popleft()
-        return task, do(task.wire(), self._out, self._repeats, _Told(self._listener, task))
+        return task, do(task.wire(), self._out, self._repeats, _TaskListener(self._listener, task))
 
 
-class _Told(Listener):
-    """Tells a batch's listener what the run's is told."""
+class _TaskListener(Listener):
+    """Passes a run's progress on to the batch's listener."""
 
     def __init__(self, listener: BatchListener, task: Task) -> None:
-        self._tell, self._task, self._total = listener.working, task, None
+        self._working, self._task, self._total = listener.working, task, None
 
     def begin(self, what: str, total: int | None = None) -> None:
         self._total = total
-        self._tell(0, self._task, what, 0, total)
+        self._working(0, self._task, what, 0, total)
 
     def advance(self, frames: int) -> None:
-        self._tell(0, self._task, "tracking", frames, self._total)
+        self._working(0, self._task, "tracking", frames, self._total)
 
 
 class _Worker:
-    """A process, and what it is at."""
+    """A worker process (`batch.worker`) and the task that it has. A thread reads its messages into the pool's queue, None at its end."""
 
-    def __init__(self, number: int, out: Path, threads: int, said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
-        self.number, self.task, self.film = number, None, ""
+    def __init__(self, number: int, out: Path, threads: int, messages: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
+        self.number, self.film = number, ""
+        self.task: Task | None = None
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `stop`
-        path = os.pathsep.join([str(Path(__file__).parents[3]), *(entry or os.getcwd() for entry in sys.path)])
-        environment = os.environ | dict.fromkeys(POOLS, str(threads)) | {"PYTHONPATH": path, "PYTHONUTF8": "1"}
-        self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.pipeline.batch.worker", str(out)], env=environment,
-                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors, text=True, encoding="utf-8")
-        threading.Thread(target=self._listen, args=(said,), daemon=True).start()
-
-    task: Task | None
-    film: str
-    """The last task's, whose silhouettes it keeps."""
+        self.process = subprocess.Popen([sys.executable, "-P", "-m", "shadowpuppet.pipeline.batch.worker", str(out)], text=True,
+                                        encoding="utf-8", env=child_environment(dict.fromkeys(POOLS, str(threads))),
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors)
+        threading.Thread(target=self._listen, args=(messages,), daemon=True).start()
 
     def give(self, task: Task, reuse: bool) -> None:
-        """A task to be done; where the process is gone, its end is told as that of any."""
+        """Send a task; where the process has ended, its end arrives as a message."""
         self.task, self.film = task, task.film
         assert self.process.stdin is not None
         with contextlib.suppress(OSError):
             self.process.stdin.write(json.dumps(task.wire() | {"reuse": reuse}) + "\n")
             self.process.stdin.flush()
 
-    def end(self) -> str:
-        """Why it ended, in words."""
-        code = self.process.wait()
-        if code < 0:
-            with contextlib.suppress(ValueError):
-                name = signal.Signals(-code).name
-                guess = ", as by a machine that ran out of memory" if name == "SIGKILL" else ""
-                return f"its worker was killed ({name}{guess})"
-        self.errors.seek(0)
-        lines = self.errors.read()[-2000:].decode("utf-8", "replace").strip().splitlines()
-        return f"its worker ended with code {code}" + (f": {lines[-1].strip()}" if lines else "")
-
-    def stop(self) -> None:
-        """Close what is open; the process has ended, or is about to."""
-        for stream in (self.process.stdin, self.errors):
-            with contextlib.suppress(OSError, ValueError):
-                stream.close()  # pyright: ignore[reportOptionalMemberAccess]
+    def stop(self) -> str:
+        """Wait for the end of a process that was terminated, or has ended, and release what is open; the reason in words."""
+        assert self.process.stdin is not None
+        with contextlib.suppress(OSError):
+            self.process.stdin.close()
         try:
-            self.process.wait(GRACE)
+            code = self.process.wait(GRACE)
         except subprocess.TimeoutExpired:
             self.process.kill()
-            self.process.wait()
+            code = self.process.wait()
+        with self.errors as file:
+            file.seek(0)
+            lines = file.read()[-2000:].decode("utf-8", "replace").strip().splitlines()
+        with contextlib.suppress(ValueError):  # no known signal
+            name = signal.Signals(-code).name
+            return f"its worker was killed ({name}{', as by a machine that ran out of memory' if name == 'SIGKILL' else ''})"
+        return f"its worker ended with code {code}" + (f": {lines[-1].strip()}" if lines else "")
 
-    def _listen(self, said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
+    def _listen(self, messages: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
         assert self.process.stdout is not None
         with self.process.stdout as lines:
             for line in lines:
                 with contextlib.suppress(ValueError):  # half a line of one that was killed
-                    said.put((self, json.loads(line)))
-        said.put((self, None))
+                    messages.put((self, json.loads(line)))
+        messages.put((self, None))
 
 
-class Processes:
-    """Worker processes on this machine. A task goes to a worker that has its film's silhouettes, where one does."""
+class LocalProcesses(WorkerPool):
+    """Worker processes on this machine. A worker gets tasks of the film whose silhouettes it has, as long as there are any.
+
+    No library's pool: loky's, which needs no extra, starts helper processes that import modules from the user's current folder, loses what
+    a process wrote before it failed to start, and ends all workers with the one that was killed, unless each worker is a pool.
+    """
 
     def __init__(self, out: Path, workers: int, threads: int, reuse: bool, listener: BatchListener) -> None:
-        """`threads`: that each may use; the others as in `Alone`."""
-        self._count = workers
-        self._out, self._threads, self._reuse, self._listener = out, threads, reuse, listener
-        self._said: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]] = queue.SimpleQueue()
+        """`workers`: processes at most; `threads`: of each; the others as in `InProcess`."""
+        self._count, self._out, self._threads, self._reuse, self._listener = workers, out, threads, reuse, listener
+        self._messages: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
         self._waiting: dict[str, deque[Task]] = {}
-        self._begun = False
-
-    def __enter__(self) -> Self:
-        """Nobody is hired before there is a task."""
-        return self
+        """By film."""
+        self._ready = False
+        """Whether any worker has begun."""
 
     def __exit__(self, *_: object) -> None:
-        """Stop all."""
+        """Stop all workers."""
         for worker in self._workers:
             worker.process.terminate()
         for worker in self._workers:
             worker.stop()
 
     def put(self, task: Task) -> None:
-        """One more, after those of its film."""
+        """Add a task, after those of its film."""
         self._waiting.setdefault(task.film, deque()).append(task)
 
     def next(self) -> tuple[Task, Outcome]:
-        """Wait for one."""
+        """Wait for a task's outcome, or for the end of its worker."""
         while True:
             self._hand_out()
             try:
-                worker, said = self._said.get(timeout=1.0)  # a wait without end cannot be interrupted everywhere
+                worker, message = self._messages.get(timeout=1.0)  # a wait without end cannot be interrupted everywhere
             except queue.Empty:
                 continue
             task = worker.task
-            if said is None:
+            if message is None:
                 self._workers.remove(worker)
-                why = worker.end()
-                worker.stop()
-                if not self._begun:
+                why = worker.stop()
+                if not self._ready:
                     raise ShadowPuppetError(f"batch: no worker can be started: {why}")
                 if task is not None:
                     return task, {"status": "failed", "message": why, "again": True, "seconds": None}
-            elif "ready" in said:
-                self._begun = True
-            elif task is not None and "outcome" in said:
+            elif "ready" in message:
+                self._ready = True
+            elif task is not None and "outcome" in message:
                 worker.task = None
                 self._listener.resting(worker.number)
-                return task, said["outcome"]
+                return task, message["outcome"]
             elif task is not None:
-                self._listener.working(worker.number, task, said["doing"], said["frames"], said["total"])
+                self._listener.working(worker.number, task, **message)
 
     def _hand_out(self) -> None:
-        """Give every idle worker a task, and hire where there are more tasks than workers."""
-        for worker in self._workers:
-            if worker.task is None and any(self._waiting.values()):
-                worker.give(self._choose(worker.film), self._reuse)
-        while len(self._workers) < self._count and any(self._waiting.values()):
-            numbers = {worker.number for worker in self._workers}
-            worker = _Worker(min(n for n in range(self._count) if n not in numbers), self._out, self._threads, self._said)
-            self._workers.append(worker)
-            worker.give(self._choose(""), self._reuse)
+        """Give each idle worker a task, and start workers while there are more tasks."""
+        numbers = sorted(set(range(self._count)) - {worker.number for worker in self._workers})
+        for worker in [one for one in self._workers if one.task is None] + numbers:
+            if not any(self._waiting.values()):
+                return
+            if isinstance(worker, int):
+                worker = _Worker(worker, self._out, self._threads, self._messages)
+                self._workers.append(worker)
+            worker.give(self._choose(worker.film), self._reuse)
 
     def _choose(self, film: str) -> Task:
-        """The next of a worker's film; else of one that no worker has; else of that with most left."""
+        """The next task of `film`; else of a film that no worker has; else of the film with most tasks left."""
         self._waiting = {name: tasks for name, tasks in self._waiting.items() if tasks}
         taken = {worker.film for worker in self._workers if worker.task is not None}
         free = [name for name in self._waiting if name not in taken]

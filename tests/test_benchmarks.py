@@ -1,0 +1,46 @@
+"""Every script of benchmarks/ runs in its smallest form, and every script of docs/ that makes pictures can be imported."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SCRIPTS = [path for path in sorted((ROOT / "benchmarks").glob("*.py")) if "def main(" in path.read_text("utf-8")]
+PICTURES = sorted({*(ROOT / "docs").glob("make_*.py"), *(ROOT / "docs").glob("*picture*.py")})
+
+
+def changed(folder: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_benchmark_runs_in_its_smallest_form(script, tmp_path):
+    before = changed(ROOT / "docs"), changed(ROOT / "benchmarks")
+    path = os.pathsep.join([str(ROOT / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run([sys.executable, script, "--smallest", tmp_path / "out"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": path},
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+    if done.stdout.startswith("skipped: "):
+        pytest.skip(done.stdout.strip())
+    assert done.stdout.strip()
+    assert (changed(ROOT / "docs"), changed(ROOT / "benchmarks")) == before
+    assert {path.name for path in tmp_path.iterdir()} <= {"out"}
+
+
+@pytest.mark.parametrize("script", PICTURES, ids=lambda path: path.stem)
+def test_a_script_of_the_documentation_can_be_imported(script):
+    spec = importlib.util.spec_from_file_location(f"docs_{script.stem}", script)
+    assert spec is not None
+    assert spec.loader is not None
+    try:
+        spec.loader.exec_module(importlib.util.module_from_spec(spec))
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith("shadowpuppet"):
+            raise
+        pytest.skip(f"{error.name} is not here")
