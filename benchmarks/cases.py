@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.metrics import UPPER_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.pipeline.footage import Footage, Mask, Sample, Silhouettes
-from shadowpuppet.pipeline.look import prepare
+from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.pipeline.person import find
-from shadowpuppet.tracking.monocular.initialization import PersonEstimate
+from shadowpuppet.pipeline.person import fit_monocular
+from shadowpuppet.pipeline.rig import Rig, open_rig
+from shadowpuppet.pipeline.survey import survey_camera
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 ALIGNED = [name.replace("hand", "wrist") for name in UPPER_JOINTS]
@@ -32,9 +34,7 @@ class Case:
     """A recording with known truth, read and segmented once."""
 
     name: str
-    footage: Footage
-    sample: Sample
-    seen: Silhouettes
+    survey: Survey
     """For the fit of the person."""
     times: Array
     masks: list[Mask]
@@ -45,24 +45,25 @@ class Case:
     def read(cls, path: Path, *, masks: bool = False, references: bool = True, silhouette: dict[str, Any] | None = None) -> Case:
         """masks: the ready ones instead of segmentation; silhouette: settings of the segmentation of the masks that are tracked."""
         options = make_options({"masks": masks, "silhouette": silhouette or {}})
-        prepared = prepare(str(path), options, np.random.default_rng(0))
-        footage = prepared.footage
+        survey = survey_camera(open_rig(path, options), options)
+        footage = survey.rig.footage[0]
         if footage.recording.truth is None:
             raise SystemExit(f"{path}: no truth")
         if not references:
-            footage = replace(footage, recording=replace(footage.recording, references=()))
-        shots = list(footage.shots(masks))
-        times, tracked = np.array([shot.time for shot in shots]), [prepared.silhouettes(shot) for shot in shots]
-        return cls(path.name, footage, prepared.sample, prepared.clear, times, tracked, read_joints(footage.recording.truth))
+            recording = replace(footage.recording, references=())
+            survey = replace(survey, rig=Rig(recording, (replace(footage, recording=recording),)))
+        frames = [(frame.time, survey.silhouettes[0](frame)) for frame in footage.frames(masks)]
+        times, tracked = np.array([time for time, _ in frames]), [mask for _, mask in frames]
+        return cls(path.name, survey, times, tracked, read_joints(footage.recording.truth))
 
     @property
     def camera(self) -> Camera:
         """The recording's one camera."""
-        return self.footage.camera
+        return self.survey.rig.cameras[0]
 
     def person(self, options: Options, rng: np.random.Generator) -> PersonEstimate:
         """Sizes and place, as `shadowpuppet track` finds them."""
-        return find(self.footage, self.sample, self.seen, options, rng).fit.guess
+        return fit_monocular(rng, self.survey, options).fit.guess
 
     def track(self, person: PersonEstimate, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
         """Run a tracker and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a frame."""

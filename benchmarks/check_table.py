@@ -19,9 +19,9 @@ import smallest
 
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.pipeline.check_calibration import CalibrationCheck, SilhouetteSets, gather_silhouettes, judge_calibration
-from shadowpuppet.pipeline.footage_rig import Rig, open_rig
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.rig import Rig, open_rig
 
 MARGIN = 12
 """Sets at both ends that films are shifted into."""

@@ -31,13 +31,11 @@ from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.pipeline.footage_rig import follow, open_rig
-from shadowpuppet.pipeline.look_rig import look_at_rig
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.person_rig import prepare_puppet
-from shadowpuppet.pipeline.track_rig import Puppet, training_of
+from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
+from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
+from shadowpuppet.pipeline.survey import survey_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
-from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 ROWS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -76,10 +74,10 @@ class Case:
     def __init__(self, path: Path, masks: bool, frames: int) -> None:
         """`masks`: the exact ones; `frames`: so many at most."""
         self.rig = open_rig(path, make_options({"masks": masks}))
-        self.prepared = look_at_rig(self.rig, make_options({"masks": masks}))
+        self.survey = survey_rig(self.rig, make_options({"masks": masks}))
         truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
         self.times, self.bits = [], []
-        for seen in follow(self.rig, self.prepared.silhouettes, ready=masks):
+        for seen in synchronized_frames(self.rig, self.survey.silhouettes, ready=masks):
             self.times.append(seen.time)
             self.bits.append([None if mask is None else (np.packbits(mask), mask.shape) for mask in seen.masks])
             if len(self.times) == frames:
@@ -87,7 +85,7 @@ class Case:
         known = truth.times <= self.times[-1] + 1e-6
         self.truth = JointTable(truth.times[known], truth.names, truth.positions[known])
         self.hulls: dict[str, tuple[list[SurfacePoints], float]] = {}
-        self.puppets: dict[str, Puppet] = {}
+        self.subjects: dict[str, MultiviewSubject] = {}
 
     def masks(self) -> list[list[Mask | None]]:
         """Those of every frame, one after the other."""
@@ -101,11 +99,10 @@ class Case:
         options = make_options({"preset": preset, "multiview": values})
         settings = options.multiview
         key = json.dumps([settings.body, training, seed])
-        if key not in self.puppets:
-            given = training_of(self.rig) if training else None
-            self.puppets[key] = prepare_puppet(np.random.default_rng([seed, 0]), self.rig, self.prepared.opening, options, given)
-        known = self.puppets[key].tracker
-        assert isinstance(known, MultiviewTracker)
+        if key not in self.subjects:
+            rig = self.rig if training else replace(self.rig, recording=replace(self.rig.recording, training=None))
+            self.subjects[key] = fit_multiview(np.random.default_rng([seed, 0]), replace(self.survey, rig=rig), options)
+        known = self.subjects[key].tracker
         tracker = replace(known, settings=settings, prior=known.prior if settings.method == "hybrid" else None)
         masks = self.masks()
         if (at := repr(settings.hull)) not in self.hulls:

@@ -10,6 +10,7 @@ from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import stem, told
 from shadowpuppet.camera.drawing import in_colour, write_text
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.pipeline.footage import take_sample
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.video import Image
 
@@ -41,10 +42,10 @@ def make(request: Request) -> Outcome:
 
 def plain(case: Case, image: Image) -> Mask | None:
     """A frame's mask by eq. 1 alone; None where there is no film of the empty scene to learn deviations from."""
-    footage = case.prepared.footage
+    footage = case.footage
     if footage.view.background is None:
         return None
-    empty, film = footage.pictures(footage.view.background, "the empty scene"), [shot.image for shot in case.prepared.sample.shots]
+    empty, film = footage.pictures(footage.view.background, "the empty scene"), [frame.image for frame in take_sample(footage).frames]
     return learn_background(empty, SilhouetteSettings(method="averaging"), film=film).raw(image)
 
 

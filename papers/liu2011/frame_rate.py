@@ -68,13 +68,13 @@ def chain(case: Case) -> dict[str, Contender]:
 
 def decode(case: Case) -> None:
     """Read some frames of the film."""
-    for _ in zip(range(FRAMES), case.prepared.footage.film()):
+    for _ in zip(range(FRAMES), case.footage.film()):
         pass
 
 
 def segment(case: Case, images: list[Image], settings: SilhouetteSettings) -> Callable[[], None]:
     """Masks of pictures, by a background that is learnt before; where there is no film of the empty scene, by these pictures' median."""
-    background, footage = case.prepared.footage.view.background, case.prepared.footage
+    background, footage = case.footage.view.background, case.footage
     empty = list(footage.pictures(background, "the empty scene")) if background is not None else [np.median(images, 0).astype(np.uint8)] * 2
     segmenter = learn_background(empty, settings, film=images[::8])
 

@@ -22,9 +22,13 @@ from shadowpuppet.io.files.plain import plain
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.metrics import match
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.pipeline.look import Prepared, check, prepare
+from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options, make_options, plain_options
+from shadowpuppet.pipeline.person import MonocularSubject
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.synthesize import make_recording
+from shadowpuppet.pipeline.track import MONOCULAR, prepare
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS
 from shadowpuppet.synthetic.spec_changes import parse_gestures
@@ -60,7 +64,9 @@ class Case:
     """A recording with its silhouettes and the person in it, measured."""
 
     folder: Path
-    prepared: Prepared
+    footage: Footage
+    silhouettes: Silhouettes
+    subject: MonocularSubject
     options: Options
     times: Array
     """Of the frames, seconds, (T,)."""
@@ -72,17 +78,17 @@ class Case:
     @property
     def name(self) -> str:
         """The recording's folder."""
-        return self.prepared.footage.recording.path.name
+        return self.footage.recording.path.name
 
     @property
     def camera(self) -> Camera:
         """Of pictures of the size that is worked on."""
-        return self.prepared.footage.camera
+        return self.footage.camera
 
     @property
     def guess(self) -> PersonEstimate:
         """The person's sizes and place."""
-        return check(self.prepared).fit.guess
+        return self.subject.fit.guess
 
     @cached_property
     def picture(self) -> Picture:
@@ -97,7 +103,7 @@ class Case:
     def frames(self, wanted: Sequence[int]) -> list[Image]:
         """Some of the film's pictures, read again: a film is not kept in memory."""
         last = max(wanted)
-        found = {n: shot.image for n, shot in zip(range(last + 1), self.prepared.footage.shots(False)) if n in wanted}
+        found = {n: shot.image for n, shot in zip(range(last + 1), self.footage.frames(False)) if n in wanted}
         return [found[n] for n in wanted]
 
     def true_places(self, names: tuple[str, ...]) -> Array:
@@ -160,13 +166,16 @@ def _seen(folder: Path, told: str) -> Case:
     """`told`: options as JSON."""
     options = make_options(json.loads(told))
     with one_blas_thread():
-        prepared = prepare(str(folder), options, np.random.default_rng(options.seed))
-        check(prepared)
-        shots = [(shot.time, prepared.silhouettes(shot)) for shot in prepared.footage.shots(options.masks)]
-    times, masks, truth = np.array([time for time, _ in shots]), np.array([mask for _, mask in shots]), prepared.footage.recording.truth
+        prepared = prepare(np.random.default_rng(options.seed), open_rig(folder, options), options, MONOCULAR)
+        subject = prepared.check()
+        assert isinstance(subject, MonocularSubject)
+        (footage,), (silhouettes,) = prepared.survey.rig.footage, prepared.survey.silhouettes
+        frames = [(frame.time, silhouettes(frame)) for frame in footage.frames(options.masks)]
+    times, masks, truth = np.array([time for time, _ in frames]), np.array([mask for _, mask in frames]), footage.recording.truth
     if not masks[0].any():
         raise ShadowPuppetError(f"{folder}: found nobody in the first frame, expected the person there: the paper's filter begins with it")
-    return Case(folder, prepared, options, times, masks, read_joints(truth) if truth is not None else None, _parts(folder, times))
+    motion = read_joints(truth) if truth is not None else None
+    return Case(folder, footage, silhouettes, subject, options, times, masks, motion, _parts(folder, times))
 
 
 def _parts(folder: Path, times: Array) -> tuple[Part, ...]:

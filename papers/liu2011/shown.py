@@ -21,14 +21,13 @@ def stem(name: str, request: Request, case: Case) -> str:
 
 def told(case: Case) -> dict[str, Any]:
     """What a case was tracked with."""
-    return {case.name: {"silhouettes": case.prepared.silhouettes.source, "person": check_source(case), "frames": len(case.times),
+    return {case.name: {"silhouettes": case.silhouettes.source, "person": check_source(case), "frames": len(case.times),
                         "size": list(case.camera.size), "tracker": case.tracker}}
 
 
 def check_source(case: Case) -> str:
     """Where the person's sizes come from."""
-    assert case.prepared.found is not None
-    return case.prepared.found.source
+    return case.subject.person.source
 
 
 def mark_parts(axes: Axes, case: Case, by_frame: bool = True, named: bool = True) -> None:

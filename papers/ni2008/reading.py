@@ -22,9 +22,9 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.pipeline.footage_rig import follow, open_rig
-from shadowpuppet.pipeline.look_rig import check_rig, look_at_rig
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
+from shadowpuppet.pipeline.survey import survey_rig
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
@@ -52,9 +52,9 @@ def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
     assert recording.truth is not None
     assert recording.training is not None
     rig = open_rig(source.path, options)
-    prepared = look_at_rig(rig, options)
-    check_rig(prepared)
-    sets = follow(rig, prepared.silhouettes, ready=source.masks)
+    survey = survey_rig(rig, options)
+    survey.check()
+    sets = synchronized_frames(rig, survey.silhouettes, ready=source.masks)
     seen = (Seen(each.time, list(each.masks)) for each in sets)
     return rig.cameras, _arrays(rig.cameras, rig.rate, seen, read_joints(recording.truth), read_motion(recording.training), OPENED)
 

@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from shadowpuppet.motion.prior.motion_prior import MotionPrior
     from shadowpuppet.motion.prior.settings import PriorSettings
     from shadowpuppet.motion.prior.vqpca import choose_regions, fit_prior
-    from shadowpuppet.pipeline.footage import open_footage, read_masks
+    from shadowpuppet.pipeline.footage import open_footage
     from shadowpuppet.pipeline.look import Look
     from shadowpuppet.pipeline.options import Options, make_options
+    from shadowpuppet.pipeline.silhouettes import read_masks
     from shadowpuppet.pipeline.track import Listener, look_at, track_recording
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
@@ -66,7 +67,7 @@ _HOMES = {
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
     "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation.evaluation",
     "Evaluation": "evaluation.evaluation", "measure_run": "evaluation.evaluation", "read_truth": "io.motion.motion_files",
-    "write_report": "evaluation.report.page", "open_footage": "pipeline.footage", "read_masks": "pipeline.footage",
+    "write_report": "evaluation.report.page", "open_footage": "pipeline.footage", "read_masks": "pipeline.silhouettes",
 }  # fmt: skip
 """Where each public name lives."""
 

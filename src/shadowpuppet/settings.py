@@ -50,6 +50,17 @@ def validate(kind: type[Settings], values: Mapping[str, Any], source: str = "set
         raise _settings_error(error, kind, source) from None
 
 
+def from_preset(kind: type[Settings], presets: Mapping[str, Mapping[str, Any]], preset: str, overrides: Mapping[str, Any] | None,
+                source: str) -> Settings:
+    """Settings of a `kind` by a named preset, with some values replaced; inner tables may be given in part.
+
+    Raises `SettingsError` for an unknown preset, an unknown name or an impossible value, with what is possible.
+    """
+    if preset not in presets:
+        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(presets)}")
+    return validate(kind, merged(plain_values(kind()), presets[preset], overrides or {}), source)
+
+
 def _settings_error(error: ValidationError, kind: Any, source: str) -> SettingsError:
     """The first mistake in one sentence."""
     first = error.errors()[0]

@@ -14,10 +14,9 @@ from shadowpuppet.camera import drawing
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model, matching, overlay_frame
 from shadowpuppet.camera.rasterize import Picture, unpack
-from shadowpuppet.errors import ShadowPuppetError, VideoError
+from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.pipeline.overlay_video import OverlayWriter
-from shadowpuppet.video import open_frames
+from shadowpuppet.video import open_frames, write_frames
 
 SIZES = CardboxSizes(*(1.8 * share for share in (
     0.09, 0.13, 0.05, 0.23, 0.19, 0.23, 0.2, 0.12, 0.11, 0.09, 0.14, 0.14, 0.17, 0.06, 0.25, 0.05, 0.04, 0.02)))
@@ -185,28 +184,13 @@ def test_a_picture_of_another_size_is_said(shapes, said):
 def test_a_film_of_overlays(tmp_path, rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)
-    with OverlayWriter(tmp_path / "overlay.mp4", 15, picture) as film:
+    with write_frames(tmp_path / "overlay.mp4", 15) as film:
         for i in range(4):
-            film.write(image, mask, a_pose(picture, torso_bend=0.1 * i), status="tracked", time=i / 15, overlap=0.9)
+            pose = a_pose(picture, torso_bend=0.1 * i)
+            film.write(overlay_frame(image, mask, picture, pose, status="tracked", time=i / 15, overlap=0.9))
     frames = list(open_frames(tmp_path / "overlay.mp4"))
     assert [round(frame.time * 15) for frame in frames] == [0, 1, 2, 3]
     assert frames[0].image.shape == (360, 160, 3)
     middle = rows(frames[0].image)[1][LABEL:].astype(int)
     white = (picture.mask(a_pose(picture)) & mask)[LABEL:]
     assert middle[white].mean() > 220
-
-
-def test_an_interrupted_film_can_be_played(tmp_path, rng):
-    picture = a_picture()
-    image, mask = a_scene(rng, picture)
-
-    def work() -> None:
-        with OverlayWriter(tmp_path / "overlay.mp4", 15, picture) as film:
-            film.write(image, mask, a_pose(picture), status="tracked", time=0.0)
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert len(list(open_frames(tmp_path / "overlay.part.mp4"))) == 1
-    with pytest.raises(VideoError, match=r"found the ending '.txt'"):
-        OverlayWriter(tmp_path / "overlay.txt", 15, picture)

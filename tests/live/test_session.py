@@ -13,12 +13,12 @@ from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.live.background_phase import in_background
-from shadowpuppet.live.learning_phase import Learner, moved
-from shadowpuppet.live.phases import Waiter, unfit
+from shadowpuppet.live.learning_phase import BackgroundCollector, moved
+from shadowpuppet.live.phases import StandStillDetector, unfit
 from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
-from shadowpuppet.live.watchdog import FIRST_PATIENCE, Vigil
+from shadowpuppet.live.watchdog import FIRST_PATIENCE, CameraWatchdog
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.settings import validate
 from shadowpuppet.video.live_source import Snapshot
@@ -38,9 +38,9 @@ class Stage:
 
     def __init__(self, settings=SETTINGS, options=OPTIONS, live=True, size=SIZE, work=None):
         self.clock, self.number = Clock(), 0
-        full, vigil = Camera.from_fov(size, np.radians(60)), Vigil("cam", size, live)
+        full, dog = Camera.from_fov(size, np.radians(60)), CameraWatchdog("cam", size, live)
         more = {} if work is None else {"work": work}
-        self.session = Session(full, options, settings, np.random.default_rng(1), self.clock, vigil, Timing(RATE), **more)
+        self.session = Session(options, settings, np.random.default_rng(1), self.clock, Timing(RATE), full=full, watchdog=dog, **more)
 
     def give(self, image, after=1 / RATE, cost=0.0):
         """A picture after some seconds, which takes some seconds to work on."""
@@ -196,8 +196,8 @@ def test_in_plain_silhouettes_people_are_tracked_but_not_measured(pictures, silh
 
 def test_a_known_background_is_not_learnt_again(pictures):
     full = Camera.from_fov(SIZE, np.radians(60))
-    parts = np.random.default_rng(1), Clock(), Vigil("cam", SIZE, True), Timing(RATE)
-    session = Session(full, OPTIONS, SETTINGS, *parts, scene=pictures[0][:5])
+    parts = np.random.default_rng(1), Clock(), Timing(RATE)
+    session = Session(OPTIONS, SETTINGS, *parts, full=full, watchdog=CameraWatchdog("cam", SIZE, True), scene=pictures[0][:5])
     assert session.phase == "waiting"
 
 
@@ -225,7 +225,7 @@ def test_impossible_settings_are_refused(values):
 
 def test_a_scene_in_which_something_moves_is_learnt_anew(pictures):
     empty, person = pictures
-    learner, now, messages = Learner(0.2, 0.6), 0.0, []
+    learner, now, messages = BackgroundCollector(0.2, 0.6), 0.0, []
     for image in [*empty[:6], *person[:8], *empty[:20]]:
         scene = learner.see(now, image)
         messages.append(learner.message)
@@ -239,7 +239,7 @@ def test_a_scene_in_which_something_moves_is_learnt_anew(pictures):
 
 def test_a_scene_that_never_rests_is_taken_as_it_is(pictures):
     empty, person = pictures
-    learner, found, n = Learner(0.0, 0.5), None, 0
+    learner, found, n = BackgroundCollector(0.0, 0.5), None, 0
     while found is None:
         found = learner.see(n / RATE, [*empty[:4], *person[40:44]][n % 8] if (n // 4) % 2 else empty[n % 5])
         n += 1
@@ -285,7 +285,7 @@ def test_people_who_cannot_be_measured_are_told_why(mask, said):
 
 
 def test_a_person_must_stand_still_for_a_while():
-    waiter = Waiter(1.0)
+    waiter = StandStillDetector(1.0)
     walking = [waiter.see(t / 10, blob(10 + 4 * t, 40 + 4 * t)) for t in range(10)]
     assert walking == [None] * 10
     standing = [waiter.see(1.0 + t / 10, blob(46, 76)) for t in range(20)]
@@ -295,7 +295,7 @@ def test_a_person_must_stand_still_for_a_while():
 
 
 def test_stillness_begins_anew_after_a_break():
-    waiter = Waiter(1.0)
+    waiter = StandStillDetector(1.0)
     for t in range(9):
         assert waiter.see(t / 10, blob()) is None
     waiter.wait()
@@ -388,16 +388,16 @@ def test_a_frozen_picture_is_said_not_tracked_and_taken_up_when_it_moves(picture
 
 
 def test_a_frozen_camera_is_opened_again_now_and_then():
-    vigil, image = Vigil("cam", (4, 4), True), np.zeros((4, 4, 3), np.uint8)
+    dog, image = CameraWatchdog("cam", (4, 4), True), np.zeros((4, 4, 3), np.uint8)
     asked = []
     for n in range(1500):
-        vigil.see(n / 15, image)
-        if vigil.asks_again(n / 15):
+        dog.see(n / 15, image)
+        if dog.asks_again(n / 15):
             asked.append(n / 15)
     assert asked[0] == pytest.approx(1.5 + FIRST_PATIENCE, abs=0.2)
     assert np.diff(asked) == pytest.approx([FIRST_PATIENCE * 2**k for k in range(1, len(asked))], abs=0.2)
-    vigil.see(100.0, image + 1)
-    assert not vigil.asks_again(100.0)
+    dog.see(100.0, image + 1)
+    assert not dog.asks_again(100.0)
 
 
 def test_a_film_may_stand_still(pictures):

@@ -19,8 +19,8 @@ from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.pipeline.check_calibration import check_calibration
-from shadowpuppet.pipeline.footage_rig import open_rig
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import open_rig
 
 FRAMES = 70
 MASKS = Options(masks=True)

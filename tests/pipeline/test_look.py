@@ -11,22 +11,13 @@ from hypothesis import strategies as st
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
-from shadowpuppet.pipeline.footage import (
-    FIRST,
-    FIRST_SECONDS,
-    LOOKED_AT,
-    RUN,
-    RUNS,
-    _spread,
-    clear_silhouettes,
-    open_footage,
-    silhouettes,
-    take_sample,
-)
-from shadowpuppet.pipeline.look import prepare, quality_of
+from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, wrong_posture
-from shadowpuppet.pipeline.track import json_text, look_at, track_recording
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.survey import _look, quality_of, survey_film
+from shadowpuppet.pipeline.track import MONOCULAR, Prepared, json_text, look_at, prepare, track_recording
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, sizes_from_height
 
@@ -100,16 +91,20 @@ def test_ready_masks_need_no_background(recording, tmp_path):
         look_at(made.copied(recording, tmp_path / "without", without=["masks"]), Options(masks=True))
 
 
+def prepared(recording, options) -> Prepared:
+    return prepare(np.random.default_rng(0), open_rig(recording, options), options, MONOCULAR)
+
+
 def test_where_plain_masks_are_tracked_the_person_is_measured_in_clean_ones(recording, look):
-    plain = prepare(str(recording), make_options({"silhouette": {"method": "averaging"}}), np.random.default_rng(0))
-    assert plain.silhouettes.segmenter.key == "averaging"
+    plain = prepared(recording, make_options({"silhouette": {"method": "averaging"}}))
+    assert plain.survey.silhouettes[0].segmenter.key == "averaging"
     assert plain.look.key == "averaging: as set"
     assert plain.look.exact_overlap == pytest.approx(look.exact_overlap_plain, abs=1e-6)
     assert plain.look.person["silhouettes"] == look.key.split(":")[0]
     assert look.person["silhouettes"] is None
-    clean = prepare(str(recording), Options(), np.random.default_rng(0))
+    clean = prepared(recording, Options())
     assert plain.look.person["sizes"] == clean.look.person["sizes"]
-    assert clean.clear is clean.silhouettes
+    assert clean.survey.clean == clean.survey.silhouettes
 
 
 @pytest.mark.parametrize(("settings", "key", "cleaned"), [
@@ -120,8 +115,8 @@ def test_silhouettes_with_specks_are_not_measured_in(recording, settings, key, c
     options = make_options({"silhouette": settings})
     footage = open_footage(recording, options)
     sample = take_sample(footage)
-    seen = silhouettes(footage, sample, options)
-    clear = clear_silhouettes(footage, sample, seen, options).segmenter
+    seen = learn_silhouettes(footage, sample, options)
+    clear = clean_silhouettes(footage, sample, seen, options).segmenter
     assert (clear.key, clear.settings.cleaned) == (key, cleaned)
     assert clear.settings.factor == (2.0 if settings["method"] == "averaging" else options.silhouette.factor)
 
@@ -131,8 +126,8 @@ def test_silhouettes_that_are_clean_are_measured_in(recording, settings):
     options = make_options({"silhouette": settings})
     footage = open_footage(recording, options)
     sample = take_sample(footage)
-    seen = silhouettes(footage, sample, options)
-    assert clear_silhouettes(footage, sample, seen, options) is seen
+    seen = learn_silhouettes(footage, sample, options)
+    assert clean_silhouettes(footage, sample, seen, options) is seen
 
 
 # Doubts
@@ -180,11 +175,8 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
 
 def look_at_masks(recording):
     """The look without the search for the person."""
-    from shadowpuppet.pipeline import look as module
-
     footage = open_footage(recording, Options())
-    sample = take_sample(footage)
-    return module._first_look(footage, sample, silhouettes(footage, sample, Options()))
+    return _look(footage, survey_film(footage, Options()))
 
 
 def test_uneven_times_are_said(recording, tmp_path):
@@ -336,7 +328,7 @@ def test_a_sample_has_the_first_seconds(recording):
     assert end - FIRST_SECONDS / FIRST - 1 / made.RATE <= first[-1] <= FIRST_SECONDS
     assert np.diff(first) == pytest.approx(FIRST_SECONDS / FIRST, abs=1 / made.RATE)
     assert len(sample.times) == made.FRAMES
-    assert all(shot.ready is not None for shot in sample.shots)
+    assert all(shot.ready is not None for shot in sample.frames)
 
 
 masks = st.lists(st.integers(0, 2**16 - 1), min_size=3, max_size=9).map(

@@ -15,10 +15,11 @@ from shadowpuppet.cli.app import run
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.pipeline.footage_rig import open_rig
-from shadowpuppet.pipeline.look_rig import RigLook, look_at_rig
+from shadowpuppet.pipeline.look import RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import json_text
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.survey import survey_rig
 from shadowpuppet.pipeline.track import look_at, track_recording
 
 MASKS = Options(masks=True)
@@ -57,7 +58,7 @@ def test_a_look_is_plain(recording):
 
 
 def test_the_opening_is_spread_over_the_first_seconds(recording):
-    opening = look_at_rig(open_rig(recording, MASKS), MASKS).opening
+    opening = survey_rig(open_rig(recording, MASKS), MASKS).first
     assert opening.times[0] == 0
     assert opening.times[-1] > 1.5
     assert len(opening.times) == len(opening.masks) <= 40

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import made
+import made_rig
 import numpy as np
 import pytest
+from follower import followed
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.silhouette_cache import Reel, Repeats
-from shadowpuppet.pipeline.track import Listener, track_recording
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
+from shadowpuppet.pipeline.track import MULTIVIEW, Listener, run, track_recording
 
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 
@@ -18,8 +21,8 @@ QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 2
 def track(recording, tmp_path):
     """Tracks; gives joints.csv and whether silhouettes were kept."""
 
-    def tracked(repeats: Repeats | None = None, listener: Listener | None = None, **values) -> tuple[bytes, bool]:
-        run = track_recording(recording, tmp_path / "run", make_options(QUICK | values), listener, repeats)
+    def tracked(cache: SilhouetteCache | None = None, listener: Listener | None = None, **values) -> tuple[bytes, bool]:
+        run = track_recording(recording, tmp_path / "run", make_options(QUICK | values), listener, cache)
         return (run.folder / "joints.csv").read_bytes(), run.metrics.get("kept_silhouettes", False)
 
     return tracked
@@ -28,24 +31,24 @@ def track(recording, tmp_path):
 @pytest.mark.parametrize("values", [{}, {"masks": True}, {"region": (30, 0, 140, 120)}, {"every": 4}],
                          ids=["film", "masks", "region", "every"])
 def test_runs_are_the_same_with_what_was_kept(track, values):
-    repeats = Repeats()
+    cache = SilhouetteCache()
     for seed, kept in ((1, False), (2, True), (1, True)):
-        assert track(repeats, seed=seed, **values) == (track(seed=seed, **values)[0], kept)
+        assert track(cache, seed=seed, **values) == (track(seed=seed, **values)[0], kept)
 
 
 def test_other_trackers_share_silhouettes_and_other_silhouettes_do_not(track):
-    repeats = Repeats()
-    track(repeats)
-    assert track(repeats, preset="liu2011") == (track(preset="liu2011")[0], True)
-    assert track(repeats, silhouette={"factor": 3.0}) == (track(silhouette={"factor": 3.0})[0], False)
-    assert not track(repeats)[1]  # one film is held
+    cache = SilhouetteCache()
+    track(cache)
+    assert track(cache, preset="liu2011") == (track(preset="liu2011")[0], True)
+    assert track(cache, silhouette={"factor": 3.0}) == (track(silhouette={"factor": 3.0})[0], False)
+    assert not track(cache)[1]  # one film is held
 
 
 def test_an_overlay_has_the_films_pictures(track, tmp_path):
-    repeats = Repeats()
-    track(repeats)
+    cache = SilhouetteCache()
+    track(cache)
     plain = track()[0]
-    assert track(repeats, overlay=True) == (plain, False)
+    assert track(cache, overlay=True) == (plain, False)
     assert len(made.images(tmp_path / "run" / "overlay.mp4")) == made.FRAMES
 
 
@@ -55,31 +58,47 @@ def test_a_run_that_broke_off_leaves_nothing_to_keep(track):
             if frames == 5:
                 raise ShadowPuppetError("stop")
 
-    repeats = Repeats()
+    cache = SilhouetteCache()
     with pytest.raises(ShadowPuppetError, match="stop"):
-        track(repeats, Stops())
-    assert track(repeats) == (track()[0], False)
+        track(cache, Stops())
+    assert track(cache) == (track()[0], False)
 
 
 def test_long_films_are_not_kept(track):
-    repeats = Repeats(limit=10 * made.SIZE[0] * made.SIZE[1] // 8)
-    track(repeats)
-    assert track(repeats) == (track()[0], False)
+    cache = SilhouetteCache(limit=10 * made.SIZE[0] * made.SIZE[1] // 8)
+    track(cache)
+    assert track(cache) == (track()[0], False)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 5), (120, 160), (7, 64)])
-def test_a_reel_gives_back_what_it_got(rng, shape):
-    reel, masks = Reel(), rng.random((4, *shape)) < 0.5
-    for n, mask in enumerate(masks):
-        reel.add(n / 10, mask)
-    assert reel.times == [0, 0.1, 0.2, 0.3]
-    assert reel.size == 4 * -(-shape[0] * shape[1] // 8)
-    np.testing.assert_array_equal([reel.mask(bits) for bits in reel.bits], masks)
+def test_a_store_gives_back_what_it_got(rng, shape):
+    store, masks = MaskStore(), rng.random((4, 2, *shape)) < 0.5
+    for n, (one, other) in enumerate(masks):
+        store.add(n / 10, (one, None, other))
+    assert [each.time for each in store] == [0, 0.1, 0.2, 0.3]
+    assert store.size == 8 * -(-shape[0] * shape[1] // 8)
+    assert all(each.masks[1] is None and each.images == (None,) * 3 for each in store)
+    np.testing.assert_array_equal([[each.masks[0], each.masks[2]] for each in store], masks)
 
 
-def test_a_full_reel_holds_nothing():
-    reel, mask = Reel(limit=100), np.ones((8, 100), bool)
+def test_a_full_store_holds_nothing():
+    store, mask = MaskStore(limit=100), np.ones((8, 100), bool)
     for _ in range(5):
-        reel.add(0.0, mask)
-    assert reel.size == 0
-    assert reel.size > reel.limit
+        store.add(0.0, [mask])
+    assert not store.sets
+    assert store.size > store.limit
+
+
+def test_several_cameras_share_silhouettes_between_seeds(tmp_path, monkeypatch):
+    recording, cache = made_rig.write(tmp_path / "rig"), SilhouetteCache()
+    kind = MULTIVIEW._replace(fit=lambda rng, survey, options: followed(survey.rig.cameras))
+
+    def tracked(seed: int, cache: SilhouetteCache | None = None) -> tuple[bytes, bool]:
+        options = make_options({"seed": seed})
+        result = run(open_rig(recording, options), kind, tmp_path / "run", options, Listener(), cache)
+        return (result.folder / "joints.csv").read_bytes(), result.metrics.get("kept_silhouettes", False)
+
+    alone = [tracked(seed)[0] for seed in (1, 2)]
+    assert tracked(1, cache) == (alone[0], False)
+    monkeypatch.setattr("shadowpuppet.pipeline.rig.CameraReader.advance", None)  # nothing is read again
+    assert tracked(2, cache) == (alone[1], True)

@@ -13,9 +13,11 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import overlap
-from shadowpuppet.pipeline.footage import RUN, RUNS, Shot, open_footage, read_masks, silhouettes, take_sample
+from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
-from shadowpuppet.pipeline.track import Listener, Watch, fit_person, track_recording
+from shadowpuppet.pipeline.progress import StageTimer
+from shadowpuppet.pipeline.silhouettes import learn_silhouettes, read_masks
+from shadowpuppet.pipeline.track import Listener, fit_person, track_recording
 from shadowpuppet.video import open_frames
 
 JOINTS = {"pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand"))}
@@ -186,19 +188,19 @@ def test_ready_masks_are_used_only_when_asked_for(recording, tmp_path):
     masks = made.images(recording / "masks" / "cam.mkv")
     made.write_film(spoilt / "masks" / "cam.mkv", [np.zeros_like(mask) for mask in masks], lossless=True)
     assert open_footage(spoilt, Options()).view.masks is not None
-    seen = silhouettes(*_sampled(spoilt, Options()))
-    shots = list(open_footage(spoilt, Options()).shots(ready=True))
+    seen = learn_silhouettes(*_sampled(spoilt, Options()))
+    shots = list(open_footage(spoilt, Options()).frames(ready=True))
     assert seen(shots[5]).mean() > 0.05
-    ready = silhouettes(*_sampled(spoilt, Options(masks=True)))
+    ready = learn_silhouettes(*_sampled(spoilt, Options(masks=True)))
     assert not ready(shots[5]).any()
 
 
 @pytest.mark.parametrize("options", [Options(), Options(masks=True)])
 def test_the_masks_that_are_read_are_those_that_are_tracked(recording, options):
     footage, sample, _ = _sampled(recording, options)
-    seen, read = silhouettes(footage, sample, options), list(read_masks(footage, options))
+    seen, read = learn_silhouettes(footage, sample, options), list(read_masks(footage, options))
     assert len(read) == footage.count
-    for mask, shot in zip(read, footage.shots(ready=options.masks)):
+    for mask, shot in zip(read, footage.frames(ready=options.masks)):
         np.testing.assert_array_equal(mask, seen(shot))
 
 
@@ -224,9 +226,9 @@ def test_what_is_outside_the_region_is_background(recording, tmp_path):
     made.write_film(spoilt / "video" / "cam.mp4", film)
     options = make_options({"region": "0,0,98,120"})
     footage, sample, _ = _sampled(spoilt, options)
-    seen, clean = silhouettes(footage, sample, options), silhouettes(*_sampled(recording, Options()))
+    seen, clean = learn_silhouettes(footage, sample, options), learn_silhouettes(*_sampled(recording, Options()))
     for n in (0, 12, 20):
-        mask, right = seen(Shot(0, film[n], None)), clean(Shot(0, made.images(recording / "video" / "cam.mp4")[n], None))
+        mask, right = seen(CameraFrame(0, film[n], None)), clean(CameraFrame(0, made.images(recording / "video" / "cam.mp4")[n], None))
         right[:, 98:] = False
         assert not mask[:, 98:].any()
         assert overlap(mask, right) > 0.9
@@ -234,8 +236,8 @@ def test_what_is_outside_the_region_is_background(recording, tmp_path):
 
 def test_ready_masks_are_cut_to_the_region(recording):
     options = make_options({"region": "0,0,80,120", "masks": True})
-    seen, whole = silhouettes(*_sampled(recording, options)), silhouettes(*_sampled(recording, Options(masks=True)))
-    shot = next(open_footage(recording, options).shots(ready=True))
+    seen, whole = learn_silhouettes(*_sampled(recording, options)), learn_silhouettes(*_sampled(recording, Options(masks=True)))
+    shot = next(open_footage(recording, options).frames(ready=True))
     assert whole(shot)[:, 80:].any()
     assert not seen(shot)[:, 80:].any()
     np.testing.assert_array_equal(seen(shot)[:, :80], whole(shot)[:, :80])
@@ -258,9 +260,9 @@ def test_a_persons_sizes_are_used_again(recording, run, tmp_path):
 def test_without_references_sizes_come_from_proportions(recording, tmp_path):
     alone = made.copied(recording, tmp_path / "alone", without=["references"])
     found, look = fit_person(alone, tmp_path / "person.toml")
-    assert found.source.startswith("proportions")
+    assert found.person.source.startswith("proportions")
     assert look.person is not None
-    assert found.start > 0.8
+    assert found.summary["start_overlap"] > 0.8
     person = read_person(tmp_path / "person.toml")
     assert 0.2 < person.sizes.upper_arm_length < 0.36
 
@@ -297,29 +299,29 @@ def test_options_round_trip_through_plain_values():
     assert options == replace(options)
 
 
-def test_a_watch_counts_each_stage():
-    watch = Watch()
-    assert list(watch.each("decode", [1, 2, 3])) == [1, 2, 3]
-    with pytest.raises(KeyError), watch.time("track"):
+def test_a_timer_counts_each_stage():
+    timer = StageTimer()
+    assert list(timer.each("decode", [1, 2, 3])) == [1, 2, 3]
+    with pytest.raises(KeyError), timer.time("track"):
         raise KeyError
-    assert watch.seconds["decode"] > 0
-    assert watch.seconds["track"] > 0
-    assert watch.seconds["write"] == 0
+    assert timer.seconds["decode"] > 0
+    assert timer.seconds["track"] > 0
+    assert timer.seconds["write"] == 0
 
 
 def test_memory_does_not_grow_with_the_film(recording):
     """A sample of four times the frames takes no more memory."""
     footage, peaks = open_footage(recording, Options()), []
-    shots = list(footage.shots(ready=False))
+    shots = list(footage.frames(ready=False))
     for times in (4, 16):
         longer, film = replace(footage), replace(footage.film(), count=times * len(shots))
         long = [shot._replace(time=n / 10) for n, shot in enumerate(shots * times)]
         object.__setattr__(longer, "film", lambda film=film: film)
-        object.__setattr__(longer, "shots", lambda ready, strict, long=long: (shot._replace(image=shot.image.copy()) for shot in long))
+        object.__setattr__(longer, "frames", lambda ready, strict, long=long: (shot._replace(image=shot.image.copy()) for shot in long))
         tracemalloc.start()
         sample = take_sample(longer)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert len(sample.times) == made.FRAMES * times
-        assert len(sample.shots) == RUNS * RUN
+        assert len(sample.frames) == RUNS * RUN
     assert peaks[1] < 1.3 * peaks[0]

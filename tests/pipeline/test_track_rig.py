@@ -3,66 +3,37 @@
 from __future__ import annotations
 
 import json
-from typing import NamedTuple
 
 import made
 import made_rig
 import numpy as np
 import pytest
+from follower import followed
 from measured import evaluate_run
 
-from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
-from shadowpuppet.pipeline.progress import RIG_STAGES, Listener
-from shadowpuppet.pipeline.track import look_at
-from shadowpuppet.pipeline.track_rig import Puppet, track_rig
-from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.pipeline.person_rig import MultiviewSubject
+from shadowpuppet.pipeline.progress import STAGES, Listener
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.track import MULTIVIEW, look_at, run
 from shadowpuppet.video import open_frames
-
-
-class Standing(NamedTuple):
-    pose: np.ndarray
-    status: str
-    cost: float = 0.0
-    overlap: float = np.nan
-
-
-class Follower:
-    """Puts a body upright where the surface points are."""
-
-    def __init__(self, body) -> None:
-        self.body, self.calls = body, []
-
-    def start(self, rng, points, masks) -> Standing:
-        self.calls.append("start")
-        return self._there(rng, points, masks)
-
-    def step(self, rng, state, points, masks) -> Standing:
-        self.calls.append("step")
-        return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
-
-    def _there(self, rng, points, masks) -> Standing:
-        pose = np.zeros(len(self.body.skeleton.dofs))
-        pose[:3] = points.points.mean(0) + rng.normal(0, 1e-3, 3)
-        return Standing(pose, "tracked" if sum(mask is not None for mask in masks) > 2 else "uncertain")
-
 
 made_of = []
 
 
-def prepare(rng, rig, opening, options, training) -> Puppet:
-    body = make_body("anatomical", average_sizes("anatomical", 1.7))
-    tracker = Follower(body)
-    made_of.append((tracker, opening, training))
-    return Puppet(body, tracker, VisualHull(rig.cameras), {"height": 1.7}, ("the sizes are a guess",))
+def fit(rng, survey, options) -> MultiviewSubject:
+    subject = followed(survey.rig.cameras)
+    made_of.append((subject.tracker, survey.first))
+    return subject
 
 
 def track(recording, folder, options=None, listener=None):
-    return track_rig(recording, folder, options or Options(masks=True), listener or Listener(), prepare)
+    options = options or Options(masks=True)
+    return run(open_rig(recording, options), MULTIVIEW._replace(fit=fit), folder, options, listener or Listener())
 
 
 @pytest.fixture(scope="module")
@@ -71,12 +42,12 @@ def recording(rig_recording):
 
 
 @pytest.fixture(scope="module")
-def run(recording, tmp_path_factory):
+def whole(recording, tmp_path_factory):
     return track(recording, tmp_path_factory.mktemp("run") / "run", Options(overlay=True))
 
 
-def test_a_run_has_a_row_for_every_set_at_its_time(run):
-    motion = read_run(run.folder).motion
+def test_a_run_has_a_row_for_every_set_at_its_time(whole):
+    motion = read_run(whole.folder).motion
     assert motion.times == pytest.approx(np.arange(made_rig.FRAMES) / made_rig.RATE, abs=1e-6)
     assert set(motion.status) == {"tracked"}
     pelvis = motion.table.select(["pelvis"]).positions[:, 0]
@@ -84,36 +55,35 @@ def test_a_run_has_a_row_for_every_set_at_its_time(run):
     assert np.linalg.norm(pelvis - true, axis=1).max() < 0.35
 
 
-def test_a_run_says_how_it_was_made(recording, run):
-    info = read_run(run.folder).info
+def test_a_run_says_how_it_was_made(recording, whole):
+    info = read_run(whole.folder).info
     assert info["recording"] == str(recording.resolve())
     assert info["method"] == "Ni 2008, 4 cameras"
     assert info["cameras"] == ["cam1", "cam2", "cam3", "cam4"]
     assert info["body"] == "anatomical"
-    assert set(run.metrics["ms_per_frame"]) == set(RIG_STAGES)
-    assert run.metrics["ms_per_frame"]["segment"] > 0
-    assert "cost_px" not in run.metrics
-    assert evaluate_run(run.folder)["cost_m2"]["count"] == made_rig.FRAMES
-    look = json.loads((run.folder / "look.json").read_text())
+    assert set(whole.metrics["ms_per_frame"]) == set(STAGES)
+    assert whole.metrics["ms_per_frame"]["segment"] > 0
+    assert "cost_px" not in whole.metrics
+    assert evaluate_run(whole.folder)["cost_m2"]["count"] == made_rig.FRAMES
+    look = json.loads((whole.folder / "look.json").read_text())
     assert look["person"] == {"height": 1.7}
     assert "the sizes are a guess" in look["doubts"]
     assert max(look["agreement"]["apart"]) < 1.5
-    assert [camera.name for camera in read_calibration(run.folder / "calibration.toml")] == info["cameras"]
+    assert [camera.name for camera in read_calibration(whole.folder / "calibration.toml")] == info["cameras"]
 
 
-def test_the_preparation_gets_the_first_seconds_and_training_motion(recording, run):
-    _, opening, training = made_of[-1]
-    assert training is None
-    assert opening.times[0] == 0
-    assert len(opening.masks[0]) == made_rig.CAMERAS
-    assert all(mask is not None and mask.any() for row in opening.masks for mask in row)
+def test_the_fit_gets_the_first_seconds(recording, whole):
+    _, first = made_of[-1]
+    assert first.times[0] == 0
+    assert len(first.masks[0]) == made_rig.CAMERAS
+    assert all(mask is not None and mask.any() for row in first.masks for mask in row)
 
 
-def test_an_overlay_is_a_grid_of_the_cameras(run):
-    frames = made.images(run.folder / "overlay.mp4")
+def test_an_overlay_is_a_grid_of_the_cameras(whole):
+    frames = made.images(whole.folder / "overlay.mp4")
     assert len(frames) == made_rig.FRAMES
     assert frames[0].shape == (2 * made_rig.SIZE[1], 2 * made_rig.SIZE[0], 3)
-    film = made.images(run.folder.parent / "run" / "overlay.mp4")[5]
+    film = made.images(whole.folder.parent / "run" / "overlay.mp4")[5]
     assert film.std() > 10
 
 
@@ -191,12 +161,12 @@ class Stops(Listener):
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), ShadowPuppetError("stop")], ids=lambda e: type(e).__name__)
-def test_a_run_that_breaks_off_keeps_what_it_has(recording, run, tmp_path, error):
+def test_a_run_that_breaks_off_keeps_what_it_has(recording, whole, tmp_path, error):
     with pytest.raises(type(error)):
         track(recording, tmp_path / "run", Options(overlay=True), Stops(5, error))
     left = read_run(tmp_path / "run")
     assert not left.complete
-    np.testing.assert_array_equal(left.motion.joints, run.motion.joints[:5])
+    np.testing.assert_array_equal(left.motion.joints, whole.motion.joints[:5])
     assert len(made.images(tmp_path / "run" / "overlay.part.mp4")) == 5
 
 

@@ -369,13 +369,13 @@ def test_particles_of_several_cameras_are_about_the_pose(tmp_path):
     from shadowpuppet.io.motion.motion_files import read_truth
     from shadowpuppet.motion.inverse_kinematics import fit_poses
     from shadowpuppet.motion.motion import MotionBuilder, MotionFrame
-    from shadowpuppet.pipeline.footage import opened
+    from shadowpuppet.pipeline.footage import open_recording
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.viewer.scene.of_recording import cameras_of
     from shadowpuppet.viewer.scene.particles import ParticleRerun
 
     options = Options()
-    cameras = cameras_of(opened(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
+    cameras = cameras_of(open_recording(synthesize(made.RING, tmp_path / "ring", np.random.default_rng(3)), options), options, True)[0]
     found = fit_poses(read_truth(tmp_path / "ring" / "truth.csv"))
     names = [name for name in found.body.landmark_names if not name.endswith("_fist")]
     builder = MotionBuilder(found.body.name, found.body.skeleton.dof_names, names)

@@ -30,7 +30,7 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     turned; and by how many frames each film is late."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.check_calibration import check_calibration
-    from shadowpuppet.pipeline.footage_rig import open_rig
+    from shadowpuppet.pipeline.rig import open_rig
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")

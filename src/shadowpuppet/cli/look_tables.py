@@ -9,8 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.tables import pairs, table
-from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.look_rig import CameraLook, RigLook
+from shadowpuppet.pipeline.look import CameraLook, Look, RigLook
 
 
 def look_table(look: Look) -> RenderableType:

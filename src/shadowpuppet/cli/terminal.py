@@ -16,8 +16,7 @@ from shadowpuppet.cli.look_tables import look_table, rig_look_table
 from shadowpuppet.cli.tables import show
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
-from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.look_rig import RigLook
+from shadowpuppet.pipeline.look import Look, RigLook
 
 REPEAT_AFTER = 10.0
 """Seconds after which the same note is printed again."""

@@ -30,14 +30,14 @@ from shadowpuppet.pipeline.options import PATHS, Options
 from shadowpuppet.settings import validate
 
 if TYPE_CHECKING:
-    from shadowpuppet.pipeline.person import Found
+    from shadowpuppet.pipeline.person import MonocularSubject
 
     DemoFlags = SessionFlags = LiveFlags = Any
 else:
     KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
-    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "prior", "training", "multiview")))
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "training")))
     """Options of a live session."""
     LiveFlags = unpacked(flags_of(LiveSettings))
 
@@ -142,15 +142,15 @@ def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File th
     """Measure a person once, from reference pictures or the film, or from the first seconds of several cameras; `track --person` uses the
     sizes."""
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.person import Found
+    from shadowpuppet.pipeline.person import MonocularSubject
     from shadowpuppet.pipeline.track import fit_person
 
     with terminal(quiet) as listener:
         listener.begin("looking")
         found, look = fit_person(recording, file, options_from(flags, config))
         listener.doubt(look)
-    if not quiet and found.person is not None:
-        curves, rows = _fit_tables(found) if isinstance(found, Found) else ((), _rig_fit_rows(found.told))
+    if not quiet:
+        curves, rows = _fit_tables(found) if isinstance(found, MonocularSubject) else ((), _rig_fit_rows(found.summary))
         show(_sizes_table(found.person.sizes), *curves, pairs([*rows, ("saved", str(file))]))
 
 
@@ -184,12 +184,13 @@ def _sizes_table(sizes: Any) -> Any:
     return table("sizes, mm", ("", "size", "mm", "", "size", "mm"), both, right=(2, 5))
 
 
-def _fit_tables(found: Found) -> tuple[list[Any], Sequence[tuple[str, str | None]]]:
+def _fit_tables(found: MonocularSubject) -> tuple[list[Any], Sequence[tuple[str, str | None]]]:
     """Cost over the rounds of Algorithm 1, a row a search of a subset of sizes; and how well the sizes fit."""
     curves = [(name if n == 1 else "", str(n), str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
               for name, searches in found.fit.curves.items() for n, curve in enumerate(searches, 1)]  # fmt: skip
     overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
-    rows = [("overlap", f"{overlaps}; film {found.start:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"), ("source", found.source)]
+    rows = [("overlap", f"{overlaps}; film {found.summary['start_overlap']:.2f}"), ("height", f"{found.fit.guess.height:.2f} m"),
+            ("source", found.person.source)]
     return [table("cost by round, pixels", ("sizes", "search", "rounds", "first", "last", "curve"), curves, right=(1, 2, 3, 4))], rows
 
 

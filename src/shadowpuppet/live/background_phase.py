@@ -1,4 +1,4 @@
-"""Work that takes seconds, done beside the pictures."""
+"""Long tasks in a thread of their own, while pictures go on."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ Result = TypeVar("Result")
 
 
 def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
-    """Begin a task in a thread of its own, which ends with the program; the answer gives its result, None before that is there.
+    """Start a task in a daemon thread; the answer gives its result, None before it is ready.
 
-    An error of the task is raised where its result is asked for.
+    An error of the task is raised by the answer.
     """
     done: list[Result] = []
     failed: list[BaseException] = []

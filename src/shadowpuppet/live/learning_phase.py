@@ -1,4 +1,4 @@
-"""The empty scene: a countdown, then some seconds of pictures without anybody."""
+"""Collects pictures of the empty scene: a countdown, then some seconds without anybody."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from shadowpuppet.silhouette.background import FrameSampler, smoothed, to_planes
 from shadowpuppet.video import Image
 
 KEPT = 20
-"""Pictures of the empty scene, to twice as many, that are kept."""
+"""Pictures of the empty scene that are kept: this many to twice as many."""
 MOVED, MOVED_SHARE = 20.0, 0.005
-"""Grey levels by which a pixel differs between the first and the last pictures, and the share of such pixels, from which on
-somebody or something moved."""
+"""Difference (grey levels) of a pixel between the first and the last pictures, and share of such pixels, from which on something moved."""
 TRIES = 3
-"""How often moving scenes are learnt anew, before they are taken as they are."""
+"""Attempts to learn a moving scene, before it is taken as it is."""
 
 
-class Learner:
-    """Counts down and collects the empty scene, from the first picture that it is given."""
+class BackgroundCollector:
+    """Counts down, then collects the empty scene, from the first picture on."""
 
     def __init__(self, countdown: float, seconds: float) -> None:
         """Seconds until learning begins, and how long it takes."""
@@ -41,7 +40,7 @@ class Learner:
         return scene
 
     def wait(self) -> None:
-        """No pictures came for a while: what was begun begins again with the next one."""
+        """No pictures came for a while: start again with the next one."""
         self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, self.countdown + self.seconds
 
     @property
@@ -56,7 +55,7 @@ class Learner:
 
 
 def moved(scene: list[Image]) -> bool:
-    """Whether something is elsewhere in the last third of some pictures than in the first."""
+    """Whether the last third of some pictures differs from the first."""
     third = max(len(scene) // 3, 1)
     before, after = (np.mean([smoothed(to_planes(image)).astype(np.float32) for image in part], axis=0)
                      for part in (scene[:third], scene[-third:]))

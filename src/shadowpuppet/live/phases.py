@@ -1,4 +1,4 @@
-"""Waits until somebody stands whole and still in the picture."""
+"""Detects a person who stands still, whole in the picture."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ from collections import deque
 
 import numpy as np
 
-from shadowpuppet.pipeline.footage import Mask
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.silhouette.quality import MIN_CONTACT, NEARLY_ALL
 
 NOBODY, TOO_NEAR = 0.015, 0.6
-"""Share of the picture under which a silhouette is nobody, and from which on a person is too near."""
+"""Share of the picture under which a silhouette is no person, and from which on a person is too near."""
 STILL = 0.1
-"""Pixels that differ from one silhouette to the next but a few, over the silhouette's, up to which a person stands still..."""
+"""Largest share of a silhouette's pixels that differ from an earlier one while a person stands still..."""
 APART = 0.25
-"""... in silhouettes so many seconds apart."""
+"""... this many seconds before."""
 MEASURED = 6
-"""Silhouettes that a person is measured by."""
+"""Number of silhouettes in which a person is measured."""
 
 
-class Waiter:
-    """Looks at silhouettes until a person can be measured."""
+class StandStillDetector:
+    """Looks at silhouettes until a person has stood still for long enough to be measured."""
 
     def __init__(self, seconds: float) -> None:
-        """How long a person must stand still."""
+        """`seconds`: how long a person must stand still."""
         self.seconds, self.message = seconds, "step into the picture, facing the camera"
         self._seen: deque[tuple[float, Mask]] = deque()
         self._since = np.nan
 
     def see(self, now: float, mask: Mask) -> list[Mask] | None:
-        """A silhouette (H, W) at a time (s); those of a person who stood still, once there is one."""
+        """Take a silhouette (H, W) at a time (s); returns those of the person who stood still, once there is one, else None."""
         while len(self._seen) > 1 and self._seen[0][0] < now - max(self.seconds, APART) - 0.5:
             self._seen.popleft()
         hint = unfit(mask)
@@ -46,7 +46,7 @@ class Waiter:
         return [still[k] for k in np.unique(np.linspace(0, len(still) - 1, MEASURED).astype(int))]
 
     def wait(self) -> None:
-        """No pictures came for a while: stillness begins anew."""
+        """No pictures came for a while: start again."""
         self._seen.clear()
         self._since = np.nan
 
@@ -57,7 +57,7 @@ class Waiter:
 
 
 def unfit(mask: Mask) -> str:
-    """Why nobody can be measured by a silhouette (H, W), as advice; empty where somebody can."""
+    """Advice for a person who cannot be measured in a silhouette (H, W); empty if they can."""
     share = float(mask.mean())
     if share >= NEARLY_ALL:
         return "nearly all of the picture has changed: let the background be learnt anew"

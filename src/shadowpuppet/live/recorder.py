@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -18,13 +19,13 @@ FALLBACK_RATE = 15.0
 """Frames/s that the film is said to have, where the camera tells none; its pictures have their own times."""
 
 
-class Keeper:
-    """Writes the recording layout: the empty scene, the pictures that were tracked, the camera, the height."""
+class Recorder:
+    """Writes the recording layout: the empty scenes, the tracked pictures, the cameras, the height."""
 
-    def __init__(self, folder: Path, camera: Camera, rate: float) -> None:
-        """`camera`: for the pictures as they are kept. Nothing is written before the first of them."""
-        self.folder, self.camera, self.rate = folder, camera, rate if np.isfinite(rate) else FALLBACK_RATE
-        self._film: FrameWriter | None = None
+    def __init__(self, folder: Path, cameras: Sequence[Camera], rate: float) -> None:
+        """`cameras`: for the pictures as they are kept. Nothing is written before the first of them."""
+        self.folder, self.cameras, self.rate = folder, cameras, rate if np.isfinite(rate) else FALLBACK_RATE
+        self._films: list[FrameWriter] = []
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -35,19 +36,22 @@ class Keeper:
         """Finish the film; after an error what there is can be played from its partial name."""
         self._open.__exit__(kind, error, trace)
 
-    def write(self, time: float, image: Image, scene: list[Image], height: float) -> None:
-        """Add a picture (H, W, 3) at its time (s); with the first one come the empty scene and the person's height (m)."""
-        if self._film is None:
-            self._film = self._begin(scene, height)
+    def write(self, time: float, images: Sequence[Image], scenes: Sequence[list[Image]], height: float | None) -> None:
+        """Add each camera's picture (H, W, 3) at their time (s); with the first come the empty scenes and the person's height (m)."""
+        if not self._films:
+            self._films = self._begin(scenes, height)
             self._first = time
-        self._film.write(image, time - self._first)
+        for film, image in zip(self._films, images):
+            film.write(image, time - self._first)
 
-    def _begin(self, scene: list[Image], height: float) -> FrameWriter:
+    def _begin(self, scenes: Sequence[list[Image]], height: float | None) -> list[FrameWriter]:
         for name in ("video", "background"):
             (self.folder / name).mkdir(parents=True, exist_ok=True)
-        write_calibration(self.folder / "calibration.toml", [self.camera])
-        write_whole(self.folder / "recording.toml", f"[subject]\nheight = {height:.3f}     # metres, shoes on\n")
-        with write_frames(self.folder / "background" / f"{self.camera.name}.mp4", self.rate) as film:
-            for image in scene:
-                film.write(image)
-        return self._open.enter_context(write_frames(self.folder / "video" / f"{self.camera.name}.mp4", self.rate))
+        write_calibration(self.folder / "calibration.toml", self.cameras)
+        if height is not None:
+            write_whole(self.folder / "recording.toml", f"[subject]\nheight = {height:.3f}     # metres, shoes on\n")
+        for camera, scene in zip(self.cameras, scenes):
+            with write_frames(self.folder / "background" / f"{camera.name}.mp4", self.rate) as film:
+                for image in scene:
+                    film.write(image)
+        return [self._open.enter_context(write_frames(self.folder / "video" / f"{camera.name}.mp4", self.rate)) for camera in self.cameras]

@@ -12,27 +12,31 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.geometry import inverse
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.person import Person, write_person
+from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.live.background_phase import in_background
+from shadowpuppet.live.base_session import LiveSession, Outcome
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
-from shadowpuppet.live.recorder import Keeper
-from shadowpuppet.live.session import Outcome, Session
+from shadowpuppet.live.recorder import Recorder
+from shadowpuppet.live.rig_capture import RigCapture
+from shadowpuppet.live.rig_session import RigSession
+from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
+from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
 from shadowpuppet.live.stream.outlet import Outlets, Subject
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.warm_up import warm_up
-from shadowpuppet.live.watchdog import Vigil
+from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import Options, plain_options
-from shadowpuppet.pipeline.track import Listener, named_body
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names
 from shadowpuppet.settings import validate
 from shadowpuppet.video.capture import Capture
-from shadowpuppet.video.live_source import Feed, open_feed
+from shadowpuppet.video.live_source import open_feed
 from shadowpuppet.video.network_stream import without_secrets
 
 IDLE = 0.05
@@ -65,19 +69,22 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
     outlets = outlets or Outlets()
-    body, joints = named_body(options.tracker.body)
+    several = is_rig(settings.camera)
+    body = average_body((options.multiview if several else options.tracker).body)
     told = validate(LiveSettings, asdict(settings) | {"camera": without_secrets(settings.camera)})
-    info = {"camera": told.camera, "method": "Liu 2011, one camera, live", "started": datetime.now().astimezone().isoformat("T", "seconds"),
+    info = {"camera": told.camera, "method": f"{'Ni 2008, several cameras' if several else 'Liu 2011, one camera'}, live",
+            "started": datetime.now().astimezone().isoformat("T", "seconds"),
             "settings": plain_options(options), "live": told}
     folder = Path(folder)
     try:
-        with outlets, RunWriter(folder, options.tracker.body, body.skeleton.dof_names, joints, info) as run:
+        with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as run:
             session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
     except _Nobody:
         return None
     motion = read_run(folder).motion
-    metrics = read_run(folder).metrics | evaluate(motion, camera=session.session.camera)
+    cameras = session.session.worked_cameras
+    metrics = read_run(folder).metrics | evaluate(motion, camera=None if several else cameras[0], cameras=len(cameras))
     write_metrics(folder, metrics)
     return metrics
 
@@ -88,16 +95,28 @@ class _Live:
     def __init__(self, run: RunWriter, options: Options, settings: LiveSettings, listener: LiveListener, display: Display,
                  clock: Callable[[], float], outlets: Outlets) -> None:
         self.run_, self.options, self.listener, self.display, self.clock = run, options, listener, display, clock
-        self.outlets = outlets
-        person = known_person(options)
-        self.feed: Feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
-        full = lens(options, self.feed.size)
-        self.session = Session(full, options, settings, np.random.default_rng(options.seed), clock,
-                               Vigil(self.feed.name, self.feed.size, self.feed.live), Timing(self.feed.rate), in_background, person,
-                               empty_scene(options, full))
-        self.keeper = Keeper(run.folder / "recording", self.session.camera, self.feed.rate) if settings.record else None
-        self.capture, self.stop = Capture(self.feed), Stop()
+        self.outlets, self.settings, self.stop = outlets, settings, Stop()
+        self.session, self.capture, self.rate, self.is_live = self._several() if is_rig(settings.camera) else self._single()
+        self.recorder = Recorder(run.folder / "recording", self.session.worked_cameras, self.rate) if settings.record else None
         self.frames, self.breaks, self.broke, self.said = 0, 0, np.nan, ""
+
+    def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
+        """The session of one camera, what reads it, its frames/s, and whether it is live."""
+        person, settings = known_person(self.options), self.settings
+        feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
+        full = lens(self.options, feed.size)
+        session = Session(self.options, settings, np.random.default_rng(self.options.seed), self.clock, Timing(feed.rate), in_background,
+                          full=full, watchdog=CameraWatchdog(feed.name, feed.size, feed.live), person=person,
+                          scene=empty_scene(self.options, full))
+        return session, Capture(feed), feed.rate, feed.live
+
+    def _several(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
+        """The same of several cameras."""
+        sources = open_rig_sources(self.options, self.settings)
+        watchdogs = tuple(CameraWatchdog(camera.name, size, sources.live) for camera, size in zip(sources.cameras, sources.sizes))
+        session = RigSession(self.options, self.settings, np.random.default_rng(self.options.seed), self.clock, Timing(sources.rate),
+                             in_background, full=sources.cameras, watchdogs=watchdogs, scene=sources.scenes, height=sources.height)
+        return session, sources.capture, sources.rate, sources.live
 
     def run(self) -> None:
         """From the first picture to the last. Raises `_Nobody` where nobody was tracked."""
@@ -105,8 +124,8 @@ class _Live:
             with ExitStack() as stack:
                 stack.enter_context(self.stop)
                 stack.enter_context(self.display)
-                if self.keeper is not None:
-                    stack.enter_context(self.keeper)
+                if self.recorder is not None:
+                    stack.enter_context(self.recorder)
                 self._open(stack)
                 self._follow()
         except KeyboardInterrupt:
@@ -121,10 +140,10 @@ class _Live:
         """Get ready, and let the pictures come; those of a film do not come before."""
         self.listener.begin("getting ready")
         self.stop.hasty = True
-        if self.feed.live:
+        if self.is_live:
             stack.enter_context(self.capture)
-        warm_up(self.session.camera, self.options)
-        if not self.feed.live:
+        warm_up(self.session.worked_cameras, self.options)
+        if not self.is_live:
             stack.enter_context(self.capture)
         self.stop.hasty = False
         self.listener.begin(self.session.phase)
@@ -147,33 +166,34 @@ class _Live:
             raise self.capture.error
 
     def _keep(self, outcome: Outcome) -> None:
-        if self.session.vigil.asks_again(self.clock()):
+        if self.session.asks_again(self.clock()):
             self.capture.again()
         if outcome.frame is None:
             return
         if self.session.newly_measured():
             self._write_beside()
-            self.outlets.begin(self._subject(outcome))
+            self.outlets.begin(self._stream_subject())
         self.outlets.follow(outcome.frame, outcome.view.latency)
         self.run_.write(outcome.frame)
         self.frames += 1
         self.listener.advance(self.frames)
-        if self.keeper is not None and outcome.view.image is not None:
-            self.keeper.write(outcome.frame.time, outcome.view.image, self.session.scene, self.session.measured.guess.height)
+        if self.recorder is not None and outcome.images:
+            self.recorder.write(outcome.frame.time, outcome.images, self.session.scenes, self._person.person.height)
 
-    def _subject(self, outcome: Outcome) -> Subject:
-        """Who was measured, and where they stand."""
-        picture = outcome.view.picture
-        assert picture is not None
-        base = inverse(picture.camera.T_camera_world) @ picture.T_camera_base
-        return Subject(picture.body, base, self.session.measured.guess.height)
+    @property
+    def _person(self) -> TrackedSubject:
+        assert self.session.subject is not None
+        return self.session.subject
+
+    def _stream_subject(self) -> Subject:
+        """The measured person, for other programs."""
+        base, floor = self.session.placed()
+        return Subject(self._person.body, base, self._person.person.height, floor)
 
     def _write_beside(self) -> None:
-        """Whom and what this run was made of; anew where the person was measured anew."""
-        guess = self.session.measured.guess
-        source = str(self.options.person) if self.options.person else "proportions, refined on who stood still"
-        write_person(self.run_.folder / "person.toml", Person(guess.sizes, round(guess.height, 4), source))
-        write_calibration(self.run_.folder / "calibration.toml", [self.session.full])
+        """Person and cameras of this run; again when the person was measured again."""
+        write_person(self.run_.folder / "person.toml", self._person.person)
+        write_calibration(self.run_.folder / "calibration.toml", self.session.cameras)
 
     def _tell(self, outcome: Outcome) -> None:
         """Say what changed, once."""

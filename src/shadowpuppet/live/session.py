@@ -1,111 +1,74 @@
-"""A live session: learns the empty scene, waits for a person, measures and tracks them. Knows no threads, files or sockets."""
+"""A live session with one camera: learns the empty scene, waits for a person who stands still, measures and tracks them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import NamedTuple
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
-from shadowpuppet.live.display.view import Angle, View
-from shadowpuppet.live.learning_phase import Learner
-from shadowpuppet.live.phases import Waiter, unfit
-from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.live.timing import Timing
-from shadowpuppet.live.watchdog import Vigil
-from shadowpuppet.motion.motion import BLANK, MotionFrame
-from shadowpuppet.pipeline.footage import Mask, Shot, Silhouettes, clear_settings, region_of, worked_size
-from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.track import motion_frame, named_body, next_state
+from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
+from shadowpuppet.live.learning_phase import BackgroundCollector
+from shadowpuppet.live.phases import StandStillDetector, unfit
+from shadowpuppet.live.watchdog import CameraWatchdog
+from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
+from shadowpuppet.pipeline.person import MonocularSubject
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_settings
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.status import LOST_OVERLAP
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
 
-GONE = 2.0
-"""Seconds for which a person is lost, after which a new measurement is advised."""
 
-
-class Outcome(NamedTuple):
-    """What came of a picture, or of none."""
-
-    view: View
-    frame: MotionFrame | None = None
-    """The person's, where somebody is tracked."""
-
-
-@dataclass(eq=False)
-class Session:
-    """The session's state; `step` is called with every picture, `idle` where none came. The generator is the only chance."""
+@dataclass(eq=False, kw_only=True)
+class Session(LiveSession):
+    """A session with one camera."""
 
     full: Camera
     """The camera as it gives its pictures."""
-    options: Options
-    settings: LiveSettings
-    rng: np.random.Generator
-    clock: Callable[[], float]
-    """Seconds that never go back: those that pictures are stamped with."""
-    vigil: Vigil
-    timing: Timing
-    work: Callable[[Callable[[], SizeFit]], Callable[[], SizeFit | None]] = lambda task: partial(lambda fit: fit, task())
-    """Does what takes seconds; the answer is asked for its result until that is not None. As it is here, done at once."""
+    watchdog: CameraWatchdog
     person: Person | None = None
-    """Whose sizes are known."""
+    """The person, if their sizes are known."""
     scene: list[Image] = field(default_factory=list)
-    """Pictures of the empty scene, of the worked size; where there are none they are learnt."""
-    phase: str = "learning"
+    """Pictures of the empty scene, of the size that is worked on; learnt if there are none."""
     fit: SizeFit | None = None
     """Sizes and place, once they are found."""
-    trouble: str = ""
-    """Why no pictures come; empty where they do."""
 
     def __post_init__(self) -> None:
-        """Make what follows from the settings. Raises `SettingsError` for a region that is none."""
+        """Raises `SettingsError` for a region outside the picture."""
+        super().__post_init__()
         self.camera = self.full.resized(worked_size(self.full.size, self.options.max_size))
         self._region = region_of(self.options.region, self.full, self.camera)
-        self._began, self._lost_since, self._new = np.nan, np.nan, False
-        self._learner = Learner(self.settings.countdown, self.settings.learn)
-        self._waiter, self._still = Waiter(self.settings.still), list[tuple[Image, Mask]]()
         self._recent: list[Image] = []
-        self._tracker: MonocularTracker | None = None
-        self._state: State | None = None
         self._silhouettes: Silhouettes | None = None
-        self._clear: Silhouettes | None = None
+        self._clean: Silhouettes | None = None
+        self.begin_learning()
+        self.begin_waiting()
         if self.scene:
             self._learnt(self.scene)
 
-    # What comes
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The camera as it gives its pictures."""
+        return (self.full,)
 
-    def step(self, shot: Snapshot) -> Outcome:
-        """A picture. Raises `SilhouetteError` where the scene cannot be learnt."""
-        self._began = shot.captured if np.isnan(self._began) else self._began
-        trouble = self.vigil.see(shot.captured, shot.image)
-        if trouble:
-            return self._pause(trouble)
-        self.trouble = ""
-        self.timing.came(shot.captured, shot.number)
-        image = self._scaled(shot.image)
-        phases = {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}
-        return phases[self.phase](shot, image)
+    @property
+    def worked_cameras(self) -> tuple[Camera, ...]:
+        """The camera for pictures of the size that is worked on."""
+        return (self.camera,)
 
-    def idle(self, problem: str = "") -> Outcome:
-        """No picture came for a moment; `problem`: why, where that is known."""
-        trouble = self.vigil.silence(self.clock(), problem, self.timing.interval)
-        return self._pause(trouble) if trouble else Outcome(self._view())
-
-    def ask(self, wish: str) -> None:
-        """`learn` the background anew, or `measure` the person anew; nothing where it is not the time for it."""
-        if wish == "learn" and self.phase in ("waiting", "tracking"):
-            self._learner, self.phase = Learner(self.settings.countdown, self.settings.learn), "learning"
-        elif wish == "measure" and self.phase == "tracking":
-            self._waiter, self.phase, self._recent = Waiter(self.settings.still), "waiting", []
+    @property
+    def scenes(self) -> Sequence[list[Image]]:
+        """Pictures of the empty scene."""
+        return (self.scene,)
 
     @property
     def measured(self) -> SizeFit:
@@ -113,29 +76,48 @@ class Session:
         assert self.fit is not None
         return self.fit
 
-    def newly_measured(self) -> bool:
-        """Whether the person was measured since this was last asked."""
-        new, self._new = self._new, False
-        return new
+    def check(self, shot: Snapshot) -> str:
+        """What is wrong with a picture."""
+        return self.watchdog.see(shot.captured, shot.image)
 
-    # Phases
+    def silence(self, now: float, problem: str) -> str:
+        """What is wrong if no picture came."""
+        return self.watchdog.silence(now, problem, self.timing.interval)
 
-    def _learn(self, shot: Snapshot, image: Image) -> Outcome:
-        scene = self._learner.see(shot.captured, image)
+    def asks_again(self, now: float) -> bool:
+        """Whether the frozen camera is to be opened again."""
+        return self.watchdog.asks_again(now)
+
+    def placed(self) -> tuple[Array, float | None]:
+        """Where the body's frame stands in the world; the floor is not known."""
+        assert isinstance(self.subject, MonocularSubject)
+        picture = self.subject.picture
+        return inverse(picture.camera.T_camera_world) @ picture.T_camera_base, None
+
+    def begin_learning(self) -> None:
+        """Forget what was collected of the empty scene."""
+        self._collector = BackgroundCollector(self.settings.countdown, self.settings.learn)
+
+    def begin_waiting(self) -> None:
+        """Wait until somebody stands still."""
+        self._still, self._recent = StandStillDetector(self.settings.still), []
+
+    def _learn(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        scene = self._collector.see(shot.captured, images[0])
         if scene is not None:
             self._learnt(scene)
-        return Outcome(self._view(image))
+        return Outcome(self._view(images))
 
-    def _wait(self, shot: Snapshot, image: Image) -> Outcome:
-        mask = self._mask(shot, image)
-        self._recent = [*self._recent[-7:], image]
-        masks = self._waiter.see(shot.captured, mask)
-        if masks is not None:
-            self.phase, self._measured = "measuring", self.work(self._fitting(masks))
-        return Outcome(self._view(image, mask))
+    def _wait(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        (mask,) = masks = self._masks(shot, images)
+        self._recent = [*self._recent[-7:], images[0]]
+        still = self._still.see(shot.captured, mask)
+        if still is not None:
+            self.phase, self._measured = "measuring", self.work(self._fitting(still))
+        return Outcome(self._view(images, masks))
 
     def _fitting(self, masks: list[Mask]) -> Callable[[], SizeFit]:
-        """Finds sizes and place of who stood still; of whom they are known, the place alone."""
+        """Finds sizes and place of the person who stood still; the place alone if the sizes are known."""
         known = self.fit.guess if self.fit else self.person
         sizes, height = (known.sizes, known.height) if known else (None, None)
         height = height if self.fit else self.options.height or height
@@ -143,104 +125,53 @@ class Session:
         return partial(find_person, self.rng.spawn(1)[0], self.camera, masks, height=height, distance=distance, sizes=sizes,
                        body=self.options.tracker.body, settings=self.options.initialization)
 
-    def _measure(self, shot: Snapshot, image: Image) -> Outcome:
-        """Waits for the fit."""
-        if (fit := self._measured()) is None:
-            return Outcome(self._view(image, self._mask(shot, image)))
+    def _measure(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        """Wait for the fit."""
+        fit: SizeFit | None = self._measured()
+        if fit is None:
+            return Outcome(self._view(images, self._masks(shot, images)))
         if np.median(list(fit.overlaps.values())) < LOST_OVERLAP:
-            self._waiter, self.phase = Waiter(self.settings.still), "waiting"
-            self._waiter.message = "no person's shape: stand whole in the picture, facing the camera"
-            return Outcome(self._view(image))
+            self._still, self.phase = StandStillDetector(self.settings.still), "waiting"
+            self._still.message = "no person's shape: stand whole in the picture, facing the camera"
+            return Outcome(self._view(images))
         self._learnt(self.scene, self._recent)
-        self.fit, self.phase, self._state = fit, "tracking", None
-        self._tracker = MonocularTracker(fit.guess.picture(self.camera, self.options.tracker.body), self.options.tracker)
-        self._new = True
-        self.timing.pause()
-        return Outcome(self._view(image))
-
-    def _track(self, shot: Snapshot, image: Image) -> Outcome:
-        assert self._tracker is not None
-        mask = self._mask(shot, image)
-        state = self._state = next_state(self._tracker, self.rng, self._state, mask)
-        now = self.clock()
-        self.timing.done(shot.captured, now, shot.number)
-        status = state.status if state else "absent"
-        if status != "lost":
-            self._lost_since = np.nan
-        elif np.isnan(self._lost_since):
-            self._lost_since = shot.captured
-        frame = motion_frame(self._seconds(shot), state, self._tracker.picture, self._columns)
-        return Outcome(self._view(image, mask, state, now - shot.captured), frame)
-
-    # Parts
+        self.fit = fit
+        source = str(self.options.person) if self.options.person else "proportions, refined on who stood still"
+        self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source))
+        return Outcome(self._view(images))
 
     def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
-        """The background; with pictures of the person also how blurred outlines are."""
-        seen = Silhouettes("live", None, self._region, scene[0] if self._region else None)
-        visible = [seen.visible(image) for image in film] if film else None
-        asked, clear = self.options.silhouette, clear_settings(self.options.silhouette)
+        """Learn the background; from pictures of the person also how blurred outlines are."""
+        blank = Silhouettes("live", None, self._region, scene[0] if self._region else None)
+        visible = [blank.visible(image) for image in film] if film else None
+        asked, clean = self.options.silhouette, clean_settings(self.options.silhouette)
         self.scene = scene
-        self._silhouettes = replace(seen, segmenter=learn_background(scene, asked, film=visible))
-        self._clear = self._silhouettes if clear == asked else replace(seen, segmenter=learn_background(scene, clear, film=visible))
+        self._silhouettes = replace(blank, segmenter=learn_background(scene, asked, film=visible))
+        self._clean = self._silhouettes if clean == asked else replace(blank, segmenter=learn_background(scene, clean, film=visible))
         self.phase, self._state = ("tracking" if self.fit else "waiting"), None
 
-    def _pause(self, trouble: str) -> Outcome:
-        """Nothing comes that can be used: the person is kept, what waits for time to pass begins anew."""
-        self.trouble = trouble
-        self._learner.wait()
-        self._waiter.wait()
-        self.timing.pause()
-        return Outcome(self._view())
+    def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
+        return (scaled(shot.image, self.camera),)
 
-    def _seconds(self, shot: Snapshot) -> float:
-        """A picture's time in the run: a film's own, else since the first picture."""
-        return shot.captured - self._began if shot.shown is None else shot.shown
-
-    def _scaled(self, image: Image) -> Image:
-        import cv2
-
-        if image.shape[1::-1] == self.camera.size:
-            return image
-        return np.asarray(cv2.resize(image, self.camera.size, interpolation=cv2.INTER_AREA), np.uint8)
-
-    def _mask(self, shot: Snapshot, image: Image) -> Mask:
-        """The silhouette (H, W): that which is tracked in, before that a clean one, in which a person can be measured."""
-        silhouettes = self._silhouettes if self.phase == "tracking" else self._clear
+    def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
+        """The silhouette (H, W): before tracking a clean one, in which a person can be measured."""
+        silhouettes = self._silhouettes if self.phase == "tracking" else self._clean
         assert silhouettes is not None
-        return silhouettes(Shot(shot.captured, image, None))
+        return (silhouettes(CameraFrame(shot.captured, images[0], None)),)
 
-    @cached_property
-    def _columns(self) -> list[int]:
-        body, joints = named_body(self.options.tracker.body)
-        return [body.landmark_names.index(name) for name in joints]
+    def _forget_time(self) -> None:
+        self._collector.wait()
+        self._still.wait()
 
-    # What is shown
+    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+        picture = self.subject.picture if isinstance(self.subject, MonocularSubject) else None
+        return {"image": images[0] if images else None, "mask": masks[0] if masks else None, "picture": picture}
 
-    def _view(self, image: Image | None = None, mask: Mask | None = None, state: State | None = None, latency: float = np.nan) -> View:
-        tracking = self.phase == "tracking"
-        status = (state.status if state else "absent") if tracking and mask is not None else ""
-        pose = state.pose if state is not None and state.status not in BLANK else None
-        picture = self._tracker.picture if self._tracker else None
-        return View(
-            phase=self.phase, message=self._message(mask), countdown=self._learner.left if self.phase == "learning" else None,
-            trouble=self.trouble, status=status, overlap=state.overlap if state and pose is not None else np.nan,
-            angles=_angles(picture, pose) if tracking else (), latency=latency, rate=self.timing.rate, interval=self.timing.interval,
-            dropped=self.timing.dropped, image=image, mask=mask, picture=picture, pose=pose,
-        )  # fmt: skip
-
-    def _message(self, mask: Mask | None) -> str:
+    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
         if self.phase == "tracking":
-            hint = unfit(mask) if mask is not None else ""
-            gone = not np.isnan(self._lost_since) and self.clock() - self._lost_since > GONE
-            return hint if hint.startswith("nearly all") else "the body does not fit any more: measure anew" if gone else ""
-        return {"learning": self._learner.message, "waiting": self._waiter.message, "measuring": "measuring: one moment"}[self.phase]
-
-
-def _angles(picture, pose: np.ndarray | None) -> tuple[Angle, ...]:
-    """All rotations, degrees."""
-    if picture is None:
-        return ()
-    values = np.full(len(picture.body.skeleton.dofs), np.nan) if pose is None else pose
-    rotations = [(dof, value) for dof, value in zip(picture.body.skeleton.dofs, values.tolist()) if dof.kind == "rotation"]
-    return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)), round(math.degrees(dof.high)))
-                 for dof, value in rotations)
+            hint = unfit(masks[0]) if masks else ""
+            gone = "the body does not fit any more: measure anew" if self._gone else ""
+            return hint if hint.startswith("nearly all") else gone, None
+        if self.phase == "learning":
+            return self._collector.message, self._collector.left
+        return self._still.message if self.phase == "waiting" else "measuring: one moment", None

@@ -17,7 +17,8 @@ class LiveSettings:
     """A live session, beside what any run can be told."""
 
     camera: str = "0"
-    """Number of a camera, a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures, played as if live."""
+    """Number of a camera, a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures, played as if live. Several with
+    commas between, in the order of the calibration; or the folder of a recording of several cameras."""
     rate: Annotated[float, Field(gt=0, le=10_000)] | None = None
     """Frames/s asked of a camera, or of a film that does not tell its times."""
     speed: Annotated[float, Field(gt=0, le=100)] = 1.0

@@ -1,4 +1,4 @@
-"""What a session begins with: the camera's pictures and lens, the person, the empty scene."""
+"""What a session with one camera begins with: its calibration, the person, the empty scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shadowpuppet.silhouette.background import sample_frames
 from shadowpuppet.video import Image, Size, open_frames
 
 USUAL_FOV = 65.0
-"""Horizontal field of view (degrees) of a webcam, assumed where nothing is said."""
+"""Horizontal field of view (degrees) of a webcam, assumed if none is given."""
 
 
 def lens(options: Options, size: Size) -> Camera:
@@ -40,7 +40,7 @@ def lens(options: Options, size: Size) -> Camera:
 
 
 def known_person(options: Options) -> Person | None:
-    """Whose sizes are known. Raises `FormatError`."""
+    """The person of `options.person`; None without. Raises `FormatError`."""
     person = read_person(options.person, options.tracker.body) if options.person is not None else None
     if options.height is None and (person is None or person.height is None) and options.distance is None:
         _warn("neither height nor distance is known: the average height is assumed, and all lengths are as wrong as that; give --height")
@@ -48,7 +48,7 @@ def known_person(options: Options) -> Person | None:
 
 
 def empty_scene(options: Options, full: Camera) -> list[Image]:
-    """Pictures of the empty scene from a file, of the worked size; none where no file is given. Raises `RecordingError`."""
+    """Pictures of the empty scene from `options.background`, of the worked size; empty without. Raises `RecordingError`."""
     if options.background is None:
         return []
     size = open_frames(options.background).size

@@ -1,4 +1,4 @@
-"""How late poses are, and how many come in a second."""
+"""Latency and rate of a session's poses."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 RECENT = 15
-"""Pictures over which the rate that is shown is taken."""
+"""Pictures over which the displayed rate is averaged."""
 
 
 class Timing:
-    """Latencies and rates of a session: what is shown, and what is kept."""
+    """Latencies and rates of a session, for the display and for metrics.json."""
 
-    def __init__(self, told: float) -> None:
-        """`told`: frames/s as the camera tells them; not a number where it does not."""
-        self._usual = 1 / told
+    def __init__(self, rate: float) -> None:
+        """`rate`: frames/s that the camera states; NaN if it does not."""
+        self._usual = 1 / rate
         self.latencies, self._done = array("d"), deque[float](maxlen=RECENT + 1)
         self.dropped = 0
         """Pictures that came while another was tracked."""
@@ -29,12 +29,12 @@ class Timing:
         self._first, self._last = self._first or (captured, number), (captured, number)
 
     def pause(self) -> None:
-        """No pictures came for a while, which is not the pace of anything."""
+        """No pictures came for a while: leave the gap out of the rates."""
         self._usual, self._first, self._tracked = self.interval, None, -1
         self._done.clear()
 
     def done(self, captured: float, now: float, number: int) -> None:
-        """A pose is there, now (s), for the n-th picture, which was captured at a time (s)."""
+        """The pose of the n-th picture, captured at a time (s), was found now (s)."""
         self.dropped += number - self._tracked - 1 if self._tracked >= 0 else 0
         self._tracked = number
         self.latencies.append(now - captured)
@@ -43,17 +43,17 @@ class Timing:
 
     @property
     def interval(self) -> float:
-        """Seconds from picture to picture, as they come; as the camera tells it, before two came."""
+        """Seconds from picture to picture; as the camera states it, before two came."""
         (last, number), (first, before) = self._last, self._first or self._last
         return (last - first) / (number - before) if number > before and last > first else self._usual
 
     @property
     def rate(self) -> float:
-        """Poses a second, of late; not a number before two."""
+        """Recent poses/s; NaN before two."""
         return (len(self._done) - 1) / (self._done[-1] - self._done[0]) if len(self._done) > 1 else np.nan
 
     def summary(self) -> dict[str, Any]:
-        """As metrics.json has it: milliseconds, and frames of the camera."""
+        """For metrics.json: latencies in milliseconds and in frames of the camera."""
         if not self.latencies:
             return {}
         late, interval = np.array(self.latencies), self.interval

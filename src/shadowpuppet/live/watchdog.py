@@ -1,4 +1,4 @@
-"""Whether pictures come, change, and have one size."""
+"""Watches a camera: whether pictures come, change, and keep their size."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from shadowpuppet.video import Image, Size
 from shadowpuppet.video.frames import size_of
 
 SILENT, SILENT_FRAMES = 1.0, 5.0
-"""Seconds, and times the usual from picture to picture, after which a camera that gives none is said to be silent."""
+"""Seconds, and multiples of the camera's interval, without a picture after which it counts as silent."""
 FROZEN, FROZEN_FRAMES = 1.5, 5
-"""Seconds and pictures that are the same, pixel for pixel, after which a camera counts as frozen: real ones have noise."""
+"""Seconds and number of identical pictures after which a camera counts as frozen: real ones have noise."""
 FIRST_PATIENCE, LONGEST_PATIENCE = 3.0, 60.0
-"""Seconds before a frozen camera is let go and opened again; each time twice as long."""
+"""Seconds before a frozen camera is opened again; doubled each time."""
 
 
-class Vigil:
-    """Watches what a camera gives."""
+class CameraWatchdog:
+    """Says what is wrong with a camera's pictures."""
 
     def __init__(self, name: str, size: Size, live: bool) -> None:
-        """The camera's name and the size of its pictures; a film, which is not `live`, cannot freeze."""
+        """`size`: of its pictures; a film, which is not `live`, cannot freeze."""
         self.name, self.size, self.live = name, size, live
         self._last: Image | None = None
         self._changed = self._came = np.nan
@@ -27,7 +27,7 @@ class Vigil:
         self._patience, self._asked = FIRST_PATIENCE, np.nan
 
     def see(self, now: float, image: Image) -> str:
-        """What is wrong with a picture that came at a time (s), in a sentence; empty where nothing is."""
+        """What is wrong with a picture that came at a time (s), in a sentence; empty if nothing is."""
         self._came = now
         if size_of(image) != self.size:
             found = size_of(image)
@@ -45,7 +45,7 @@ class Vigil:
         return self.live and self._same >= FROZEN_FRAMES and now - self._changed >= FROZEN
 
     def silence(self, now: float, problem: str, interval: float) -> str:
-        """What is wrong where no picture came until now (s), with the usual seconds between two; `problem` is the reader's own word."""
+        """What is wrong if no picture came until now (s); `problem`: what the reader says, `interval`: seconds from picture to picture."""
         self._came = now if np.isnan(self._came) else self._came
         if problem:
             return f"{problem} (it is tried again)"
@@ -54,7 +54,7 @@ class Vigil:
         return f"{self.name}: no picture for {now - self._came:.0f} s" if silent else ""
 
     def asks_again(self, now: float) -> bool:
-        """Whether a frozen camera is to be opened anew; true once in a while."""
+        """Whether a frozen camera is to be opened again; true once per waiting time."""
         if not self.frozen(now):
             return False
         self._asked = now if np.isnan(self._asked) else self._asked

@@ -15,10 +15,13 @@ from shadowpuppet.calibration.rotation_error import RotationError, estimate_rota
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
 from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
-from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Silhouettes, silhouettes, take_sample
-from shadowpuppet.pipeline.footage_rig import Rig, follow, usable_cores
+from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.survey import brief_length
+from shadowpuppet.threads import usable_cores
 
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
 """Number of sets of silhouettes compared; their least number if the films are long enough; the greatest number of sets read."""
@@ -26,8 +29,6 @@ MAX_SET_RATE = 31.0
 """Greatest rate of sets, 1/s: a higher one adds nothing."""
 SETS_COMPARED = 12
 """Number of sets, spread over all, in which places are compared."""
-SAMPLE_FRAMES = 240
-"""Frames of each film that are sampled if its background is not made from the film."""
 MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 3.0
 """Sets from which on a film counts as late; the same for a camera that disagrees about places, whose time is less certain; and how
 many times the spread of its pairs the offset must be."""
@@ -105,7 +106,7 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> Silhou
     listener.begin("reading", SETS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
-        for n, each in enumerate(follow(rig, segmenters, ready=options.masks, every=every, threads=usable_cores())):
+        for n, each in enumerate(synchronized_frames(rig, segmenters, ready=options.masks, every=every, threads=usable_cores())):
             row = silhouettes_of(each.masks)
             if rows or sum(silhouette is not None for silhouette in row) > 1:
                 rows.append(row)
@@ -116,8 +117,7 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> Silhou
 
 
 def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
-    sample = take_sample(footage, options.masks, LOOKED_AT if footage.view.background is None and not options.masks else SAMPLE_FRAMES)
-    return silhouettes(footage, sample, options)
+    return learn_silhouettes(footage, take_sample(footage, options.masks, brief_length(footage, options)), options)
 
 
 def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:

@@ -23,6 +23,9 @@ from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS, Multivie
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
+TRACKERS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
+    "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings)}  # fmt: skip
+"""Tables of the trackers' settings, with their presets and what makes them."""
 PATHS = ("calibration", "background", "person", "prior")
 """Options that are files; relative to the file of settings that names them."""
 
@@ -104,15 +107,14 @@ def make_options(values: Mapping[str, Any] | None = None, source: str = "setting
     preset = values.get("preset", "default")
     if not isinstance(preset, str):
         raise SettingsError(f"{source}: preset: found {preset!r}, expected a name in quotes")
-    known = {**PRESETS, **MULTIVIEW_PRESETS}
+    known = [*dict.fromkeys(name for presets, _ in TRACKERS.values() for name in presets)]
     if preset not in known:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(known)}")
     if values.get("body") is not None:
-        values |= {table: {**values.get(table, {}), "body": values["body"]} for table in ("tracker", "multiview")
+        values |= {table: {**values.get(table, {}), "body": values["body"]} for table in TRACKERS
                    if table == "tracker" or values["body"] in WHOLE}
-    of = {table: preset if preset in presets else "default" for table, presets in (("tracker", PRESETS), ("multiview", MULTIVIEW_PRESETS))}
-    values["tracker"] = make_settings(of["tracker"], values.get("tracker", {}), f"{source}: tracker")
-    values["multiview"] = make_multiview_settings(of["multiview"], values.get("multiview", {}), f"{source}: multiview")
+    for table, (presets, make) in TRACKERS.items():
+        values[table] = make(preset if preset in presets else "default", values.get(table, {}), f"{source}: {table}")
     return validate(Options, values, source)
 
 

@@ -1,27 +1,35 @@
-"""Who is in the film: the person's sizes and place, from a file, from reference pictures, or from the film itself."""
+"""The person before one camera: sizes and place from a file, from reference pictures, or from the film itself (Liu 2011, Algorithm 1)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, islice
 
 import numpy as np
 
-from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import may_be_person
+from shadowpuppet.camera.drawing import overlay_frame
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
-from shadowpuppet.pipeline.footage import FIRST, Footage, Mask, Sample, Shot, Silhouettes
+from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline.footage import CameraFrame, Footage
+from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.subject import TrackedSubject
 from shadowpuppet.silhouette.boundary import disc
-from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, as_whole, find_person, fit_references
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.video import Image
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
 """Overlap (intersection over union) of the fitted body and a reference's silhouette under which it does not show its posture..."""
@@ -30,7 +38,7 @@ DOUBTFUL = {"front_t_pose": 0.78, "side_arms_hanging": 0.68, "front_arms_t_pose"
 SEEN = 0.6
 """Share of a level forearm that lies in the silhouette, under which the arms were not level: sizes can hide a wrong posture..."""
 BESIDE = 0.03
-"""... or so far beside it, over the root of its area: in small pictures an arm may lack one side."""
+"""... or this far beside it, as a share of the root of its area: in small pictures an arm may lack one side."""
 DEEP = 1.2
 """Depth of the fitted trunk over its width from which on it was not seen from the side; right ones have 0.75 to 0.82."""
 BROAD = 0.33
@@ -44,56 +52,85 @@ LOOKED_FOR_IN = 12
 """Masks of the first seconds in which a person without references is looked for."""
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A person who was found in the pictures."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MonocularSubject(TrackedSubject):
+    """A person before one camera."""
 
     fit: SizeFit
-    """Sizes and place."""
-    source: str
-    """Where the sizes come from, in words."""
-    start: float
-    """Overlap of the body, in the best pose found, with the film's first silhouette."""
+    """Sizes and place, and how they were found."""
+    tracker: MonocularTracker
+
+    @classmethod
+    def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str) -> MonocularSubject:
+        """The person of a fit; `source`: where the sizes come from, in words."""
+        picture = fit.guess.picture(camera, settings.body)
+        person = Person(fit.guess.sizes, round(fit.guess.height, 4), source)
+        return cls(body=picture.body, person=person, fit=fit, tracker=MonocularTracker(picture, settings), summary={})
 
     @property
-    def person(self) -> Person:
-        """To be saved and used again."""
-        guess = self.fit.guess
-        return Person(guess.sizes, round(guess.height, 4), self.source)
+    def picture(self) -> Picture:
+        """How the camera sees the body."""
+        return self.tracker.picture
 
-    def doubts(self) -> list[str]:
-        """What speaks against this fit."""
-        said = [f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
-                "is the silhouette whole? take it again, or remove it" for name, overlap in self.fit.overlaps.items()
-                if self.source == "references" and overlap < DOUBTFUL[name]]
-        if self.start < POOR:
-            said.append(f"the body overlaps the film's first silhouette by {self.start:.2f} only: do height and distance hold, is the "
-                        "silhouette a person's, and does the person face the camera?")
-        return said
+    def observe(self, masks: Sequence[Mask | None]) -> Mask:
+        """The camera's mask (H, W)."""
+        (mask,) = masks
+        assert mask is not None
+        return mask
+
+    def next_state(self, rng: np.random.Generator, state: State | None, observation: Mask) -> State | None:
+        """The state after a mask; None before the first that is not empty."""
+        if state is None:
+            return self.tracker.start(rng, observation) if observation.any() else None
+        return self.tracker.step(rng, state, observation)
+
+    def points(self, pose: Array) -> Array:
+        """Landmarks (L, 3) of a pose (D,) in the world, metres."""
+        return self.picture.points_world(pose[None])[0]
+
+    def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
+        """Model, matching result and raw picture, one below the other."""
+        image, mask = frames.images[0], self.observe(frames.masks)
+        assert image is not None
+        pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
+        ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None
+        return overlay_frame(image, mask, self.picture, pose, status=found.status, time=found.time, overlap=found.overlap, ignore=ignored)
 
 
-def find(footage: Footage, sample: Sample, seen: Silhouettes, options: Options, rng: np.random.Generator) -> Found:
-    """Sizes and place. Raises `TrackingError` where nobody is found or a reference shows another posture, or `FormatError`."""
+def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) -> MonocularSubject:
+    """The person's sizes and place. Raises `TrackingError` where nobody is found, `RecordingError` where a reference shows another posture,
+    or `FormatError`."""
     for_fit, for_start = rng.spawn(2)
-    masks = list(islice(filter(may_be_person, map(seen, chain(sample.first, sample.shots))), FIRST))
+    (footage,), (clean,), masks = survey.rig.footage, survey.clean, [mask for (mask,) in survey.first.masks if mask is not None]
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
     try:
-        fit, source = _fitted(footage, masks, seen, options, for_fit)
+        fit, source = _fitted(footage, masks, clean, options, for_fit)
     except TrackingError as error:
         raise TrackingError(f"{footage.recording.path}: {error}") from None
-    tracker = MonocularTracker(fit.guess.picture(footage.camera, options.tracker.body), options.tracker)
-    return Found(fit, source, tracker.start(for_start, masks[0]).overlap)
+    subject = MonocularSubject.of(fit, footage.camera, options.tracker, source)
+    start = subject.tracker.start(for_start, masks[0]).overlap
+    other = clean.segmenter.key if clean is not survey.silhouettes[0] and clean.segmenter is not None else None
+    guess = fit.guess
+    summary = {"source": source, "silhouettes": other, "height": float(guess.height), "distance": float(guess.distance),
+               "elevation": float(guess.elevation), "overlaps": dict(fit.overlaps), "start_overlap": start,
+               "sizes": dict(zip(guess.sizes.names(), guess.sizes.to_array().tolist()))}
+    return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start)))
 
 
-def told_scale(footage: Footage) -> str:
-    """What fixes the scale, in words."""
-    subject = footage.recording.subject
-    known = [f"{name} {value:.2f} m" for name, value in (("height", subject.height), ("distance", subject.distance)) if value]
-    return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
+def _doubts(fit: SizeFit, source: str, start: float) -> list[str]:
+    """What speaks against a fit; `start`: overlap of the body, in the best pose found, with the film's first silhouette."""
+    doubts = [f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
+              "is the silhouette whole? take it again, or remove it" for name, overlap in fit.overlaps.items()
+              if source == "references" and overlap < DOUBTFUL[name]]
+    if start < POOR:
+        doubts.append(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
+                      "silhouette a person's, and does the person face the camera?")
+    return doubts
 
 
-def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Options, rng: np.random.Generator) -> tuple[SizeFit, str]:
+def _fitted(footage: Footage, masks: list[Mask], silhouettes: Silhouettes, options: Options,
+            rng: np.random.Generator) -> tuple[SizeFit, str]:
     subject, body = footage.recording.subject, options.tracker.body
     known = {"height": subject.height, "distance": subject.distance, "body": body, "settings": options.initialization}
     if options.person is not None:
@@ -101,7 +138,7 @@ def _fitted(footage: Footage, masks: list[Mask], seen: Silhouettes, options: Opt
         known["height"] = known["height"] or person.height
         fit = find_person(rng, footage.camera, _few(masks), sizes=person.sizes, **known)
         return replace(fit, curves={}), str(options.person)
-    references = _references(footage, seen)
+    references = _references(footage, silhouettes)
     if references:
         known["body"] = "rounded" if body in WHOLE else body
         fit = fit_references(rng, footage.camera, references, **known)
@@ -115,18 +152,18 @@ def _few(masks: list[Mask]) -> list[Mask]:
     return [masks[k] for k in np.unique(np.linspace(0, len(masks) - 1, LOOKED_FOR_IN).astype(int))]
 
 
-def _references(footage: Footage, seen: Silhouettes) -> dict[str, Mask]:
+def _references(footage: Footage, silhouettes: Silhouettes) -> dict[str, Mask]:
     """Masks of the reference postures; with ready masks those that have one."""
-    given = [r for r in footage.recording.references if seen.segmenter is not None or r.mask is not None]
-    found = {reference.name: _reference(footage, seen, reference) for reference in given}
+    given = [r for r in footage.recording.references if silhouettes.segmenter is not None or r.mask is not None]
+    found = {reference.name: _reference(footage, silhouettes, reference) for reference in given}
     return {name: found[name] for name in POSTURES if name in found}
 
 
-def _reference(footage: Footage, seen: Silhouettes, reference: Reference) -> Mask:
-    path = reference.image if seen.segmenter is not None or reference.mask is None else reference.mask
+def _reference(footage: Footage, silhouettes: Silhouettes, reference: Reference) -> Mask:
+    path = reference.image if silhouettes.segmenter is not None or reference.mask is None else reference.mask
     images = (image for image, _ in zip(footage.pictures(path, "a reference"), range(LONGEST_REFERENCE)))
     try:
-        masks = [seen(Shot(0.0, image, image)) for image in images]
+        masks = [silhouettes(CameraFrame(0.0, image, image)) for image in images]
     except SilhouetteError as error:
         raise RecordingError(f"{path}: {error}") from None
     middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # in a film of the posture, whoever walks in is in few frames
@@ -182,4 +219,4 @@ HOW = {
     "side_arms_hanging": "turn to show the left or right side, arms down along the body",
     "front_arms_t_pose": "face the camera, arms level to the sides, palms down",
 }
-"""What each reference shows."""
+"""How to stand for each reference."""

@@ -1,56 +1,129 @@
-"""Who is before several cameras, and what follows them: sizes from a file, from training motion or from a height, refined on the first
-seconds; a motion prior; the tracker."""
+"""The person before several cameras: sizes from a file, from training motion or from a height, refined on the first seconds; a motion
+prior; the tracker."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
+from collections.abc import Generator, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.pipeline.footage_rig import Rig
+from shadowpuppet.motion.motion import JointTable, MotionFrame
 from shadowpuppet.pipeline.learn_prior import familiar
-from shadowpuppet.pipeline.look_rig import Opening
+from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.track_rig import Puppet
+from shadowpuppet.pipeline.overlay_video import overlay_grid
+from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.pipeline.subject import Observed, TrackedSubject
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
-from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
-from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.video import Image
 
 
-def prepare_puppet(rng: np.random.Generator, rig: Rig, opening: Opening, options: Options, training: JointTable | None) -> Puppet:
-    """Measure the person in the first seconds, and make the tracker. Raises a `ShadowPuppetError` where nobody is found, or a file does not
+class HullObservation(NamedTuple):
+    """What several cameras show of the person."""
+
+    points: SurfacePoints
+    """On the visual hull."""
+    masks: Sequence[Mask | None]
+    people: int
+    """Number of cameras whose silhouette may be a person's."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MultiviewSubject(TrackedSubject):
+    """A person before several cameras."""
+
+    tracker: MultiviewTracker
+    hull: VisualHull
+
+    def observe(self, masks: Sequence[Mask | None]) -> HullObservation:
+        """Surface points and the masks that they come from."""
+        return HullObservation(self.hull.points(masks), masks, sum(mask is not None and may_be_person(mask) for mask in masks))
+
+    def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
+        """Observations of frame sets: the next is made by another thread while one is tracked."""
+        source = super().observations(frames)
+        with ThreadPoolExecutor(1, "hull") as thread:
+            coming = thread.submit(next, source, None)
+            while (observed := coming.result()) is not None:
+                coming = thread.submit(next, source, None)
+                yield observed
+
+    def next_state(self, rng: np.random.Generator, state: MultiviewState | None, observation: HullObservation) -> MultiviewState | None:
+        """The state after an observation; None while nobody is seen, after which the person is searched for again."""
+        points, masks, people = observation
+        if people == 0 or (state is None and people < 2):
+            return None
+        return self.tracker.start(rng, points, masks) if state is None else self.tracker.step(rng, state, points, masks)
+
+    def unfound(self, observation: HullObservation) -> str:
+        """Lost if one camera still shows somebody, else absent."""
+        return "lost" if observation.people else "absent"
+
+    def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
+        """A grid of the cameras' images with the model and the silhouettes."""
+        return overlay_grid(frames, found, self.pictures)
+
+    @cached_property
+    def pictures(self) -> list[Picture]:
+        """How each camera sees the body."""
+        return [Picture(self.body, camera, camera.T_camera_world) for camera in self.hull.cameras]
+
+
+def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) -> MultiviewSubject:
+    """The person's sizes from the first seconds, and the tracker. Raises a `ShadowPuppetError` where nobody is found, or a file does not
     fit."""
+    rig, recording = survey.rig, survey.rig.recording
+    check_body(options)
+    training = None if recording.training is None else read_motion(recording.training)
+    return fit_in_views(rng, rig.cameras, survey.first.masks, options, rig.rate / options.every, recording.subject.height, training)
+
+
+def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], options: Options,
+                 rate: float, height: float | None = None, training: JointTable | None = None) -> MultiviewSubject:
+    """The person that the `cameras` show in some `views` (masks by time), tracked at `rate` frames/s. Raises as `fit_multiview`."""
     settings = options.multiview
-    if options.body not in (None, settings.body):
-        raise SettingsError(f"body: found {options.body!r}, an upper body, for several cameras; expected one of {choices(WHOLE)}, "
-                            "or one camera (--camera)")
-    hull = VisualHull(rig.cameras, settings.hull)
-    known = familiar(rng, options, training, settings.body, rig.rate / options.every)
-    first = [(hull.points(masks), masks) for masks in opening.masks]
-    height = options.height or rig.recording.subject.height
+    hull = VisualHull(cameras, settings.hull)
+    known = familiar(rng, options, training, settings.body, rate)
+    first = [(hull.points(masks), masks) for masks in views]
+    height = options.height or height
     if options.person is not None:
         sizes, source = read_person(options.person, settings.body).sizes, str(options.person)
         spread = np.zeros(len(sizes.names()))
     elif known.sizes is not None:
         sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", size_deviations(known.sizes, shown=True)
     else:
-        seen = height or estimate_height(rng, lambda tall: make_body(settings.body, average_sizes(settings.body, tall)), rig.cameras, first,
-                                       settings) or AVERAGE_HEIGHT
-        sizes = average_sizes(settings.body, seen)
-        source = f"{'the height' if height else f'a height of {seen:.2f} m as seen'}, and the hulls of the first seconds"
+        tall = height or estimate_height(rng, lambda tall: make_body(settings.body, average_sizes(settings.body, tall)), cameras, first,
+                                         settings) or AVERAGE_HEIGHT
+        sizes = average_sizes(settings.body, tall)
+        source = f"{'the height' if height else f'a height of {tall:.2f} m as seen'}, and the hulls of the first seconds"
         assert isinstance(sizes, BoneSizes)
         spread = size_deviations(sizes, shown=False)
     library = known.poses if len(known.poses) else None
-    person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, rig.cameras, first, settings, library)
+    person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library)
     prior = known.prior if settings.method == "hybrid" else None
-    tracker = MultiviewTracker(person.body, rig.cameras, settings, prior, library)
-    told: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
-                            "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    return Puppet(person.body, tracker, hull, told, (), Person(person.sizes, height, source))
+    summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
+                               "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
+    return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull,
+                            tracker=MultiviewTracker(person.body, tuple(cameras), settings, prior, library))
+
+
+def check_body(options: Options) -> None:
+    """Raise `SettingsError` for a body that several cameras cannot track."""
+    if options.body not in (None, options.multiview.body):
+        raise SettingsError(f"body: found {options.body!r}, an upper body, for several cameras; expected one of {choices(WHOLE)}, "
+                            "or one camera (--camera)")

@@ -1,4 +1,4 @@
-"""What every run has, of one camera or several: who is told, the time each stage takes, measures at the end."""
+"""What every run reports: progress, the time of each stage, measures at its end."""
 
 from __future__ import annotations
 
@@ -13,70 +13,62 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.motion.motion_files import read_truth
-from shadowpuppet.io.recording import Recording
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.look_rig import RigLook
+from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import Rig
 
 Item = TypeVar("Item")
-STAGES = ("decode", "segment", "track", "write")
-"""What a frame's time is spent on, with one camera."""
-RIG_STAGES = ("decode", "segment", "wait", "hull", "track", "write")
-"""The same with several; their films are decoded and segmented side by side, and what this takes altogether is not waited for."""
+STAGES = ("decode", "segment", "wait", "hull", "track", "write")
+"""Stages of a frame. Several cameras' films are decoded and segmented in parallel: their sum is not what the tracker waits for, `wait`."""
 FALLBACK_RATE = 25.0
-"""Frames/s of an overlay whose film does not tell its own."""
+"""Frames/s of an overlay whose film does not state its own."""
 MANY_LOST = 0.1
-"""Share of frames from which on a run that lost the person is said to be in doubt."""
+"""Share of lost frames from which on a run is in doubt."""
 
 
 class Listener:
-    """Is told how a run goes, and does nothing: derive from it."""
+    """Is notified of a run's progress, and does nothing: derive from it."""
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """Something begins: `looking` or `tracking`; `total`: frames, where that is known."""
+        """A phase begins: `looking` or `tracking`; `total`: its frames, if known."""
 
     def advance(self, frames: int) -> None:
-        """So many frames are tracked."""
+        """`frames` frames are tracked."""
 
     def look(self, look: Look | RigLook) -> None:
-        """What was found, before the tracking begins."""
+        """The look is done; tracking follows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """A run that came to its end."""
+    """A finished run."""
 
     folder: Path
     motion: Motion
     metrics: dict[str, Any]
-    """What is in metrics.json."""
+    """The contents of metrics.json."""
     look: Look | RigLook
 
 
 @dataclass
-class Watch:
+class StageTimer:
     """Seconds by stage."""
 
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
 
-    @classmethod
-    def of(cls, stages: Iterable[str]) -> Watch:
-        """One for other stages than those of one camera."""
-        return cls(dict.fromkeys(stages, 0.0))
-
-    def add(self, stage: str, seconds: float) -> None:
-        """Count what was measured elsewhere."""
-        self.seconds[stage] += seconds
+    def add(self, **seconds: float) -> None:
+        """Count times that were measured elsewhere."""
+        for stage, value in seconds.items():
+            self.seconds[stage] += value
 
     @contextlib.contextmanager
     def time(self, stage: str) -> Iterator[None]:
-        """Count what is done in the `with` block."""
+        """Count the time of a `with` block."""
         start = time.perf_counter()
         try:
             yield
@@ -84,7 +76,7 @@ class Watch:
             self.seconds[stage] += time.perf_counter() - start
 
     def each(self, stage: str, items: Iterable[Item]) -> Iterator[Item]:
-        """Count the making of the items."""
+        """Pass items on, and count the time of making them."""
         source = iter(items)
         while True:
             with self.time(stage):
@@ -95,28 +87,28 @@ class Watch:
 
 
 def json_text(value: Any) -> str:
-    """Plain values, arrays and dataclasses as JSON; null for what is not finite."""
+    """Plain values, arrays and dataclasses as JSON; null for numbers that are not finite."""
     return json.dumps(for_json(plain(value, "value")), indent=1, ensure_ascii=False, allow_nan=False)
 
 
 def generators(options: Options) -> list[np.random.Generator]:
-    """One for the look, one for the tracking, so that neither's use of chance changes the other."""
+    """Two random generators, for the look and for the tracking, so that neither depends on what the other draws."""
     return np.random.default_rng(options.seed).spawn(2)
 
 
 def tracked(frames: int | None, every: int) -> int | None:
-    """How many of a film's frames are tracked; None where their number is not known."""
+    """Number of a film's frames that are tracked; None where it is not known."""
     return None if frames is None else -(-frames // every)
 
 
-def timings(watch: Watch, frames: int, wall: float) -> dict[str, Any]:
-    """Seconds in all, frames/s, and milliseconds a frame by stage, for metrics.json."""
-    milliseconds = {stage: round(1000 * seconds / max(frames, 1), 3) for stage, seconds in watch.seconds.items()}
+def timings(timer: StageTimer, stages: Iterable[str], frames: int, wall: float) -> dict[str, Any]:
+    """Seconds in total, frames/s, and milliseconds per frame of the `stages`, for metrics.json."""
+    milliseconds = {stage: round(1000 * timer.seconds[stage] / max(frames, 1), 3) for stage in stages}
     return {"track_s": round(wall, 3), "frames_per_s": round(frames / max(wall, 1e-9), 2), "ms_per_frame": milliseconds}
 
 
 def warn_of_losses(motion: Motion) -> None:
-    """Warn where much of the run is nothing."""
+    """Warn if many frames are lost."""
     lost = np.flatnonzero(motion.status == "lost")
     present = np.count_nonzero(motion.status != "absent")
     if len(lost) > MANY_LOST * present:
@@ -125,10 +117,11 @@ def warn_of_losses(motion: Motion) -> None:
              ShadowPuppetWarning, stacklevel=3)
 
 
-def evaluated(recording: Recording, motion: Motion, camera: Camera | None = None, cameras: int = 1) -> dict[str, Any]:
-    """Measures, against the truth where there is one that fits; `camera` says what is depth, where it is not one of several `cameras`."""
+def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
+    """Measures of a motion, against the recording's truth if there is one that fits; depths are those of a single camera."""
+    camera, cameras = None if rig.is_multiview else rig.cameras[0], len(rig.cameras)
     try:
-        truth = read_truth(recording.truth, motion.joint_names) if recording.truth is not None else None
+        truth = read_truth(rig.recording.truth, motion.joint_names) if rig.recording.truth is not None else None
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is done: it is not to be lost over this
         warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)

@@ -1,37 +1,29 @@
-"""A whole run: a recording in, a run folder out. Prints nothing: it tells a `Listener`."""
+"""A whole run, with one camera or several: a recording in, a run folder out. Prints nothing: it notifies a `Listener`."""
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.shapes import Body
-from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.motion.motion import BLANK, MotionFrame
-from shadowpuppet.pipeline.footage import opened
-from shadowpuppet.pipeline.footage_rig import chosen_views, open_rig
-from shadowpuppet.pipeline.look import Look, Prepared, check, prepare
-from shadowpuppet.pipeline.look_rig import RigLook, check_rig, look_at_rig
+from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
-from shadowpuppet.pipeline.overlay_video import OverlayWriter
-from shadowpuppet.pipeline.person import Found
-from shadowpuppet.pipeline.person_rig import prepare_puppet
+from shadowpuppet.pipeline.person import fit_monocular
+from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
+    STAGES,
     Listener,
+    StageTimer,
     Summary,
-    Watch,
     evaluated,
     generators,
     json_text,
@@ -39,155 +31,155 @@ from shadowpuppet.pipeline.progress import (
     tracked,
     warn_of_losses,
 )
-from shadowpuppet.pipeline.silhouette_cache import Repeats
-from shadowpuppet.pipeline.track_rig import Puppet, track_rig, training_of
+from shadowpuppet.pipeline.rig import Rig, open_rig, read_frames
+from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
+from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
+from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.video import write_frames
 
-__all__ = ["Listener", "Summary", "Watch", "fit_person", "json_text", "look_at", "motion_frame", "named_body", "next_state",
-           "track_recording"]
+__all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
+
+
+class Kind(NamedTuple):
+    """How a kind of recording is looked at, fitted and tracked."""
+
+    method: str
+    """In words, with the number of cameras for {}."""
+    settings: str
+    """The table of `Options` that has the tracker's settings."""
+    survey: Callable[[Rig, Options], Survey]
+    fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject]
+    """Measures the person and makes the tracker."""
+    look_fits: bool
+    """Whether a look without a run measures the person too: not with several cameras, where that takes long."""
+    stages: tuple[str, ...]
+    """Stages whose times metrics.json has."""
+
+
+MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "write"))
+MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, False, STAGES)
+
+
+class Prepared(NamedTuple):
+    """All that a run begins with."""
+
+    survey: Survey
+    subject: TrackedSubject | None
+    """The fitted person; None where tracking is hopeless."""
+    look: Look | RigLook
+
+    def check(self) -> TrackedSubject:
+        """The fitted person. Raises `TrackingError` where tracking is hopeless."""
+        self.survey.check()
+        assert self.subject is not None
+        return self.subject
 
 
 @one_blas_thread()
 def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
     """What `track_recording` would begin with. Raises a `ShadowPuppetError` where something cannot be used."""
     options = options or Options()
-    if several(recording, options):
-        return look_at_rig(open_rig(recording, options), options).look
-    return prepare(str(recording), options, generators(options)[0]).look
+    rig = open_rig(recording, options)
+    kind = kind_of(rig)
+    return prepare(generators(options)[0], rig, options, kind).look if kind.look_fits else kind.survey(rig, options).look
+
+
+@one_blas_thread()
+def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[TrackedSubject, Look | RigLook]:
+    """Measure a person and save the sizes. Raises a `ShadowPuppetError` where nobody is found or the file cannot be written."""
+    options = options or Options()
+    rig = open_rig(recording, options)
+    prepared = prepare(generators(options)[0], rig, options, kind_of(rig))
+    subject = prepared.check()
+    write_person(file, subject.person)
+    return subject, prepared.look
 
 
 @one_blas_thread()
 def track_recording(recording: str | Path, folder: str | Path, options: Options | None = None,
-                    listener: Listener | None = None, repeats: Repeats | None = None) -> Summary:
-    """Track a recording (folder, or film with `Options.fov`) into a run folder; one of several cameras as `rig_run` does.
+                    listener: Listener | None = None, cache: SilhouetteCache | None = None) -> Summary:
+    """Track a recording (a folder, or a film with `Options.fov`) of one camera or several into a run folder.
 
-    `repeats` keeps what the next run of the same film can use; metrics.json tells `kept_silhouettes` of one that did.
+    `cache` keeps silhouettes for the next run of the same recording; `kept_silhouettes` of metrics.json marks a run that used them.
 
-    Beside what `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the camera) and, when
-    asked for, overlay.mp4. An interrupted run keeps what it has. Raises a `ShadowPuppetError` where something cannot be used;
-    the same options, film and machine give the same joints.
+    Beside what `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the cameras) and, if asked
+    for, overlay.mp4. An interrupted run keeps what it has. Raises a `ShadowPuppetError` where something cannot be used;
+    the same options, films and machine give the same joints.
     """
-    options, listener = options or Options(), listener or Listener()
-    if several(recording, options):
-        return track_rig(recording, folder, options, listener, prepare_puppet)
-    with_names, joints = named_body(options.tracker.body)
-    info = {"recording": Path(recording).resolve(), "method": "Liu 2011, one camera", "settings": plain_options(options)}
-    with RunWriter(folder, options.tracker.body, with_names.skeleton.dof_names, joints, info) as run:
-        for_look, for_track = generators(options)
+    options = options or Options()
+    rig = open_rig(recording, options)
+    return run(rig, kind_of(rig), folder, options, listener or Listener(), cache)
+
+
+def kind_of(rig: Rig) -> Kind:
+    """How a recording is tracked."""
+    return MULTIVIEW if rig.is_multiview else MONOCULAR
+
+
+def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None) -> Prepared:
+    """Look at a recording, and fit the person unless the look refuses. Raises a `ShadowPuppetError` where something cannot be used."""
+    survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
+    if survey.look.refusal is not None:
+        return Prepared(survey, None, survey.look)
+    subject = kind.fit(rng, survey, options)
+    return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
+
+
+def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None) -> Summary:
+    """Look, fit, track and evaluate, as `track_recording`."""
+    for_look, for_track = generators(options)
+    body, recording = average_body(getattr(options, kind.settings).body), rig.recording
+    info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
+            "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
+            "truth": recording.truth and recording.truth.resolve()}
+    with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as writer:
         listener.begin("looking")
         start = time.perf_counter()
-        prepared = prepare(str(recording), options, for_look) if repeats is None else repeats.prepare(recording, options, for_look)
-        run.metrics |= {"kept_silhouettes": True} if repeats is not None and repeats.reused else {}
-        run.metrics["look_s"] = round(time.perf_counter() - start, 3)
+        prepared = prepare(for_look, rig, options, kind, cache)
+        writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
+        writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
-        run.info |= {"truth": str(truth.resolve())} if (truth := prepared.footage.recording.truth) else {}
-        _write_beside(run.folder, prepared)
-        _follow(run, prepared, options, listener, for_track, joints)
+        _write_beside(writer.folder, prepared)
+        _track(writer, prepared, kind, options, listener, for_track, cache)
     written = read_run(folder)
-    motion, metrics = written.motion, written.metrics | evaluated(prepared.footage.recording, written.motion, prepared.footage.camera)
-    warn_of_losses(motion)
+    metrics = written.metrics | evaluated(rig, written.motion)
+    warn_of_losses(written.motion)
     write_metrics(folder, metrics)
-    return Summary(Path(folder), motion, metrics, prepared.look)
-
-
-def several(recording: str | Path, options: Options) -> bool:
-    """Whether a recording is one of several cameras, of which not one alone is asked for. Raises a `ShadowPuppetError` as they are read."""
-    return len(chosen_views(opened(recording, options), options.camera)) > 1
-
-
-@one_blas_thread()
-def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[Found | Puppet, Look | RigLook]:
-    """Find a person's sizes and save them. Raises a `ShadowPuppetError` where nobody is found or the file cannot be written."""
-    options = options or Options()
-    if several(recording, options):
-        puppet, look = measured(recording, options)
-        assert puppet.person is not None
-        write_person(file, puppet.person)
-        return puppet, look
-    prepared = prepare(str(recording), options, generators(options)[0])
-    found = check(prepared)
-    write_person(file, found.person)
-    return found, prepared.look
-
-
-def measured(recording: str | Path, options: Options) -> tuple[Puppet, RigLook]:
-    """Who is before several cameras, measured in the first seconds. Raises a `ShadowPuppetError` where nobody is found."""
-    rig = open_rig(recording, options)
-    prepared = look_at_rig(rig, options)
-    check_rig(prepared)
-    puppet = prepare_puppet(generators(options)[0], rig, prepared.opening, options, training_of(rig))
-    return puppet, replace(prepared.look, person=puppet.told, doubts=(*prepared.look.doubts, *puppet.doubts))
-
-
-def named_body(name: str) -> tuple[Body, list[str]]:
-    """A body of average sizes, for its names, and the names of the joints that a run keeps."""
-    body = make_body(name, average_sizes(name, AVERAGE_HEIGHT))
-    return body, [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
+    return Summary(Path(folder), written.motion, metrics, prepared.look)
 
 
 def _write_beside(folder: Path, prepared: Prepared) -> None:
-    found = check(prepared)
+    subject = prepared.check()
     write_whole(folder / "look.json", json_text(prepared.look) + "\n")
-    write_person(folder / "person.toml", found.person)
-    write_calibration(folder / "calibration.toml", [prepared.footage.view.camera])
+    write_person(folder / "person.toml", subject.person)
+    write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
 
 
-def _follow(run: RunWriter, prepared: Prepared, options: Options, listener: Listener, rng: np.random.Generator,
-            joints: list[str]) -> None:
-    """Frame by frame: silhouette, pose, files."""
-    picture = check(prepared).fit.guess.picture(prepared.footage.camera, options.tracker.body)
-    columns = [picture.body.landmark_names.index(name) for name in joints]
-    tracker, state, watch, frames = MonocularTracker(picture, options.tracker), None, Watch(), 0
+def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
+           cache: SilhouetteCache | None) -> None:
+    """Frame set by frame set: silhouettes, observation, state, files."""
+    subject, survey, timer, state, count = prepared.check(), prepared.survey, StageTimer(), None, 0
+    rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
     try:
-        with _overlay(run.folder, prepared, picture, options) as overlay:
-            for shot in watch.each("decode", prepared.footage.tracked(options.masks, options.every)):
-                with watch.time("segment"):
-                    mask = prepared.silhouettes(shot)
-                with watch.time("track"):
-                    state = next_state(tracker, rng, state, mask)
-                with watch.time("write"):
-                    run.write(motion_frame(shot.time, state, picture, columns))
+        with ExitStack() as stack:
+            overlay = stack.enter_context(write_frames(writer.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
+            frames = stack.enter_context(closing(read_frames(survey.rig, survey.silhouettes, ready=options.masks, every=options.every)))
+            if cache is not None:
+                frames = stack.enter_context(closing(cache.frames(frames, options)))
+            observed = stack.enter_context(closing(subject.observations(frames)))
+            for seen, observation, seconds in timer.each("wait", observed):
+                timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
+                with timer.time("track"):
+                    state = subject.next_state(rng, state, observation)
+                with timer.time("write"):
+                    found = motion_frame(subject, seen.time, state, observation)
+                    writer.write(found)
                     if overlay is not None:
-                        _draw(overlay, shot.time, shot.image, mask, state, picture, options.tracker.ignore_legs)
-                frames += 1
-                listener.advance(frames)
+                        overlay.write(subject.draw(seen, found))
+                count += 1
+                listener.advance(count)
     finally:
-        run.metrics |= timings(watch, frames, time.perf_counter() - began)
-
-
-def next_state(tracker: MonocularTracker, rng: np.random.Generator, state: State | None, mask: np.ndarray) -> State | None:
-    """The state after a mask; none before the first that is not empty."""
-    if state is None:
-        return tracker.start(rng, mask) if mask.any() else None
-    return tracker.step(rng, state, mask)
-
-
-def motion_frame(seconds: float, state: State | None, picture: Picture, columns: list[int]) -> MotionFrame:
-    """A state as a run keeps it; `columns`: the landmarks that are its joints."""
-    if state is None:
-        return MotionFrame(seconds, "absent")
-    points = picture.points_world(state.pose[None])[0][columns]
-    return MotionFrame(seconds, state.status, state.pose, points, cost=state.cost, overlap=state.overlap)
-
-
-@contextlib.contextmanager
-def _overlay(folder: Path, prepared: Prepared, picture: Picture, options: Options) -> Iterator[OverlayWriter | None]:
-    if not options.overlay:
-        yield None
-        return
-    rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
-    with OverlayWriter(folder / "overlay.mp4", rate / options.every, picture) as film:
-        yield film
-
-
-def _draw(film: OverlayWriter, seconds: float, image: np.ndarray, mask: np.ndarray, state: State | None, picture: Picture,
-          without_legs: bool) -> None:
-    known = state is not None and state.status not in BLANK
-    pose = state.pose if state is not None and known else np.full(len(picture.body.skeleton.dofs), np.nan)
-    film.write(image, mask, pose, status=state.status if state else "absent", time=seconds, overlap=state.overlap if state else np.nan,
-               ignore=mask & picture.legs(pose) if known and without_legs else None)
-
-
+        writer.metrics |= timings(timer, kind.stages, count, time.perf_counter() - began)

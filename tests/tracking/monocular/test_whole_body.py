@@ -14,7 +14,7 @@ from shadowpuppet.body.segments import keep_limb_directions
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.person_rig import prepare_puppet
+from shadowpuppet.pipeline.person_rig import check_body
 from shadowpuppet.tracking.monocular.initialization import SizeFit, as_whole, find_person
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
@@ -158,4 +158,4 @@ def test_somebody_is_found_by_silhouettes_alone(sizes):
 
 def test_an_upper_body_for_several_cameras_is_refused():
     with pytest.raises(SettingsError, match="body: found 'rounded', an upper body, for several cameras; expected one of anatomical"):
-        prepare_puppet(None, None, None, Options(body="rounded"), None)  # type: ignore[arg-type]
+        check_body(Options(body="rounded"))

@@ -19,8 +19,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import BLANK, JointTable
 from shadowpuppet.motion.synchronization import at_times, match, step_of
-from shadowpuppet.pipeline.footage import footage_of, opened
-from shadowpuppet.pipeline.footage_rig import chosen_views
+from shadowpuppet.pipeline.footage import camera_footage, chosen_views, open_recording
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import grid_of
 
@@ -142,13 +141,13 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
     if not isinstance(path, str) or not Path(path).exists():
         raise ShadowPuppetError(f"the run has no overlay.mp4, and its recording, {path}, is not there")
     options = make_options(settings) if settings else Options()
-    recording = opened(path, options)
+    recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
     motion = of.run.motion
     by_frame: dict[int, dict[Camera, Image]] = {frame: {} for frame in wanted}
     for view in views:
-        footage = footage_of(recording, view, options)
-        for frame, image in _nearest_images(footage.shots(False), motion.times, sorted(wanted)):
+        footage = camera_footage(recording, view, options)
+        for frame, image in _nearest_images(footage.frames(False), motion.times, sorted(wanted)):
             image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * MIN_HEIGHT))
             for places, own in _tables(of, frame):
                 draw_bones(image, footage.camera, places, own)

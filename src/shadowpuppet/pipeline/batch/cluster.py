@@ -22,12 +22,12 @@ _kept = threading.local()
 def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome:
     """Run a task on a worker of the cluster. `start` identifies the batch: between two batches recordings may have changed."""
     from shadowpuppet.pipeline.batch.task import do
-    from shadowpuppet.pipeline.silhouette_cache import Repeats
+    from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
     from shadowpuppet.threads import limit_threads
 
     limit_threads()
     if getattr(_kept, "start", None) != start:
-        _kept.start, _kept.repeats = start, Repeats()
+        _kept.start, _kept.repeats = start, SilhouetteCache()
     return do(task, out, _kept.repeats if reuse else None)
 
 

@@ -21,7 +21,7 @@ from shadowpuppet.io.run import versions
 from shadowpuppet.pipeline.batch.tasks import named
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.silhouette_cache import Repeats
+from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 
 MARK, PART, PLAN, RUNS = "task.json", ".part", "batch.toml", "runs"
 """In a run folder: the file with its task's id, written last. In a batch's folder: the ending of unfinished run folders, the file that
@@ -30,7 +30,8 @@ PERMANENT = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPER
 """Errors of the system that another try would meet again."""
 
 
-def do(task: Mapping[str, Any], out: str | Path, repeats: Repeats | None = None, listener: Listener | None = None) -> dict[str, Any]:
+def do(task: Mapping[str, Any], out: str | Path, repeats: SilhouetteCache | None = None,
+       listener: Listener | None = None) -> dict[str, Any]:
     """Run a task (`Task.wire`) into its folder in `out`, unless that is complete. Returns the outcome as plain values.
 
     `status`: done or failed; `seconds`; of a failure `message`, a sentence, `again`, whether a further try may succeed, `trace`, of a bug.
@@ -46,7 +47,7 @@ def do(task: Mapping[str, Any], out: str | Path, repeats: Repeats | None = None,
     return {"status": "done", "seconds": round(time.perf_counter() - began, 3)}
 
 
-def _run(task: Mapping[str, Any], out: Path, repeats: Repeats | None, listener: Listener | None) -> None:
+def _run(task: Mapping[str, Any], out: Path, repeats: SilhouetteCache | None, listener: Listener | None) -> None:
     folder = out / RUNS / task["folder"]
     if not (out / PLAN).exists():
         raise ShadowPuppetError(f"{out}: found no {PLAN} in it, expected the batch's folder, which all machines that work on it must see")

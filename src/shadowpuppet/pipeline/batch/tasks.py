@@ -19,7 +19,8 @@ from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
 from shadowpuppet.pipeline.silhouette_cache import film_of
 
 Track = Callable[..., Any]
-"""Makes a run folder, as `pipeline.track_recording` does: of a recording, a folder, `Options`, a `Listener` or none, `Repeats` or none."""
+"""Makes a run folder, as `pipeline.track_recording` does: of a recording, a folder, `Options`, a `Listener` and a `SilhouetteCache`
+or None."""
 TRACK = "shadowpuppet.pipeline.track:track_recording"
 """The default `Track`, by name."""
 RUN_INPUTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")

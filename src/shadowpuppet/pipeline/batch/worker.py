@@ -13,7 +13,7 @@ from typing import Any
 
 from shadowpuppet.pipeline.batch.task import do
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.silhouette_cache import Repeats
+from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.threads import limit_threads
 
 PACE = 0.25
@@ -54,7 +54,7 @@ def _read(tasks: queue.SimpleQueue[dict[str, Any]]) -> None:
 def main() -> None:
     """Run tasks until standard input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all processes; the pool ends this one
-    pipe, tasks, repeats = _Pipe(), queue.SimpleQueue[dict[str, Any]](), Repeats()
+    pipe, tasks, repeats = _Pipe(), queue.SimpleQueue[dict[str, Any]](), SilhouetteCache()
     threading.Thread(target=_read, args=(tasks,), daemon=True).start()
     limit_threads()
     pipe.send(ready=True)

@@ -18,7 +18,7 @@ from typing import Any, Self
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.silhouette_cache import Repeats
+from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.threads import THREAD_VARIABLES, child_environment
 
 Outcome = dict[str, Any]
@@ -70,7 +70,7 @@ class InProcess(WorkerPool):
 
     def __init__(self, out: Path, reuse: bool, listener: BatchListener) -> None:
         """`out`: the batch's folder; `reuse`: keep a film's silhouettes for the next task."""
-        self._out, self._repeats, self._listener = out, Repeats() if reuse else None, listener
+        self._out, self._repeats, self._listener = out, SilhouetteCache() if reuse else None, listener
         self._waiting: deque[Task] = deque()
 
     def put(self, task: Task) -> None:

@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from shadowpuppet.body.models import BodyName
-from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, checked, merged, plain_values, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, from_preset
 
 
 def pixel_scale(size: tuple[int, int]) -> float:
@@ -96,11 +95,8 @@ PRESETS: dict[str, dict] = {
 
 
 def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None, source: str = "settings") -> MonocularSettings:
-    """A preset with some values replaced; tables (`torso`, `arm`) may be given in part. Raises `SettingsError` for an unknown preset or
-    name, or an impossible value, with the possible ones."""
-    if preset not in PRESETS:
-        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(PRESETS)}")
-    return validate(MonocularSettings, merged(plain_values(MonocularSettings()), PRESETS[preset], overrides or {}), source)
+    """A preset of the one-camera tracker with some values replaced, as `from_preset`."""
+    return from_preset(MonocularSettings, PRESETS, preset, overrides, source)
 
 
 @checked

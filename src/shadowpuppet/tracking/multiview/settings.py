@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from shadowpuppet.body.models import WholeBodyName
-from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.settings import NonNegative, Positive, Share, checked, merged, plain_values, validate
+from shadowpuppet.settings import NonNegative, Positive, Share, checked, from_preset
 
 
 @checked
@@ -155,7 +154,5 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
 
 def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None,
                             source: str = "settings") -> MultiviewSettings:
-    """A preset of `MULTIVIEW_PRESETS` with some values replaced, as `make_settings`."""
-    if preset not in MULTIVIEW_PRESETS:
-        raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(MULTIVIEW_PRESETS)}")
-    return validate(MultiviewSettings, merged(plain_values(MultiviewSettings()), MULTIVIEW_PRESETS[preset], overrides or {}), source)
+    """A preset of the tracker of several cameras with some values replaced, as `from_preset`."""
+    return from_preset(MultiviewSettings, MULTIVIEW_PRESETS, preset, overrides, source)

@@ -9,9 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetWarning, SilhouetteError, VideoError
-from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Mask, Shot, Silhouettes, silhouettes, take_sample
+from shadowpuppet.pipeline.footage import LOOKED_AT, CameraFrame, Footage, take_sample
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image
@@ -68,7 +70,7 @@ class FilmImages:
             image = self._ready.at(time + self.footage.view.start) if self._is_within(time) else None
             return None if image is None else ready_mask(image)
         image = self.picture(time)
-        return None if image is None else self._silhouettes(Shot(time, image, None))
+        return None if image is None else self._silhouettes(CameraFrame(time, image, None))
 
     def _is_within(self, time: float) -> bool:
         """Whether a time is within the recording."""
@@ -78,7 +80,7 @@ class FilmImages:
     @cached_property
     def _silhouettes(self) -> Silhouettes:
         longest = LOOKED_AT if self.footage.view.background is None else SAMPLE
-        return silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
+        return learn_silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
 
 
 def hull_function(cameras: Sequence[SceneCamera], settings: Options):

@@ -12,8 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.recording import Recording
-from shadowpuppet.pipeline.footage import Footage, footage_of, opened
-from shadowpuppet.pipeline.footage_rig import chosen_views
+from shadowpuppet.pipeline.footage import Footage, camera_footage, chosen_views, open_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.scene.figures import joint_figure
@@ -23,7 +22,7 @@ from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
 
 def recording_scene(path: str | Path, options: Options) -> Scene:
     """The scene of a recording folder, or of a film with a field of view. Raises a `ShadowPuppetError`."""
-    recording = opened(path, options)
+    recording = open_recording(path, options)
     cameras, footage, ready = cameras_of(recording, options)
     figures, problems = _truth(recording)
     made = "ready, from masks/" if ready else "made as `track` makes them"
@@ -37,7 +36,7 @@ def cameras_of(recording: Recording, options: Options, ready: bool | None = None
     views = chosen_views(recording, options.camera)
     ready = all(view.masks is not None for view in views) if ready is None else ready
     options = replace(options, masks=ready)
-    footage = [footage_of(recording, view, options) for view in views]
+    footage = [camera_footage(recording, view, options) for view in views]
     return tuple(SceneCamera(each.camera, FilmImages(each, options)) for each in footage), footage, ready
 
 
@@ -47,7 +46,7 @@ def frame_times(footage: Sequence[Footage]) -> Array:
     n = int(np.argsort(rates)[(len(rates) - 1) // 2])
     count = footage[n].count
     if count is None:  # the film is read once
-        return np.array([shot.time for shot in footage[n].shots(ready=False)])
+        return np.array([shot.time for shot in footage[n].frames(ready=False)])
     return np.arange(max(count, 1)) / rates[n]
 
 

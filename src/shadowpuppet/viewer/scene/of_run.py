@@ -21,7 +21,7 @@ from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.body_animation import motion_animation
 from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.pipeline.footage import opened
+from shadowpuppet.pipeline.footage import open_recording
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure
 from shadowpuppet.viewer.scene.film_images import hull_function
@@ -125,7 +125,7 @@ class _Run:
             return None
         if not Path(path).exists():
             raise ShadowPuppetError(f"the recording {path} is not there")
-        return cameras_of(opened(path, self.options), self.options, self.options.masks)[0]
+        return cameras_of(open_recording(path, self.options), self.options, self.options.masks)[0]
 
     @cached_property
     def kept_cameras(self) -> tuple[SceneCamera, ...]:

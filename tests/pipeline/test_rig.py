@@ -12,9 +12,10 @@ from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.pipeline.footage import Footage, Shot
-from shadowpuppet.pipeline.footage_rig import LATE, Rig, chosen_views, follow, open_rig
+from shadowpuppet.pipeline.check_calibration import check_calibration
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, chosen_views
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
 from shadowpuppet.video import write_frames
 
 SIZE = (32, 16)
@@ -49,13 +50,13 @@ def rig(folder: Path, *times: np.ndarray, starts=(), duration: float | None = No
     return Rig(recording, tuple(Footage(recording, view, view.camera) for view in views))
 
 
-def bright(shot: Shot) -> np.ndarray:
+def bright(shot: CameraFrame) -> np.ndarray:
     return shot.image[:, :, 1] > 127
 
 
 def numbers(made: Rig, **more) -> list[tuple[int | None, ...]]:
     """Of the frames of every set."""
-    sets = list(follow(made, [bright] * len(made.footage), **more))
+    sets = list(synchronized_frames(made, [bright] * len(made.footage), **more))
     for each in sets:
         for image, mask in zip(each.images, each.masks):
             assert (image is None) == (mask is None)
@@ -70,7 +71,7 @@ def steady(count: int, rate: float = 10.0, start: float = 0.0) -> np.ndarray:
 def test_frames_of_one_number_belong_together(tmp_path):
     made = rig(tmp_path, steady(7), steady(7), steady(7))
     assert numbers(made) == [(n, n, n) for n in range(7)]
-    assert [each.time for each in follow(made, [bright] * 3)] == pytest.approx(steady(7))
+    assert [each.time for each in synchronized_frames(made, [bright] * 3)] == pytest.approx(steady(7))
     assert made.rate == pytest.approx(10)
 
 
@@ -84,12 +85,12 @@ def test_sets_do_not_depend_on_threads(tmp_path, threads):
 def test_only_every_nth_set_is_looked_at(tmp_path, every):
     looked = []
 
-    def see(shot: Shot) -> np.ndarray:
+    def see(shot: CameraFrame) -> np.ndarray:
         looked.append(number_of(shot.image))
         return bright(shot)
 
     made = rig(tmp_path, steady(11), steady(11))
-    sets = list(follow(made, [see] * 2, every=every))
+    sets = list(synchronized_frames(made, [see] * 2, every=every))
     assert [number_of(each.images[0]) for each in sets] == list(range(0, 11, every))
     assert sorted(looked) == sorted(2 * list(range(0, 11, every)))
     assert all(mask is not None for each in sets for mask in each.masks)
@@ -175,29 +176,29 @@ def test_a_film_that_is_cut_off_leaves_the_others(tmp_path):
 def test_a_silhouette_that_cannot_be_made_costs_that_camera_only(tmp_path):
     made = rig(tmp_path, steady(12), steady(12))
 
-    def fails(shot: Shot) -> np.ndarray:
+    def fails(shot: CameraFrame) -> np.ndarray:
         if shot.time > 0.35:
             raise SilhouetteError("masks/cam2.mkv: none left")
         return bright(shot)
 
     with pytest.warns(ShadowPuppetWarning, match="none left; from there on the run goes on without camera 'cam2'"):
-        sets = list(follow(made, [bright, fails]))
+        sets = list(synchronized_frames(made, [bright, fails]))
     assert [each.masks[1] is not None for each in sets] == [n < 4 for n in range(12)]
     assert len(sets) == 12
 
 
 def test_other_errors_are_not_swallowed(tmp_path):
-    def broken(shot: Shot) -> np.ndarray:
+    def broken(shot: CameraFrame) -> np.ndarray:
         raise RuntimeError("a bug")
 
     with pytest.raises(RuntimeError, match="a bug"):
-        list(follow(rig(tmp_path, steady(3), steady(3)), [bright, broken]))
+        list(synchronized_frames(rig(tmp_path, steady(3), steady(3)), [bright, broken]))
 
 
 def test_a_reader_who_stops_leaves_no_threads(tmp_path):
     import threading
 
-    sets = follow(rig(tmp_path, steady(30), steady(30)), [bright] * 2, threads=2)
+    sets = synchronized_frames(rig(tmp_path, steady(30), steady(30)), [bright] * 2, threads=2)
     next(sets)
     assert any(thread.name.startswith("camera") for thread in threading.enumerate())
     sets.close()
@@ -236,9 +237,28 @@ def test_cameras_that_are_not_there_are_refused(tmp_path, names):
         chosen_views(made.recording, names)
 
 
-def test_one_camera_is_no_rig(tmp_path):
+def test_one_camera_is_a_rig_whose_calibration_cannot_be_checked(tmp_path):
+    made = open_rig(recording(tmp_path / "r"), Options(camera="cam2"))
+    assert made.names == ("cam2",)
+    assert not made.is_multiview
     with pytest.raises(RecordingError, match="found one camera, expected two or more"):
-        open_rig(recording(tmp_path / "r"), Options(camera="cam2"))
+        check_calibration(made, Options())
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_one_cameras_frames_are_read_as_several_cameras_are(tmp_path, every):
+    made = rig(tmp_path, steady(10))
+    alone = list(read_frames(made, [bright], every=every))
+    assert [each.time for each in alone] == [each.time for each in synchronized_frames(made, [bright], every=every)]
+    assert [number_of(each.images[0]) for each in alone] == list(range(0, 10, every))
+
+
+def test_one_camera_that_breaks_off_is_an_error(tmp_path):
+    def fails(frame: CameraFrame) -> np.ndarray:
+        raise SilhouetteError("none left")
+
+    with pytest.raises(SilhouetteError, match="none left"):
+        list(read_frames(rig(tmp_path, steady(3)), [fails]))
 
 
 @pytest.mark.parametrize(("options", "message"), [

@@ -1,0 +1,227 @@
+"""What live sessions with one camera and with several have in common: phases, timing, views. Knows no threads, files or sockets."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.live.display.view import Angle, View
+from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.timing import Timing
+from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
+from shadowpuppet.video import Image
+
+GONE = 2.0
+"""Seconds for which a person is lost, after which a new measurement is advised."""
+
+
+class Outcome(NamedTuple):
+    """The result of a picture, or of none."""
+
+    view: View
+    frame: MotionFrame | None = None
+    """The person's motion, while they are tracked."""
+    images: tuple[Image, ...] = ()
+    """Each camera's picture, of the size that is worked on."""
+
+
+def at_once(task: Callable[[], Any]) -> Callable[[], Any]:
+    """Do a task; the answer gives its result."""
+    return partial(lambda result: result, task())
+
+
+@dataclass(eq=False)
+class LiveSession(ABC):
+    """State of a session; `step` is called with every picture (or set of pictures), `idle` if none came."""
+
+    options: Options
+    settings: LiveSettings
+    rng: np.random.Generator
+    """The only source of randomness."""
+    clock: Callable[[], float]
+    """Seconds of a clock that never goes back, by which pictures are stamped."""
+    timing: Timing
+    work: Callable[[Callable[[], Any]], Callable[[], Any]] = at_once
+    """Runs a long task; its answer is called until it gives a result that is not None."""
+    phase: str = "learning"
+    """One of `PHASES`."""
+    subject: TrackedSubject | None = None
+    """The person, once measured."""
+    trouble: str = ""
+    """Why no pictures come; empty while they do."""
+
+    def __post_init__(self) -> None:
+        """Nothing has come yet."""
+        self._began, self._lost_since, self._new, self._state = np.nan, np.nan, False, None
+        self._measured: Callable[[], Any] = lambda: None
+
+    # Input
+
+    def step(self, shot: Any) -> Outcome:
+        """Take a picture. Raises `SilhouetteError` where the scene cannot be learnt."""
+        self._began = shot.captured if np.isnan(self._began) else self._began
+        if trouble := self.check(shot):
+            return self._pause(trouble)
+        self.trouble = ""
+        self.timing.came(shot.captured, shot.number)
+        phases = {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}
+        return phases[self.phase](shot, self._scaled(shot))
+
+    def idle(self, problem: str = "") -> Outcome:
+        """No picture came for a moment; `problem`: why, if that is known."""
+        trouble = self.silence(self.clock(), problem)
+        return self._pause(trouble) if trouble else Outcome(self._view())
+
+    def ask(self, wish: str) -> None:
+        """`learn` the background again, or `measure` the person again; ignored in other phases than those that can."""
+        if wish == "learn" and self.phase in ("waiting", "tracking"):
+            self.begin_learning()
+            self.phase = "learning"
+        elif wish == "measure" and self.phase == "tracking":
+            self.begin_waiting()
+            self.phase = "waiting"
+
+    def newly_measured(self) -> bool:
+        """Whether the person was measured since this was last asked."""
+        new, self._new = self._new, False
+        return new
+
+    # What depends on the number of cameras
+
+    @property
+    @abstractmethod
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras as they give their pictures."""
+
+    @property
+    @abstractmethod
+    def worked_cameras(self) -> tuple[Camera, ...]:
+        """For pictures of the size that is worked on."""
+
+    @property
+    @abstractmethod
+    def scenes(self) -> Sequence[list[Image]]:
+        """Pictures of each camera's empty scene, of the size that is worked on."""
+
+    @abstractmethod
+    def check(self, shot: Any) -> str:
+        """What is wrong with a picture, in a sentence; empty if nothing is."""
+
+    @abstractmethod
+    def silence(self, now: float, problem: str) -> str:
+        """What is wrong if no picture came until now (s); empty if nothing is."""
+
+    @abstractmethod
+    def asks_again(self, now: float) -> bool:
+        """Whether a frozen camera is to be opened again."""
+
+    @abstractmethod
+    def placed(self) -> tuple[Array, float | None]:
+        """The body's frame in the world (4, 4), and Z of the floor (m), if it is known."""
+
+    @abstractmethod
+    def begin_learning(self) -> None:
+        """Forget what was collected of the empty scene."""
+
+    @abstractmethod
+    def begin_waiting(self) -> None:
+        """Wait for a person."""
+
+    @abstractmethod
+    def _scaled(self, shot: Any) -> tuple[Image, ...]: ...
+
+    @abstractmethod
+    def _masks(self, shot: Any, images: tuple[Image, ...]) -> tuple[Mask, ...]: ...
+
+    @abstractmethod
+    def _learn(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+
+    @abstractmethod
+    def _wait(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+
+    @abstractmethod
+    def _measure(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+
+    @abstractmethod
+    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+        """Image, mask and picture of a view."""
+
+    @abstractmethod
+    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
+        """What the person is to do, and the seconds of a countdown."""
+
+    @abstractmethod
+    def _forget_time(self) -> None:
+        """Begin again what waits for time to pass."""
+
+    # What does not
+
+    def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
+        assert self.subject is not None
+        masks = self._masks(shot, images)
+        observation = self.subject.observe(masks)
+        self._state = self.subject.next_state(self.rng, self._state, observation)
+        now = self.clock()
+        self.timing.done(shot.captured, now, shot.number)
+        frame = motion_frame(self.subject, shot.captured - self._began if shot.shown is None else shot.shown, self._state, observation)
+        if frame.status != "lost":
+            self._lost_since = np.nan
+        elif np.isnan(self._lost_since):
+            self._lost_since = shot.captured
+        return Outcome(self._view(images, masks, frame, now - shot.captured), frame, images)
+
+    def _begin_tracking(self, subject: TrackedSubject) -> None:
+        self.subject, self.phase, self._state, self._new = subject, "tracking", None, True
+        self.timing.pause()
+
+    def _pause(self, trouble: str) -> Outcome:
+        """No usable picture: the person is kept, what waits for time to pass begins again."""
+        self.trouble = trouble
+        self._forget_time()
+        self.timing.pause()
+        return Outcome(self._view())
+
+    def _view(self, images: tuple[Image, ...] = (), masks: tuple[Mask, ...] = (), frame: MotionFrame | None = None,
+              latency: float = np.nan) -> View:
+        pose = None if frame is None or frame.pose is None else np.asarray(frame.pose)
+        message, countdown = self._message(masks)
+        angles = _angles(self.subject.body, pose) if self.phase == "tracking" and self.subject else ()
+        return View(
+            phase=self.phase, message=message, countdown=countdown, trouble=self.trouble, status=frame.status if frame else "",
+            overlap=frame.overlap if frame and pose is not None else np.nan, angles=angles, latency=latency, rate=self.timing.rate,
+            interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, **self._shown(images, masks, frame),
+        )  # fmt: skip
+
+    @property
+    def _gone(self) -> bool:
+        """Whether the person has been lost for long."""
+        return not np.isnan(self._lost_since) and self.clock() - self._lost_since > GONE
+
+
+def scaled(image: Image, camera: Camera) -> Image:
+    """A picture of the camera's size."""
+    import cv2
+
+    if image.shape[1::-1] == camera.size:
+        return image
+    return np.asarray(cv2.resize(image, camera.size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _angles(body: Body, pose: Array | None) -> tuple[Angle, ...]:
+    """All rotations, degrees; one without limits goes from -180 to 180."""
+    values: Sequence[float] = np.full(len(body.skeleton.dofs), np.nan).tolist() if pose is None else pose.tolist()
+    rotations = [(dof, value) for dof, value in zip(body.skeleton.dofs, values) if dof.kind == "rotation"]
+    return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)) if math.isfinite(dof.low) else -180,
+                       round(math.degrees(dof.high)) if math.isfinite(dof.high) else 180) for dof, value in rotations)

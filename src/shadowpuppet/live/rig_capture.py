@@ -1,0 +1,101 @@
+"""Several cameras read at once, each in a thread of its own: sets of pictures that were taken together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import NamedTuple, Self
+
+from shadowpuppet.pipeline.rig import NEAR
+from shadowpuppet.video import Image
+from shadowpuppet.video.capture import Capture
+from shadowpuppet.video.live_source import Feed, Snapshot
+
+
+class SnapshotSet(NamedTuple):
+    """Pictures of all cameras that were taken together."""
+
+    captured: float
+    """When the last of them was taken, in seconds of a clock that never goes back."""
+    images: tuple[Image, ...]
+    shown: float | None = None
+    """The films' own time, seconds."""
+    number: int = 0
+    """Number of sets before it."""
+
+
+class NewestSet:
+    """The newest set of pictures; has the interface of `Newest`."""
+
+    def __init__(self, captures: Sequence[Capture], interval: float) -> None:
+        """`interval`: seconds between two pictures."""
+        self.captures, self.interval, self.put_count = captures, interval, 0
+        self._next: list[Snapshot | None] = [None] * len(captures)
+
+    def take(self, timeout: float = 0.0) -> SnapshotSet | None:
+        """A set, waited for (seconds); None if none comes."""
+        end = time.monotonic() + timeout
+        while behind := self.behind():
+            for n in behind:
+                if (shot := self.captures[n].newest.take(max(end - time.monotonic(), 0.0))) is None:
+                    return None
+                self._next[n] = shot
+        shots = [shot for shot in self._next if shot is not None]
+        self._next = [None] * len(self.captures)
+        self.put_count += 1
+        shown = [shot.shown for shot in shots if shot.shown is not None]
+        return SnapshotSet(max(shot.captured for shot in shots), tuple(shot.image for shot in shots), max(shown, default=None),
+                           self.put_count - 1)
+
+    def behind(self) -> list[int]:
+        """Cameras that lack a picture, or whose picture is older than another's by over half an interval."""
+        films = all(shot is None or shot.shown is not None for shot in self._next)
+        moments = [None if shot is None else shot.shown if films else shot.captured for shot in self._next]
+        latest = max((moment for moment in moments if moment is not None), default=0.0)
+        return [n for n, moment in enumerate(moments) if moment is None or moment < latest - NEAR * self.interval]
+
+    @property
+    def waiting(self) -> bool:
+        """Whether every camera that lacks a picture of the next set has one, or can still get one."""
+        return not any(self.captures[n].ended and not self.captures[n].newest.waiting for n in self.behind())
+
+
+class RigCapture:
+    """Reads several feeds from `with` to their end; has the interface of `Capture`."""
+
+    def __init__(self, feeds: Sequence[Feed], interval: float) -> None:
+        """Nothing is read yet; `interval`: seconds between two pictures."""
+        self.captures = [Capture(feed) for feed in feeds]
+        self.newest = NewestSet(self.captures, interval)
+        self._open = ExitStack()
+
+    def __enter__(self) -> Self:
+        """Begin to read."""
+        for capture in self.captures:
+            self._open.enter_context(capture)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let the feeds go."""
+        self._open.close()
+
+    def again(self) -> None:
+        """Open the cameras once more."""
+        for capture in self.captures:
+            capture.again()
+
+    @property
+    def problem(self) -> str:
+        """Why no pictures come, in a sentence; empty while they do."""
+        return next(filter(None, (capture.problem for capture in self.captures)), "")
+
+    @property
+    def ended(self) -> bool:
+        """Whether a film is over."""
+        return any(capture.ended for capture in self.captures)
+
+    @property
+    def error(self) -> BaseException | None:
+        """What is not a camera's fault."""
+        return next((capture.error for capture in self.captures if capture.error is not None), None)

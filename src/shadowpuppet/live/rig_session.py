@@ -1,0 +1,180 @@
+"""A live session with several calibrated cameras: the person is measured in their first seconds, and tracked in all cameras at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.errors import TrackingError
+from shadowpuppet.geometry import Array
+from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
+from shadowpuppet.live.learning_phase import BackgroundCollector
+from shadowpuppet.live.phases import NOBODY
+from shadowpuppet.live.rig_capture import SnapshotSet
+from shadowpuppet.live.watchdog import CameraWatchdog
+from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline.footage import CameraFrame, worked_size
+from shadowpuppet.pipeline.overlay_video import overlay_grid
+from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
+from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.subject import average_body
+from shadowpuppet.pipeline.survey import OPENED, OPENING
+from shadowpuppet.silhouette import learn_background
+from shadowpuppet.video import Image
+
+STEP_IN = "step in between the cameras and move a little"
+
+
+@dataclass(eq=False, kw_only=True)
+class RigSession(LiveSession):
+    """A session with several cameras."""
+
+    full: tuple[Camera, ...]
+    """The cameras as they give their pictures."""
+    watchdogs: tuple[CameraWatchdog, ...]
+    scene: list[list[Image]] = field(default_factory=list)
+    """For each camera pictures of its empty scene, of the size that is worked on; learnt if there are none."""
+    height: float | None = None
+    """Height of the person, if it is known (m)."""
+
+    def __post_init__(self) -> None:
+        """Raises `SettingsError` for a body that several cameras cannot track."""
+        super().__post_init__()
+        check_body(self.options)
+        self._worked = tuple(camera.resized(worked_size(camera.size, self.options.max_size)) for camera in self.full)
+        body = average_body(self.options.multiview.body)
+        self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
+        self._silhouettes: list[Silhouettes] = []
+        given = self.scene if self.scene and all(self.scene) else None
+        self.begin_learning()
+        self.begin_waiting()
+        if given is not None:
+            self._learnt(given)
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras as they give their pictures."""
+        return self.full
+
+    @property
+    def worked_cameras(self) -> tuple[Camera, ...]:
+        """For pictures of the size that is worked on."""
+        return self._worked
+
+    @property
+    def scenes(self) -> list[list[Image]]:
+        """Pictures of each camera's empty scene."""
+        return self.scene
+
+    def check(self, shot: SnapshotSet) -> str:
+        """What is wrong with one of the pictures."""
+        troubles = [dog.see(shot.captured, image) for dog, image in zip(self.watchdogs, shot.images)]
+        return next(filter(None, troubles), "")
+
+    def silence(self, now: float, problem: str) -> str:
+        """What is wrong if no set of pictures came."""
+        return next(filter(None, (dog.silence(now, problem, self.timing.interval) for dog in self.watchdogs)), "")
+
+    def asks_again(self, now: float) -> bool:
+        """Whether a frozen camera is to be opened again."""
+        asking = [dog.asks_again(now) for dog in self.watchdogs]
+        return any(asking)
+
+    def placed(self) -> tuple[Array, float | None]:
+        """The body's frame is the world's; the floor is at Z = 0."""
+        return np.eye(4), 0.0
+
+    def begin_learning(self) -> None:
+        """Forget what was collected of the empty scenes."""
+        self._collectors = [BackgroundCollector(self.settings.countdown, self.settings.learn) for _ in self.full]
+        self._collected: list[list[Image] | None] = [None] * len(self.full)
+
+    def begin_waiting(self) -> None:
+        """Wait until two cameras see somebody."""
+        self._first: list[tuple[float, tuple[Mask, ...]]] = []
+        self._hint = STEP_IN
+
+    def _learn(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+        for n, (collector, image) in enumerate(zip(self._collectors, images)):
+            if self._collected[n] is None:
+                self._collected[n] = collector.see(shot.captured, image)
+        scenes = [scene for scene in self._collected if scene is not None]
+        if len(scenes) == len(self.full):
+            self._learnt(scenes)
+        return Outcome(self._view(images))
+
+    def _learnt(self, scenes: list[list[Image]]) -> None:
+        self.scene = scenes
+        self._silhouettes = [Silhouettes("live", learn_background(scene, self.options.silhouette)) for scene in scenes]
+        self.phase, self._state = ("tracking" if self.subject else "waiting"), None
+
+    def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+        masks = self._masks(shot, images)
+        if sum(may_be_person(mask) and float(mask.mean()) > NOBODY / 3 for mask in masks) > 1:
+            self._first.append((shot.captured, masks))
+        else:
+            self.begin_waiting()
+        if self._first and shot.captured - self._first[0][0] >= max(OPENING, self.settings.still):
+            self.phase, self._measured = "measuring", self.work(self._fitting())
+        return Outcome(self._view(images, masks))
+
+    def _fitting(self) -> Callable[[], MultiviewSubject | TrackingError]:
+        """Measures the person in the first seconds; nobody there is a result, too."""
+        chosen = np.unique(np.linspace(0, len(self._first) - 1, OPENED).astype(int)).tolist()
+        fit = partial(fit_in_views, self.rng.spawn(1)[0], self._worked, [self._first[n][1] for n in chosen], self.options,
+                      1 / self.timing.interval, self.height)
+
+        def tried() -> MultiviewSubject | TrackingError:
+            try:
+                return fit()
+            except TrackingError as error:
+                return error
+
+        return tried
+
+    def _measure(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+        """Wait for the fit."""
+        found: MultiviewSubject | TrackingError | None = self._measured()
+        if found is None:
+            return Outcome(self._view(images, self._masks(shot, images)))
+        if isinstance(found, TrackingError):
+            self.begin_waiting()
+            self.phase, self._hint = "waiting", f"no person's shape: {STEP_IN}"
+        else:
+            self._begin_tracking(found)
+        return Outcome(self._view(images))
+
+    def _scaled(self, shot: SnapshotSet) -> tuple[Image, ...]:
+        return tuple(map(scaled, shot.images, self._worked))
+
+    def _masks(self, shot: SnapshotSet, images: tuple[Image, ...]) -> tuple[Mask, ...]:
+        return tuple(silhouettes(CameraFrame(shot.captured, image, None)) for silhouettes, image in zip(self._silhouettes, images))
+
+    def _forget_time(self) -> None:
+        for collector in self._collectors:
+            collector.wait()
+        self._first.clear()
+
+    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+        """A grid of the cameras, drawn here: the display knows one picture."""
+        if not images:
+            return {}
+        pictures = self.subject.pictures if isinstance(self.subject, MultiviewSubject) else self._pictures
+        found = frame or MotionFrame(0.0, self.phase)
+        return {"image": overlay_grid(FrameSet(found.time, images, masks or (None,) * len(images)), found, pictures)}
+
+    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
+        if self.phase == "learning":
+            slowest = max(self._collectors, key=lambda collector: collector.left)
+            return slowest.message, slowest.left
+        if self.phase == "tracking":
+            return "the body does not fit any more: measure anew" if self._gone else "", None
+        return self._hint if self.phase == "waiting" else "measuring: one moment", None

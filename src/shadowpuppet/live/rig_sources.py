@@ -1,0 +1,146 @@
+"""What a session with several cameras begins with: films played together, or cameras read at once; calibration and empty scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.errors import CalibrationError, RecordingError, SettingsError, choices
+from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.recording import Recording, View
+from shadowpuppet.live.learning_phase import KEPT
+from shadowpuppet.live.rig_capture import RigCapture, SnapshotSet
+from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import Rig, open_rig, synchronized_frames
+from shadowpuppet.silhouette.background import sample_frames
+from shadowpuppet.video import FrameSource, Image, Size, open_frames
+from shadowpuppet.video.capture import Capture
+from shadowpuppet.video.live_source import ADDRESS, Feed, film_feed, open_feed
+
+
+class RigSources(NamedTuple):
+    """Several cameras, and what is known of their scene."""
+
+    capture: RigCapture | Capture
+    cameras: tuple[Camera, ...]
+    """As they give their pictures."""
+    sizes: tuple[Size, ...]
+    """Of the pictures that come."""
+    rate: float
+    """Sets of pictures/s."""
+    live: bool
+    """False for films."""
+    scenes: list[list[Image]]
+    """Pictures of each camera's empty scene, of the size that is worked on; empty if they are to be learnt."""
+    height: float | None
+    """Height of the person, if the recording says it (m)."""
+
+
+def is_rig(source: str) -> bool:
+    """Whether a source is several: names with commas between, or the folder of a recording."""
+    path = Path(source)
+    return (path / "video").is_dir() if path.exists() else len(_parts(source)) > 1
+
+
+def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
+    """Open several cameras, streams or films. Raises a `ShadowPuppetError` where something cannot be used."""
+    if options.region is not None or options.background is not None:
+        raise SettingsError(f"{'region' if options.region else 'background'}: found one for several cameras, expected none")
+    if Path(settings.camera).is_dir():
+        return _films(_recorded(settings.camera, options), options, settings)
+    names = _parts(settings.camera)
+    cameras = _calibrated(options, len(names))
+    if any(name.isdecimal() or ADDRESS.match(name) for name in names):
+        return _feeds([open_feed(name, rate=settings.rate, speed=settings.speed) for name in names], cameras, options)
+    recording = Recording(Path(settings.camera), "live", tuple(map(View, cameras, map(Path, names))), rate=settings.rate)
+    for view in recording.views:
+        _check_size(view.camera, open_frames(view.video).size)
+    return _films(Rig(recording, tuple(camera_footage(recording, view, options) for view in recording.views)), options, settings)
+
+
+def _parts(source: str) -> list[str]:
+    return [part.strip() for part in source.split(",")]
+
+
+def _recorded(folder: str, options: Options) -> Rig:
+    rig = open_rig(folder, options)
+    if not rig.is_multiview:
+        raise RecordingError(f"{folder}: found the recording of one camera, expected several; play its film")
+    return rig
+
+
+def _calibrated(options: Options, count: int) -> tuple[Camera, ...]:
+    """The cameras of the calibration, which come in the order of the sources."""
+    if options.calibration is None:
+        raise CalibrationError(f"found {count} cameras without a calibration, expected one that knows where they stand; give --calibration")
+    cameras = tuple(read_calibration(options.calibration))
+    if len(cameras) != count:
+        raise CalibrationError(f"{options.calibration}: found the cameras {choices(camera.name for camera in cameras)}, expected {count}, "
+                               "in the order of --camera")
+    return cameras
+
+
+def _check_size(camera: Camera, size: Size) -> None:
+    if camera.size != size:
+        raise CalibrationError(f"camera {camera.name!r}: size: found {camera.size[0]} x {camera.size[1]} pixels in the calibration, "
+                               f"expected {size[0]} x {size[1]} as the camera gives them")
+
+
+def _feeds(feeds: list[Feed], cameras: tuple[Camera, ...], options: Options) -> RigSources:
+    for camera, feed in zip(cameras, feeds):
+        _check_size(camera, feed.size)
+    rates = [feed.rate for feed in feeds if np.isfinite(feed.rate)]
+    rate = min(rates) if rates else 30.0
+    return RigSources(RigCapture(feeds, 1 / rate), cameras, tuple(feed.size for feed in feeds), rate, True, [], None)
+
+
+def _films(rig: Rig, options: Options, settings: LiveSettings) -> RigSources:
+    scenes = [_scene(footage) for footage in rig.footage]
+    cameras = tuple(footage.view.camera for footage in rig.footage)
+    sizes = tuple(camera.size for camera in rig.cameras)
+    return RigSources(Capture(film_set_feed(rig, settings.speed)), cameras, sizes, rig.rate * settings.speed, False,
+                      scenes if all(scenes) else [], rig.recording.subject.height)
+
+
+def _scene(footage: Footage) -> list[Image]:
+    background = footage.view.background
+    return [] if background is None else sample_frames(footage.pictures(background, "the empty scene"), KEPT)
+
+
+@dataclass(frozen=True)
+class _FilmSet:
+    """Synchronized films as one: iterates over times and tuples of pictures."""
+
+    rig: Rig
+    name: str
+    size: Size
+    rate: float
+
+    def __iter__(self) -> Iterator[tuple[float, tuple[Image, ...]]]:
+        for each in synchronized_frames(self.rig, [_no_mask] * len(self.rig.footage)):
+            images = tuple(image for image in each.images if image is not None)
+            if len(images) == len(self.rig.footage):
+                yield each.time, images
+
+
+def _no_mask(frame: CameraFrame) -> np.ndarray:
+    return np.zeros((0, 0), bool)
+
+
+def film_set_feed(rig: Rig, speed: float = 1.0) -> Feed:
+    """Synchronized films played as if live: each set of pictures comes when it is due."""
+    film = _FilmSet(rig, rig.recording.name, rig.cameras[0].size, rig.rate)
+    feed = film_feed(cast(FrameSource, film), speed)
+
+    def read() -> Iterator[SnapshotSet]:
+        for shot in feed.read():
+            yield SnapshotSet(shot.captured, cast("tuple[Image, ...]", shot.image), shot.shown)
+
+    return replace(feed, read=cast(Any, read))

@@ -1,0 +1,236 @@
+"""A recording's cameras, one or several: their films synchronized, decoded and segmented in parallel."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+import warnings
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, SilhouetteError, VideoError
+from shadowpuppet.io.recording import Recording
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.threads import usable_cores
+from shadowpuppet.video import Image
+from shadowpuppet.video.frames import ASSUMED_RATE
+
+NEAR = 0.55
+"""Largest offset of a frame from the time of its set, over the sets' interval: half, and a little for jittering clocks."""
+LATE = 5
+"""Sets without a frame of a camera whose film is over, after which that is said: films rarely end with the same frame."""
+
+Segment = Callable[[CameraFrame], Mask]
+"""Makes a camera's silhouettes, such as `Silhouettes`."""
+
+
+class FrameSet(NamedTuple):
+    """Frames of all cameras at one time, in the rig's order; None for a camera without one."""
+
+    time: float
+    """Seconds of the recording."""
+    images: tuple[Image | None, ...]
+    masks: tuple[Mask | None, ...]
+    """The person's silhouettes (H, W)."""
+    decoding: float = 0.0
+    """Seconds of reading, summed over the cameras."""
+    segmenting: float = 0.0
+    """Seconds of making silhouettes, likewise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """The cameras of a recording, one or more."""
+
+    recording: Recording
+    footage: tuple[Footage, ...]
+    """One for each camera."""
+
+    @property
+    def is_multiview(self) -> bool:
+        """Whether there are two cameras or more."""
+        return len(self.footage) > 1
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """For images of the size that is worked on."""
+        return tuple(footage.camera for footage in self.footage)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cameras."""
+        return tuple(camera.name for camera in self.cameras)
+
+    @cached_property
+    def rates(self) -> tuple[float, ...]:
+        """Frames/s of the films; an assumed rate for those that do not state it."""
+        stated = (footage.film().rate for footage in self.footage)
+        return tuple(rate if math.isfinite(rate) else ASSUMED_RATE for rate in stated)
+
+    @property
+    def rate(self) -> float:
+        """Sets/s."""
+        return self.rates[self.leaders[0]]
+
+    @property
+    def count(self) -> int | None:
+        """Number of sets; None where the films do not state their lengths."""
+        counts = [footage.count for footage, rate in zip(self.footage, self.rates) if rate == self.rate]
+        return max((count for count in counts if count is not None), default=None)
+
+    @cached_property
+    def leaders(self) -> tuple[int, ...]:
+        """Cameras whose clock sets the sets' times, the first of them that still has frames: of the middle rate, others after them.
+
+        At a faster camera's clock the slower ones would be missing from every second set; a slower one's would waste frames.
+        """
+        middle = sorted(self.rates)[(len(self.rates) - 1) // 2]
+        return tuple(sorted(range(len(self.rates)), key=lambda n: round(abs(self.rates[n] / middle - 1), 1)))
+
+
+def open_rig(path: str | Path, options: Options) -> Rig:
+    """The cameras of a recording: all, or those that `options.camera` names.
+
+    Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError` where something cannot be used.
+    """
+    recording = open_recording(path, options)
+    views = chosen_views(recording, options.camera)
+    if options.background is not None and len(views) > 1:
+        raise SettingsError(f"background: found one for {len(views)} cameras, expected one each, background/<camera>.* in the recording")
+    if options.region is not None and len(views) > 1:
+        raise SettingsError(f"region: found one for {len(views)} cameras, expected none: it serves a single camera")
+    return Rig(recording, tuple(camera_footage(recording, view, options) for view in views))
+
+
+def read_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1) -> Generator[FrameSet]:
+    """Every `every`-th frame set with its silhouettes: one camera's frames in turn, several cameras' by `synchronized_frames`."""
+    if rig.is_multiview:
+        return synchronized_frames(rig, segment, ready=ready, every=every)
+    return _single_frames(rig, segment[0], ready, every)
+
+
+def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Generator[FrameSet]:
+    """One camera's frames. Errors of the film are raised: nothing else could go on."""
+    frames = islice(rig.footage[0].frames(ready), 0, None, every)
+    while True:
+        start = time.perf_counter()
+        if (frame := next(frames, None)) is None:
+            return
+        decoded = time.perf_counter()
+        mask = segment(frame)
+        yield FrameSet(frame.time, (frame.image,), (mask,), decoded - start, time.perf_counter() - decoded)
+
+
+def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1,
+                        threads: int | None = None) -> Generator[FrameSet]:
+    """All cameras' frames, set by set, with their silhouettes by `segment` (one for each camera).
+
+    A set has of each camera the frame nearest to its time, within half the sets' interval. A camera whose film breaks off or ends is
+    missing from there on, which is said once. `ready`: read the recording's ready silhouettes, too. `every`: only every `every`-th set
+    is segmented and given. The next set is made by `threads` (default: the processor's cores less one, which tracks) while the last is
+    used; the sets do not depend on their number.
+    """
+    readers = [CameraReader(footage, one, ready) for footage, one in zip(rig.footage, segment)]
+    leaders, step = rig.leaders, 1 / rig.rate
+    with contextlib.ExitStack() as stack:
+        pool = ThreadPoolExecutor(threads or max(1, usable_cores() - 1), "camera")
+        stack.callback(pool.shutdown, cancel_futures=True)
+        for future in [pool.submit(reader.advance) for reader in readers]:
+            future.result()
+        work, n = _begin(pool, readers, leaders, step), 0
+        while work is not None:
+            moment, futures = work
+            parts, n = [future.result() for future in futures], n + 1
+            _warn_of_ends(readers, moment, step)
+            work = _begin(pool, readers, leaders, step, moment, wanted=n % every == 0)
+            if n % every != 1 % every:
+                continue
+            yield FrameSet(moment, tuple(part.image for part in parts), tuple(part.mask for part in parts),
+                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts))
+
+
+class _Part(NamedTuple):
+    """One camera's part of a frame set."""
+
+    image: Image | None
+    mask: Mask | None
+    decoding: float
+    segmenting: float
+
+
+class CameraReader:
+    """Reads one camera's film; `next` is the frame that was read last and belongs to no set yet. Used by one thread at a time."""
+
+    def __init__(self, footage: Footage, segment: Segment, ready: bool) -> None:
+        """Nothing is read yet."""
+        self.footage, self.segment = footage, segment
+        self.next: CameraFrame | None = None
+        self.last, self.trouble, self.warned = -math.inf, "", False
+        self._frames = footage.frames(ready)
+
+    def advance(self) -> None:
+        """Read the next frame."""
+        self.last = self.last if self.next is None else self.next.time
+        try:
+            self.next = next(self._frames, None)
+        except (VideoError, SilhouetteError) as error:
+            self.next, self.trouble = None, str(error)
+
+    def take(self, moment: float, reach: float, leads: bool, wanted: bool) -> _Part:
+        """The frame nearest to a moment (s), within reach (s), of the leading camera the next; with its silhouette if `wanted`."""
+        start = time.perf_counter()
+        best = self._pop() if leads else self._nearest(moment, reach)
+        decoded = time.perf_counter()
+        try:
+            mask = None if best is None or not wanted else self.segment(best)
+        except SilhouetteError as error:
+            best = mask = None
+            self.next, self.trouble = None, str(error)
+        return _Part(None if best is None else best.image, mask, decoded - start, time.perf_counter() - decoded)
+
+    def _pop(self) -> CameraFrame | None:
+        frame = self.next
+        self.advance()
+        return frame
+
+    def _nearest(self, moment: float, reach: float) -> CameraFrame | None:
+        while self.next is not None and self.next.time < moment - reach:
+            self.advance()
+        if self.next is None or self.next.time > moment + reach:
+            return None
+        best = self._pop()
+        while best is not None and self.next is not None and abs(self.next.time - moment) < abs(best.time - moment):
+            best = self._pop()  # what is farther waits: it may belong to the next set
+        return best
+
+
+def _begin(pool: ThreadPoolExecutor, readers: Sequence[CameraReader], leaders: Sequence[int], step: float, last: float = -math.inf,
+           wanted: bool = True):
+    """Start the set after the one at `last` (s): its time and the futures of its parts; None where no camera has a frame left."""
+    for leader in leaders:
+        reader = readers[leader]
+        while leader != leaders[0] and reader.next is not None and reader.next.time <= last + NEAR * step:
+            reader.advance()  # between two sets of the leader before it
+        if reader.next is not None:
+            moment = reader.next.time
+            return moment, [pool.submit(reader.take, moment, NEAR * step, n == leader, wanted) for n, reader in enumerate(readers)]
+    return None
+
+
+def _warn_of_ends(readers: Sequence[CameraReader], moment: float, step: float) -> None:
+    """Warn, once for each camera, that it has no more frames where others have."""
+    for reader in readers:
+        if reader.next is None and not reader.warned and (reader.trouble or moment > reader.last + LATE * step):
+            reader.warned = True
+            ends = reader.trouble or f"{reader.footage.view.video}: ends at {max(reader.last, 0.0):.2f} s"
+            warnings.warn(f"{ends}; from there on the run goes on without camera {reader.footage.camera.name!r}", ShadowPuppetWarning,
+                          stacklevel=3)

@@ -1,0 +1,105 @@
+"""Silhouettes of one camera's frames: made by segmentation, or taken from the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sample
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
+from shadowpuppet.video import Image
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouettes:
+    """Turns a camera's frames into masks, by segmentation or by reading ready ones."""
+
+    source: str
+    """Where the silhouettes come from, in words."""
+    segmenter: Segmenter | None
+    """None for ready silhouettes."""
+    region: tuple[slice, slice] | None = None
+    blank: Image | None = None
+    """Image of the empty scene, which replaces what is outside the region."""
+
+    def __call__(self, frame: CameraFrame) -> Mask:
+        """The person's mask (H, W)."""
+        if self.segmenter is None:
+            return self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
+        return self._within(self.segmenter(self.visible(frame.image)))
+
+    def plain(self, frame: CameraFrame) -> Mask | None:
+        """The mask by eq. 1 alone; None where the background has no standard deviation."""
+        if self.segmenter is None or self.segmenter.background.frames < 2:
+            return None
+        return self._within(self.segmenter.raw(frame.image))
+
+    def visible(self, image: Image) -> Image:
+        """An image with the empty scene outside the region, so that nothing there is taken for the person."""
+        if self.region is None or self.blank is None:
+            return image
+        out = self.blank.copy()
+        out[self.region] = image[self.region]
+        return out
+
+    def _within(self, mask: Mask) -> Mask:
+        if self.region is None:
+            return mask
+        out = np.zeros_like(mask)
+        out[self.region] = mask[self.region]
+        return out
+
+
+def learn_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
+    """Silhouettes with a learnt background, or the ready ones. Raises `SilhouetteError` or `SettingsError`."""
+    if options.masks:
+        return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes", None, footage.region)
+    images = [frame.image for frame in sample.frames]
+    if footage.view.background is None:
+        scene, source = [background_from_film(images)], "the film itself (median)"
+    else:
+        scene, source = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background)
+    first, scene = _peeked(iter(scene))
+    silhouettes = Silhouettes(source, None, footage.region, None if footage.region is None else first)
+    segmenter = learn_background(scene, options.silhouette, film=[silhouettes.visible(image) for image in images])
+    return replace(silhouettes, segmenter=segmenter)
+
+
+def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
+    """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
+    `SettingsError`."""
+    return map(learn_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+
+
+def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
+    """Silhouettes for measuring a person: the `tracked` ones if these are clean, otherwise clean ones.
+
+    A filter finds a body among specks and holes once its sizes are known; sizes and postures cannot be found in them.
+    """
+    clean = clean_settings(options.silhouette)
+    if tracked.segmenter is None or clean == options.silhouette:
+        return tracked
+    return learn_silhouettes(footage, sample, replace(options, silhouette=clean))
+
+
+def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
+    """Settings of silhouettes for measuring a person: those asked for if they make clean ones."""
+    if asked.method == "averaging":
+        return SilhouetteSettings()
+    return asked if asked.cleaned else replace(asked, clean=None)
+
+
+def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:
+    """The first of some images, and an iterator over all of them."""
+    first = next(images, None)
+    return first, chain([] if first is None else [first], images)
+
+
+def _short(path: Path | None) -> str:
+    return f"{path.parent.name}/{path.name}" if path is not None else ""

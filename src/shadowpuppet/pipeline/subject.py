@@ -1,0 +1,120 @@
+"""The person in a recording: a fitted body and the tracker that follows it, behind one interface for one camera and for several."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.io.person import Person
+from shadowpuppet.motion.motion import BLANK, MotionFrame
+from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.video import Image
+
+
+class TrackerState(Protocol):
+    """What a run needs of a tracker's state."""
+
+    @property
+    def pose(self) -> Array:
+        """The estimate, of shape (D,)."""
+        ...
+
+    @property
+    def status(self) -> str:
+        """One of `motion.STATUSES`."""
+        ...
+
+    @property
+    def cost(self) -> float:
+        """The tracker's own measure of misfit."""
+        ...
+
+    @property
+    def overlap(self) -> float:
+        """Mean intersection over union of the drawn estimate and the silhouettes; NaN where it was not computed."""
+        ...
+
+
+class Observed(NamedTuple):
+    """A frame set and what a tracker is given of it."""
+
+    frames: FrameSet
+    observation: Any
+    seconds: float = 0.0
+    """What making the observation took."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackedSubject(ABC):
+    """A fitted person and the tracker that follows them."""
+
+    body: Body
+    person: Person
+    """What can be used again: person.toml."""
+    summary: dict[str, Any]
+    """How the person was fitted, plain values: `person` of look.json."""
+    doubts: tuple[str, ...] = ()
+    """What may harm the run, a sentence each."""
+
+    @abstractmethod
+    def observe(self, masks: Sequence[Mask | None]) -> Any:
+        """The tracker's observation of one frame set's silhouettes."""
+
+    @abstractmethod
+    def next_state(self, rng: np.random.Generator, state: Any, observation: Any) -> Any:
+        """The tracker's state after an observation; None before the person is found."""
+
+    @abstractmethod
+    def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
+        """A frame of overlay.mp4, blue green red."""
+
+    def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
+        """Observations of frame sets, one after another."""
+        for each in frames:
+            start = time.perf_counter()
+            observation = self.observe(each.masks)
+            yield Observed(each, observation, time.perf_counter() - start)
+
+    def unfound(self, observation: Any) -> str:
+        """Status of a frame for which there is no state."""
+        return "absent"
+
+    def points(self, pose: Array) -> Array:
+        """Landmarks (L, 3) of a pose (D,) in the world, metres."""
+        return self.body.points(pose[None])[0]
+
+    @cached_property
+    def joint_columns(self) -> list[int]:
+        """Indices of the landmarks that a run keeps."""
+        return [self.body.landmark_names.index(name) for name in joint_names(self.body)]
+
+
+def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | None, observation: Any = None) -> MotionFrame:
+    """A tracker's state as a run keeps it, without a pose if the person is lost or absent."""
+    if state is None:
+        return MotionFrame(seconds, subject.unfound(observation))
+    if state.status in BLANK:
+        return MotionFrame(seconds, state.status, cost=state.cost, overlap=state.overlap)
+    joints = subject.points(state.pose)[subject.joint_columns]
+    return MotionFrame(seconds, state.status, state.pose, joints, cost=state.cost, overlap=state.overlap)
+
+
+def joint_names(body: Body) -> list[str]:
+    """Names of the landmarks that a run keeps as joints."""
+    return [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
+
+
+def average_body(name: str) -> Body:
+    """A body of average sizes, for its names."""
+    return make_body(name, average_sizes(name, AVERAGE_HEIGHT))

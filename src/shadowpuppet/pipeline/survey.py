@@ -1,0 +1,235 @@
+"""The look before a run: silhouettes of every camera's film, their quality, and what may harm the run."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import chain, islice
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.calibration.agreement import agreement
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.motion.metrics import overlap
+from shadowpuppet.pipeline.footage import FIRST, LOOKED_AT, CameraFrame, Footage, Sample, take_sample
+from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, Look, RigLook, Survey
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
+from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
+from shadowpuppet.threads import usable_cores
+
+UNEVEN = 0.1
+"""Jitter of the frames' interval, as a share of it, from which on the film's rate varies."""
+GOOD = 0.9
+"""Overlap with exact silhouettes under which segmentation is in doubt."""
+OPENING, OPENED = 2.0, 40
+"""With several cameras: the first seconds in which the person is measured, and at most how many frame sets of them are kept."""
+BRIEFLY = 240
+"""With several cameras: frames of each film that are looked at if its background need not be made from it."""
+RATES, LENGTHS = 0.02, 0.1
+"""Relative difference of rates, and difference of lengths (s), from which on films are said to differ."""
+
+
+class FilmSurvey(NamedTuple):
+    """What was found in one camera's film."""
+
+    sample: Sample
+    silhouettes: Silhouettes
+    masks: list[Mask]
+    """Silhouettes of the sample's frames."""
+    exact: list[Mask]
+    """The recording's ready silhouettes of the same frames; empty where these are used, or there are none."""
+    values: dict[str, Any]
+    """The fields that `Look` and `CameraLook` have in common."""
+
+
+def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) -> FilmSurvey:
+    """Look at one camera's first `longest` frames. Raises a `ShadowPuppetError` where something cannot be used."""
+    sample = take_sample(footage, options.masks, longest)
+    silhouettes = learn_silhouettes(footage, sample, options)
+    runs = [[silhouettes(frame) for frame in run] for run in sample.runs]
+    masks = [mask for run in runs for mask in run]
+    exact = [ready_mask(frame.ready) for frame in sample.frames if frame.ready is not None and silhouettes.segmenter is not None]
+    camera = footage.camera
+    return FilmSurvey(sample, silhouettes, masks, exact, {
+        "size": footage.view.camera.size, "worked_size": camera.size, "background": silhouettes.source,
+        "fov": float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))),
+        "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
+        "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
+    })  # fmt: skip
+
+
+def brief_length(footage: Footage, options: Options) -> int:
+    """Frames of one of several cameras that are looked at: no more than its background needs."""
+    return LOOKED_AT if footage.view.background is None and not options.masks else BRIEFLY
+
+
+# One camera
+
+
+def survey_camera(rig: Rig, options: Options) -> Survey:
+    """Look at a recording of one camera. Raises a `ShadowPuppetError` where something cannot be used."""
+    footage = rig.footage[0]
+    film = survey_film(footage, options)
+    look = _look(footage, film)
+    if look.refusal:
+        return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
+    clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
+    return Survey(rig, (film.silhouettes,), (clean,), _first_people(film.sample, clean), look)
+
+
+def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
+    """Silhouettes of the first seconds that may be a person's, followed by those of later frames."""
+    def seen(frame: CameraFrame) -> tuple[float, Mask]:
+        return frame.time, clean(frame)
+
+    people = list(islice((each for each in map(seen, chain(sample.first, sample.frames)) if may_be_person(each[1])), FIRST))
+    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people])
+
+
+def _look(footage: Footage, film: FilmSurvey) -> Look:
+    sample, camera = film.sample, footage.camera
+    plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
+    look = Look(
+        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.film().count,
+        looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
+        plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
+        refusal=film.values["quality"].refusal(), **film.values,
+    )  # fmt: skip
+    return look if look.refusal else replace(look, doubts=tuple(_doubts(look, footage)))
+
+
+def known_scale(footage: Footage) -> str:
+    """What fixes the scale, in words."""
+    subject = footage.recording.subject
+    known = [f"{name} {value:.2f} m" for name, value in (("height", subject.height), ("distance", subject.distance)) if value]
+    return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
+
+
+def _doubts(look: Look, footage: Footage) -> list[str]:
+    doubts, subject = [], footage.recording.subject
+    if not look.calibrated:
+        doubts.append(f"no calibration: the camera is taken for level, with a field of view of {look.fov:.0f} degrees and no distortion; "
+                      "depths and the world's axes are as good as that; give a calibration.toml")
+    if subject.height is None and subject.distance is None:
+        doubts.append(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give --height")
+    elif subject.distance is None and not footage.recording.references:
+        doubts.append("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as wrong as "
+                      "that; measure it and give --distance, or take references")
+    if footage.view.background is None and look.key != "none":
+        doubts.append("no picture of the empty scene: it is the median of the film, so whoever stands still becomes background; "
+                      "give background/<camera>.mp4 or --background")
+    if look.jitter * look.rate > UNEVEN:
+        doubts.append(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are kept")
+    if look.exact_overlap is not None and look.exact_overlap < GOOD:
+        doubts.append(f"the silhouettes overlap the ready ones in masks/ by {look.exact_overlap:.2f} only: try another "
+                      "--silhouette.method, or --masks")
+    return [*doubts, *look.quality.warnings()]
+
+
+# Several cameras
+
+
+def survey_rig(rig: Rig, options: Options) -> Survey:
+    """Look at each camera's film, and at the first seconds of all together. Raises a `ShadowPuppetError` where something cannot be used."""
+    with ThreadPoolExecutor(usable_cores(), "look") as pool:
+        films = list(pool.map(lambda footage: survey_film(footage, options, brief_length(footage, options)), rig.footage))
+    silhouettes = tuple(film.silhouettes for film in films)
+    first = _first_sets(rig, silhouettes, options.masks)
+    step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
+    look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
+                   agreement=agreement(rig.cameras, first.masks, step))
+    refusal = _rig_refusal(look, first)
+    look = replace(look, refusal=refusal, doubts=() if refusal else tuple(_rig_doubts(look)))
+    return Survey(rig, silhouettes, silhouettes, first, look)
+
+
+def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> FirstSeconds:
+    every = max(1, round(OPENING * rig.rate / OPENED))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when the run comes to it
+        frames = synchronized_frames(rig, silhouettes, ready=ready, every=every, threads=usable_cores())
+        sets = [(each.time, each.masks) for each in islice(frames, OPENED)]
+    sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
+    return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
+
+
+def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
+    x, y, z = footage.view.camera.centre.tolist()
+    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film().rate
+    return CameraLook(name=footage.camera.name, place=(x, y, z), frames=footage.count, rate=rate, start=footage.view.start, **film.values)
+
+
+def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
+    """Why tracking is hopeless, and the remedy, in a sentence."""
+    bad = [(camera.name, why) for camera in look.cameras if (why := camera.quality.refusal())]
+    if len(look.cameras) - len(bad) < 2:
+        return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
+    if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in first.masks):
+        return (f"no two cameras see a person at the same time within the first {OPENING:g} s: do the films belong together, and begin "
+                "together? say in [start] of recording.toml when each began")
+    return look.agreement.refusal()
+
+
+def _rig_doubts(look: RigLook) -> list[str]:
+    doubts = list(look.agreement.doubts())
+    rates = np.array([camera.rate for camera in look.cameras])
+    ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
+    if np.ptp(rates) > RATES * rates.min():
+        listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
+        doubts.append(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets a "
+                      "second, and a camera without a picture of a moment is left out of it; film at one rate")
+    elif ends and max(ends.values()) - min(ends.values()) > LENGTHS:
+        listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
+        doubts.append(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml when "
+                      "each began")
+    for camera in look.cameras:
+        if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
+            doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
+                          "try another --silhouette.method, or --masks")
+        doubts += [f"camera {camera.name!r}: {warning}" for warning in camera.quality.warnings()]
+        doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
+    return doubts
+
+
+# Silhouettes
+
+
+def _share(masks: Sequence[Mask]) -> float:
+    return float(np.mean([mask.mean() for mask in masks]))
+
+
+def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:
+    """Mean intersection over union of pairs of masks; None where there are none."""
+    overlaps = np.array([overlap(mask, right) for mask, right in zip(masks, exact)])
+    return float(np.nanmean(overlaps)) if np.isfinite(overlaps).any() else None
+
+
+def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int]) -> MaskQuality:
+    """Quality of masks in several runs that begin at frames `starts`; consecutive frames are compared within a run only."""
+    parts = [mask_quality(run) for run in runs]
+    frames = np.array([part.frames for part in parts], float)
+
+    def mean(name: str) -> float:
+        return float(np.average([getattr(part, name) for part in parts], weights=frames))
+
+    def median(name: str) -> float:
+        return float(np.median([getattr(part, name) for part in parts]))
+
+    def first(name: str) -> int | None:
+        return min((start + n for part, start in zip(parts, starts) if (n := getattr(part, name)) is not None), default=None)
+
+    border = {side: float(np.average([part.border[side] for part in parts], weights=frames)) for side in parts[0].border}
+    return MaskQuality(
+        frames=int(frames.sum()), area=median("area"), area_change=median("area_change"), area_jumps=mean("area_jumps"),
+        flicker=median("flicker"), border=border, specks=mean("specks"), speck_area=mean("speck_area"), holes=mean("holes"),
+        hole_area=mean("hole_area"), empty=sum(part.empty for part in parts), full=sum(part.full for part in parts),
+        first_empty=first("first_empty"), first_full=first("first_full"),
+    )  # fmt: skip

@@ -1,0 +1,47 @@
+"""A tracker for tests of what is around a tracker: it puts a body upright where the surface points are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.io.person import Person
+from shadowpuppet.pipeline.person_rig import MultiviewSubject
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+
+
+class Standing(NamedTuple):
+    pose: np.ndarray
+    status: str
+    cost: float = 0.0
+    overlap: float = np.nan
+
+
+class Follower:
+    """Puts a body upright where the surface points are."""
+
+    def __init__(self, body) -> None:
+        self.body, self.calls = body, []
+
+    def start(self, rng, points, masks) -> Standing:
+        self.calls.append("start")
+        return self._there(rng, points, masks)
+
+    def step(self, rng, state, points, masks) -> Standing:
+        self.calls.append("step")
+        return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
+
+    def _there(self, rng, points, masks) -> Standing:
+        pose = np.zeros(len(self.body.skeleton.dofs))
+        pose[:3] = points.points.mean(0) + rng.normal(0, 1e-3, 3)
+        return Standing(pose, "tracked" if sum(mask is not None for mask in masks) > 2 else "uncertain")
+
+
+def followed(cameras) -> MultiviewSubject:
+    """A person of average sizes whom the tracker follows in these cameras."""
+    sizes = average_sizes("anatomical", 1.7)
+    body = make_body("anatomical", sizes)
+    return MultiviewSubject(body=body, tracker=Follower(body), hull=VisualHull(cameras), person=Person(sizes), summary={"height": 1.7},
+                            doubts=("the sizes are a guess",))
