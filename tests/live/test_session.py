@@ -12,9 +12,7 @@ from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.live.background_phase import in_background
-from shadowpuppet.live.learning_phase import BackgroundCollector, moved
-from shadowpuppet.live.phases import StandStillDetector, unfit
+from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, in_background, moved, unfit
 from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing

@@ -15,8 +15,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
-from shadowpuppet.live.learning_phase import BackgroundCollector
-from shadowpuppet.live.phases import NOBODY
+from shadowpuppet.live.phases import NOBODY, BackgroundCollector
 from shadowpuppet.live.rig_capture import SnapshotSet
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import MotionFrame

@@ -13,7 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, SettingsError, choices
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.live.learning_phase import KEPT
+from shadowpuppet.live.phases import KEPT
 from shadowpuppet.live.rig_capture import RigCapture, SnapshotSet
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage

@@ -15,10 +15,10 @@ import numpy as np
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.live.background_phase import in_background
 from shadowpuppet.live.base_session import LiveSession, Outcome
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
+from shadowpuppet.live.phases import in_background
 from shadowpuppet.live.recorder import Recorder
 from shadowpuppet.live.rig_capture import RigCapture
 from shadowpuppet.live.rig_session import RigSession

@@ -14,8 +14,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
-from shadowpuppet.live.learning_phase import BackgroundCollector
-from shadowpuppet.live.phases import StandStillDetector, unfit
+from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, unfit
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size

@@ -10,7 +10,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.live.learning_phase import KEPT
+from shadowpuppet.live.phases import KEPT
 from shadowpuppet.pipeline.footage import worked_size
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette.background import sample_frames
