@@ -14,6 +14,7 @@ from shadowpuppet.silhouette.boundary import SHARP, Outline, disc, outline_width
 from shadowpuppet.silhouette.channels import Choice, choose_key
 from shadowpuppet.silhouette.classifiers import SAMPLES, KeyRule, MixtureRule, NeighbourRule, PlainRule
 from shadowpuppet.silhouette.cleanup import coarse_person
+from shadowpuppet.silhouette.light import Light
 from shadowpuppet.silhouette.segmenter import Segmenter, plain_rule
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
@@ -46,7 +47,8 @@ def learn_background(images: Iterable[Image], settings: SilhouetteSettings | Non
     mixture, samples = MixtureRule(settings.shadow), scene.Spread(SAMPLES)
     see = {"mog2": mixture.learn, "knn": samples.add}.get(settings.method, lambda image: None)
     background = scene.learn_statistics(images, see)
-    frames = _sample(film, background)
+    light = Light(scene.picture_of(background))
+    frames = [light.normalised(frame) for frame in _sample(film, background)]
     basis = _key_rule(background, frames, settings)
     choice = _choose(background, frames, basis, settings)
     rules: dict[str, Callable[[], Rule]] = {
@@ -56,7 +58,7 @@ def learn_background(images: Iterable[Image], settings: SilhouetteSettings | Non
     }
     rule = rules.get(choice.key, lambda: replace(basis, key=choice.key))()
     least = LEAST_CONTRAST * settings.factor / float(basis.inverse_sigma[..., 0].max())
-    segmenter = Segmenter(background, settings, *choice, Outline(SHARP, least), rule)
+    segmenter = Segmenter(background, settings, *choice, Outline(SHARP, least), rule, light)
     return replace(segmenter, outline=Outline(_outline_width(segmenter, frames), least))
 
 

@@ -14,6 +14,7 @@ from shadowpuppet.silhouette.background import Background, Image, check_alike, c
 from shadowpuppet.silhouette.boundary import Contrast, Mask, Outline
 from shadowpuppet.silhouette.classifiers import KEYED, PlainRule
 from shadowpuppet.silhouette.cleanup import Window, clean
+from shadowpuppet.silhouette.light import Light
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 EVERYTHING: Window = (slice(None), slice(None))
@@ -34,6 +35,8 @@ class Segmenter:
     """How blurred outlines are in the film."""
     rule: Callable[[Image], Mask]
     """The test of pixels: picture to labels (H, W), 0 background, 1 perhaps a person, 2 a person."""
+    light: Light | None = None
+    """Follows changes of light; None: the light is taken to be constant."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a picture (H, W, 3), blue green red, or (H, W), grey; empty where nobody is.
@@ -41,6 +44,7 @@ class Segmenter:
         Raises `SilhouetteError` for a picture that does not fit the background.
         """
         self._check(image)
+        image = image if self.light is None else self.light.normalised(image)
         label = self.rule(image)
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.outline)
