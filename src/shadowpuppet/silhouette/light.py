@@ -10,15 +10,17 @@ from shadowpuppet.silhouette.background import Image
 
 SAMPLED = 6000
 """Pixels, on a grid, that a gain is estimated from."""
-DARK, BRIGHT = 20, 245
+DARK, BRIGHT = 40, 245
 """Grey levels between which a pixel tells a gain: below, it is noise; above, it may be clipped."""
 ENOUGH = 300
 """Least number of such pixels."""
 CLIPPED = 254
 """Grey level from which a pixel of the frame counts as clipped."""
-WIDTH = 0.03
-"""Half width of the window, in log gain, whose mean refines the mode."""
-NEGLIGIBLE = 0.012
+WIDTH = 0.12
+"""Half width of the window, in log gain, in which the mean is moved to the middle of the background's pixels (mean shift)."""
+SHIFTS = 5
+"""Steps of the mean shift."""
+NEGLIGIBLE = 0.02
 """Log gain that is left as it is: a camera's exposure holds no better, and clean film stays untouched."""
 
 
@@ -64,5 +66,7 @@ def _mode_of_ratio(before: np.ndarray, after: np.ndarray) -> float:
         half = len(values) // 2
         start = int(np.argmin(values[half:] - values[: len(values) - half]))
         values = values[start : start + half]
-    near = ratio[np.abs(ratio - values.mean()) < WIDTH]
-    return float(np.exp(near.mean()))
+    middle = values.mean()
+    for _ in range(SHIFTS):
+        middle = ratio[np.abs(ratio - middle) < WIDTH].mean()
+    return float(np.exp(middle))
