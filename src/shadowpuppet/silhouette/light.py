@@ -3,70 +3,91 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image
 
-SAMPLED = 6000
+SAMPLED = 5000
 """Pixels, on a grid, that a gain is estimated from."""
 DARK, BRIGHT = 40, 245
-"""Grey levels between which a pixel tells a gain: below, it is noise; above, it may be clipped."""
-ENOUGH = 300
+"""Grey levels between which a pixel shows the gain: below, it is noise; above, it may be clipped."""
+MIN_PIXELS = 300
 """Least number of such pixels."""
 CLIPPED = 254
 """Grey level from which a pixel of the frame counts as clipped."""
-WIDTH = 0.12
-"""Half width of the window, in log gain, in which the mean is moved to the middle of the background's pixels (mean shift)."""
+BINS, BIN = 512, 0.008
+"""Histogram of log gains: number and width of bins, the middle one at a gain of 1."""
+WINDOW = 15
+"""Half width, in bins, of the window that the mean shift moves onto the background's pixels."""
 SHIFTS = 5
 """Steps of the mean shift."""
 NEGLIGIBLE = 0.02
-"""Log gain that is left as it is: a camera's exposure holds no better, and clean film stays untouched."""
+"""Log gain up to which a frame is left as it is: rounding and codecs make as much, and clean film stays untouched."""
 
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """The empty scene that the light of a frame is compared with."""
+    """The light of the empty scene, that of a frame is compared with."""
 
     scene: Image
     """Mean picture of the empty scene, of shape (H, W, 3), blue green red, or (H, W)."""
 
-    def gains(self, image: Image) -> np.ndarray:
+    def gains(self, image: Image) -> NDArray[np.float64]:
         """Gain of each channel (C,) of a picture like the scene: the mode of the ratio picture to scene over pixels.
 
-        The mode is that of the background even where the person covers half of the picture. 1 where too few pixels tell.
+        The mode is the background's even where the person covers nearly half of the picture. 1 where too few pixels show it.
         """
-        step = max(1, int(np.sqrt(self.scene.shape[0] * self.scene.shape[1] / SAMPLED)))
-        before = self.scene[::step, ::step].reshape(-1, *self.scene.shape[2:] or (1,)).astype(np.float32)
-        after = image[::step, ::step].reshape(before.shape).astype(np.float32)
-        return np.array([_mode_of_ratio(before[:, c], after[:, c]) for c in range(before.shape[1])])
+        levels, informative = self._sampled
+        step = self._step
+        after = image[::step, ::step].reshape(levels.shape)
+        informative = informative & (after > DARK // 2) & (after < BRIGHT)
+        bins = np.rint((LOG[after] - levels) / BIN).astype(np.intp) + BINS // 2
+        return np.array([_mode(bins[use, c]) for c, use in enumerate(informative.T)])
 
     def normalised(self, image: Image) -> Image:
-        """The picture divided by its gains; itself where these are negligible. Clipped pixels become the scene's where it would clip."""
+        """The picture divided by its gains; the picture itself where these are negligible.
+
+        Where the scene under this light is clipped, clipped pixels of the picture become the scene's.
+        """
         import cv2
 
         gains = self.gains(image)
         if np.abs(np.log(gains)).max() < NEGLIGIBLE:
             return image
-        levels = np.arange(256)[:, None] / gains
-        table = np.clip(np.rint(levels), 0, 255).astype(np.uint8)
+        table = np.clip(np.rint(np.arange(256)[:, None] / gains), 0, 255).astype(np.uint8)
         out = np.asarray(cv2.LUT(image, table[None] if image.ndim == 3 else table[:, 0]), np.uint8)
-        clipped = (image >= CLIPPED) & (self.scene * gains.astype(np.float32) >= CLIPPED - 4)
-        np.copyto(out, self.scene, where=clipped)
+        if gains.max() > 1 and (image >= CLIPPED).any():
+            reached = np.clip(np.ceil((CLIPPED - 4) / gains), 0, 255).astype(np.uint8)
+            np.copyto(out, self.scene, where=(image >= CLIPPED) & (self.scene >= (reached if image.ndim == 3 else reached[0])))
         return out
 
+    @property
+    def _step(self) -> int:
+        return max(1, int(np.sqrt(self.scene.shape[0] * self.scene.shape[1] / SAMPLED)))
 
-def _mode_of_ratio(before: np.ndarray, after: np.ndarray) -> float:
-    told = (before > DARK) & (before < BRIGHT) & (after > DARK / 2) & (after < BRIGHT)
-    if np.count_nonzero(told) < ENOUGH:
+    @cached_property
+    def _sampled(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """Log levels of the scene's sampled pixels (n, C), and where they can show a gain."""
+        pixels = self.scene[:: self._step, :: self._step].reshape(-1, self.scene.shape[2] if self.scene.ndim == 3 else 1)
+        return LOG[pixels], (pixels > DARK) & (pixels < BRIGHT)
+
+
+LOG = np.log(np.maximum(np.arange(256), 1)).astype(np.float32)
+"""Logarithm of each grey level."""
+
+
+def _mode(bins: NDArray[np.intp]) -> float:
+    """The gain at the mode of a histogram of log gains, by mean shift from its highest stretch."""
+    if len(bins) < MIN_PIXELS:
         return 1.0
-    ratio = np.sort(np.log(after[told] / before[told]))
-    values = ratio
-    while len(values) > 40:  # half-sample mode (Bickel and Fruehwirth 2006)
-        half = len(values) // 2
-        start = int(np.argmin(values[half:] - values[: len(values) - half]))
-        values = values[start : start + half]
-    middle = values.mean()
+    counts = np.bincount(np.clip(bins, 0, BINS - 1), minlength=BINS).astype(float)
+    total, moment = (np.concatenate([[0], np.cumsum(values)]) for values in (counts, counts * np.arange(BINS)))
+    narrow = WINDOW // 3
+    middle = float(np.argmax(total[2 * narrow + 1 :] - total[: -2 * narrow - 1]) + narrow)
     for _ in range(SHIFTS):
-        middle = ratio[np.abs(ratio - middle) < WIDTH].mean()
-    return float(np.exp(middle))
+        first, last = max(0, round(middle) - WINDOW), min(BINS, round(middle) + WINDOW + 1)
+        middle = (moment[last] - moment[first]) / (total[last] - total[first])
+    return float(np.exp((middle - BINS // 2) * BIN))
