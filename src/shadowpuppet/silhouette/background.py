@@ -145,6 +145,16 @@ def film_noise(frames: list[Image], mean: Floats) -> NDArray[np.float64]:
     return np.percentile(np.concatenate(differences), 68, axis=0)
 
 
+def picture_of(background: Background) -> Image:
+    """The empty scene as a picture (H, W, 3), blue green red, or (H, W) grey."""
+    import cv2
+
+    if not background.colour:
+        return np.clip(np.rint(background.brightness), 0, 255).astype(np.uint8)
+    planes = np.clip(np.rint(background.mean), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YCrCb2BGR), np.uint8)
+
+
 def to_planes(image: Image) -> Image:
     """Y, Cr, Cb (H, W, 3) of a picture (H, W, 3), blue green red, or (H, W), grey: neutral Cr and Cb."""
     import cv2

@@ -14,6 +14,7 @@ from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, disc, out
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene
 from shadowpuppet.silhouette.cleanup import coarse_person
+from shadowpuppet.silhouette.light import Light
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
@@ -44,12 +45,13 @@ def learn_background(images: Iterable[Image], settings: SilhouetteSettings | Non
     settings = settings or SilhouetteSettings()
     observer = METHODS[settings.method].observer(settings) if settings.method in METHODS else None
     background = scene.learn_statistics(images, observer.add if observer is not None else lambda image: None)
-    frames = _sample(film, background)
+    light = Light(scene.picture_of(background)) if settings.follows_light else None
+    frames = [frame if light is None else light.normalised(frame) for frame in _sample(film, background)]
     channels = _channel_classifier(background, frames, settings)
     choice = _choose(background, frames, channels, settings)
     classifier = METHODS[choice.key].build(EmptyScene(background, channels, settings, observer))
     least = MIN_EDGE_CONTRAST * settings.factor / float(channels.inverse_sigma[..., 0].max())
-    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier)
+    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, light)
     return replace(segmenter, edge=EdgeProfile(_outline_width(segmenter, frames), least))
 
 

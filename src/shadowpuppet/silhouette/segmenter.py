@@ -12,6 +12,7 @@ from shadowpuppet.silhouette.background import Background, Image, check_alike, c
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, Classifier
 from shadowpuppet.silhouette.cleanup import Window, clean
+from shadowpuppet.silhouette.light import Light
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 WHOLE_IMAGE: Window = (slice(None), slice(None))
@@ -24,15 +25,15 @@ class Segmenter:
     The steps of a call, in order:
 
     1. Check that the frame has the background's size and channels.
-    2. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
-       its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`). The frame is
-       compared as it comes: exposure is not normalised, and the camera is taken to stand still. `averaging`, `mog2` and `knn` have
-       comparisons of their own.
-    3. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
+    2. Divide it by the gain of its exposure and white balance over the empty scene, if the light has changed (`light.Light.normalised`).
+    3. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
+       its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`). The camera
+       is taken to stand still. `averaging`, `mog2` and `knn` have comparisons of their own.
+    4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
 
-    The noise that step 2 assumes is set once, by `learning.assumed_sigma`: the greatest of the empty scene's, the film's own
-    (`background.film_noise`) and the setting `noise_floor`, plus a share of the background's edges.
+    The noise that step 3 assumes is set once, by `learning.assumed_sigma`: the greatest of the empty scene's, the film's own
+    (`background.film_noise`, after step 2) and the setting `noise_floor`, plus a share of the background's edges.
     """
 
     background: Background
@@ -46,6 +47,8 @@ class Segmenter:
     """Blur of outlines in the film."""
     classifier: Classifier
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
+    light: Light | None = None
+    """The light of the empty scene; None: frames are compared as they come."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if nobody is in it.
@@ -53,6 +56,7 @@ class Segmenter:
         Raises `SilhouetteError` for a frame that does not fit the background.
         """
         self._check(image)
+        image = image if self.light is None else self.light.normalised(image)
         label = self.classifier(image)
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.edge)

@@ -30,9 +30,16 @@ class SilhouetteSettings:
     shadow: bool = True
     """Whether a pixel that keeps its colour and loses up to half of its light counts as background in shadow. Has no effect on a grey
     film, which has no colour. Not used by `averaging`."""
+    light: bool | None = None
+    """Whether to follow changes of exposure and white balance, frame by frame. By default for every method but `averaging`."""
     clean: bool | None = None
     """Whether to remove specks and small holes, keep only the person, and move the outline to half of the contrast. By default for
     every method but `averaging`."""
+
+    @property
+    def follows_light(self) -> bool:
+        """Whether changes of light are followed: `light`, or its default."""
+        return self.method != "averaging" if self.light is None else self.light
 
     @property
     def cleaned(self) -> bool:

@@ -1,0 +1,70 @@
+"""Changes of light: gains are found beside a person who covers much of the picture, and silhouettes stay what they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shadowpuppet.silhouette import learn_background
+from shadowpuppet.silhouette.light import NEGLIGIBLE, Light
+
+SIZE = (96, 128)
+
+
+def scene_of(seed: int = 0) -> np.ndarray:
+    """A textured empty scene, (H, W, 3)."""
+    rng = np.random.default_rng(seed)
+    rough = rng.uniform(50, 170, (8, 10, 3)).repeat(12, 0).repeat(13, 1)[: SIZE[0], : SIZE[1]]
+    return (rough + rng.normal(0, 4, rough.shape)).clip(0, 255).astype(np.uint8)
+
+
+def filmed(scene: np.ndarray, gains, share: float = 0.0, noise: float = 2.0, seed: int = 1) -> np.ndarray:
+    """A frame of the scene under gains, `share` of its width covered by a person in dark clothes."""
+    rng = np.random.default_rng(seed)
+    image = scene.astype(float)
+    image[10:, 20 : 20 + round(share * SIZE[1])] = (90, 60, 45)
+    return np.rint(image * gains + rng.normal(0, noise, image.shape)).clip(0, 255).astype(np.uint8)
+
+
+@settings(max_examples=30, deadline=None)
+@given(gains=st.tuples(*[st.floats(0.6, 1.4)] * 3), share=st.floats(0, 0.45), noise=st.floats(0, 6))
+def test_gains_are_found_whatever_the_person_covers(gains, share, noise):
+    scene = scene_of()
+    found = Light(scene).gains(filmed(scene, gains, share, noise))
+    np.testing.assert_allclose(found, gains, rtol=0.03)
+
+
+def test_a_constant_light_leaves_the_picture_as_it_is():
+    scene = scene_of()
+    image = filmed(scene, 1 + NEGLIGIBLE / 4, 0.3)
+    assert Light(scene).normalised(image) is image
+
+
+def test_a_picture_too_dark_to_tell_is_left_as_it_is():
+    scene = scene_of()
+    black = np.zeros_like(scene)
+    assert Light(scene).normalised(black) is black
+
+
+def test_clipped_pixels_of_a_bright_scene_are_not_taken_for_a_person():
+    scene = scene_of()
+    scene[:20] = 225
+    image = filmed(scene, 1.3, noise=1)
+    assert (image[:20] == 255).all()
+    assert np.abs(Light(scene).normalised(image)[:20].astype(int) - 225).max() <= 2
+
+
+@pytest.mark.parametrize("grey", [False, True])
+@pytest.mark.parametrize("gain", [0.7, 1.3])
+def test_silhouettes_are_the_same_under_another_exposure(gain, grey):
+    scene = scene_of()
+    empty = [filmed(scene, 1, seed=k) for k in range(6)]
+    film = [filmed(scene, g, 0.25, seed=10 + k) for k, g in enumerate([1, 1, 1, gain, gain, gain])]
+    if grey:
+        empty, film = [image[..., 1].copy() for image in empty], [image[..., 1].copy() for image in film]
+    segmenter = learn_background(empty, film=film)
+    before, after = segmenter(film[0]), segmenter(film[-1])
+    assert 0.15 < before.mean() < 0.3
+    assert (before & after).sum() > 0.95 * (before | after).sum()
