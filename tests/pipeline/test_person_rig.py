@@ -22,7 +22,7 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
 
 FRAMES = 16
-QUICK = {"masks": True, "multiview": {"particles": 6}, "training": {"regions": 6, "starts": 1}}
+QUICK = {"masks": True, "multiview": {"particles": 16}, "training": {"regions": 6, "starts": 1}}
 TRUE = actor.sizes(thigh_width=1.15, waist_depth=1.2, upper_arm_length=1.04)
 
 

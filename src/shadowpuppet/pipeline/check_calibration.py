@@ -90,6 +90,8 @@ class SilhouetteSets(NamedTuple):
 
 def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
     """Test the calibration of several cameras. Raises a `ShadowPuppetError` if there are no silhouettes, or no person in them."""
+    if not rig.is_multiview:
+        raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
     listener = listener or Listener()
     sets = gather_silhouettes(rig, options, listener)
     listener.begin("comparing")

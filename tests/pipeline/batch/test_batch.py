@@ -218,7 +218,7 @@ def test_a_full_disk_fails_the_runs_that_it_hits(recording, tmp_path, monkeypatc
         seed = self.info["settings"]["seed"]
         if len(self._motion) == 3 and (seed == 2 or (seed == 1 and 1 not in hit)):
             hit.append(seed)
-            with self._told():
+            with self._system_errors():
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         append(self, rows)
 
@@ -241,7 +241,7 @@ def test_a_full_disk_fails_the_runs_that_it_hits(recording, tmp_path, monkeypatc
 ], ids=repr)  # fmt: skip
 def test_nothing_is_left_of_a_run_that_failed_and_what_may_go_well_next_time_is_known(recording, tmp_path, monkeypatch, error, again):
     def fails(self, frame):
-        with self._told():
+        with self._system_errors():
             raise error
 
     (tmp_path / "batch.toml").touch()
@@ -342,7 +342,7 @@ def test_a_workers_threads_are_limited(tmp_path, monkeypatch):
     with pytest.raises(ShadowPuppetError):
         run_batch([tmp_path / "gone"], tmp_path / "out", QUICK, workers=1, threads=3)
     found = dict(line.split("=", 1) for line in seen.read_text().splitlines() if "=" in line)
-    assert {found[name] for name in pools.POOLS} == {"3"}
+    assert {found[name] for name in pools.THREAD_VARIABLES} == {"3"}
 
 
 def test_a_folder_with_other_things_in_it_is_refused(recording, tmp_path):
