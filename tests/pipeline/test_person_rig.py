@@ -96,7 +96,7 @@ def test_a_recording_becomes_joints(run):
     assert run.metrics["errors"]["mean_mm"] < 40
     assert run.metrics["errors"]["lost"] == 0
     assert run.info["body"] == "anatomical"
-    assert run.info["settings"]["multiview"]["particles"] == 6
+    assert run.info["settings"]["multiview"]["particles"] == 16
 
 
 def test_who_was_there_is_told_and_saved(run):

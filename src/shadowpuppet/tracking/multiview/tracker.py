@@ -82,7 +82,7 @@ class MultiviewTracker:
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
               also: Cost | None = None) -> MultiviewState:
-        """A state from one frame, as `search` finds it, or `absent`. Arguments as in `step`."""
+        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step`."""
         observation = MultiviewObservation(self.views, points, masks, also)
         if self.is_present(observation):
             return self.search(rng, observation)
