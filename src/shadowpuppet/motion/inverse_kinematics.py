@@ -85,9 +85,9 @@ def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | N
     """Poses of a whole body, and the person's sizes if none are given, from joints over time.
 
     Args:
-            joints: in the world, metres, Z up; any of the 17 joints of a body, among them shoulders, elbows, knees, and the pelvis or both
-                hips. Frames may lack joints.
-            source: the name of the joints in messages.
+        joints: in the world, metres, Z up; any of the 17 joints of a body, among them shoulders, elbows, knees, and the pelvis or both
+            hips. Frames may lack joints.
+        source: the name of the joints in messages.
 
     Raises `ShadowPuppetError` if joints are missing, not in metres, upside down or mirrored, or the body is not a whole one.
     """
