@@ -38,13 +38,6 @@ def test_the_best_pose_is_that_of_least_cost_whatever_the_weights():
     np.testing.assert_array_equal(particles.best, [2, 2])
 
 
-def test_selected_particles_keep_all_that_they_carry():
-    particles = Particles(np.array([[1.0], [2], [3]]), np.array([5.0, 4, 6]), np.array([0.0, -9, -1]), np.array([7, 8, 9]))
-    for values, chosen in zip(particles, particles.select(np.array([2, 0, 0, 1])), strict=True):
-        np.testing.assert_array_equal(chosen, values[[2, 0, 0, 1]])
-    assert len(particles._replace(regions=np.zeros(0, int)).select(np.array([1])).regions) == 0  # a method without states
-
-
 @pytest.mark.parametrize("number", [None, 1, 2, 5, 40])
 @pytest.mark.parametrize("name", SCHEMES)
 def test_there_are_as_many_after_a_step_as_asked_for(name, number, rng):

@@ -12,10 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.resampling import Indices, Scheme
-
-NO_REGION = -1
-"""State of a particle that was not drawn from the motion prior."""
+from shadowpuppet.tracking.resampling import Scheme
 
 
 class Particles(NamedTuple):
@@ -27,18 +24,11 @@ class Particles(NamedTuple):
     """Of shape (N,), the lower the better (pixels for silhouettes)."""
     log_weights: Array
     """Of shape (N,), not normalised."""
-    regions: Indices = np.zeros(0, np.int64)
-    """State s of each in Ni 2008, its region of the motion prior, or `NO_REGION`, of shape (N,); empty in methods without."""
 
     @property
     def best(self) -> Array:
         """The pose (D,) of least cost."""
         return self.poses[np.argmin(self.costs)]
-
-    def select(self, ancestors: Indices) -> Particles:
-        """The particles of some indices, each with all that it carries."""
-        regions = self.regions[ancestors] if len(self.regions) else self.regions
-        return Particles(self.poses[ancestors], self.costs[ancestors], self.log_weights[ancestors], regions)
 
 
 Propose = Callable[[np.random.Generator, Array], Array]

@@ -214,5 +214,5 @@ def test_evaluated_particles_hold_the_stage_s_values(rng):
     pose = np.zeros(12)
     values = rng.standard_normal((7, 4))
     particles = evaluate(values, arm.weigh(Observation.of(arm.picture.mask(pose)), pose, pose))
-    assert [array.shape for array in particles] == [(7, 4), (7,), (7,), (0,)]
+    assert [array.shape for array in particles] == [(7, 4), (7,), (7,)]
     np.testing.assert_array_equal(particles.best, values[np.argmin(particles.costs)])

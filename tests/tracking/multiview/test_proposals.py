@@ -16,7 +16,6 @@ from shadowpuppet.tracking.multiview.exploration import ARM_NOISE, JOINT_CHANCE,
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
-from shadowpuppet.tracking.particle_filter import NO_REGION, Particles
 
 SKELETON = actor.body().skeleton
 PLAIN = MultiviewSettings(method="particle_filter", velocity=0.0, defensive=0.25, keep=0.0)
@@ -35,14 +34,8 @@ def prior_of(names, *, at=0.2, wide: float = 1e-3) -> MotionPrior:
 
 
 def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, mismatch=lambda poses: np.zeros(len(poses))) -> np.ndarray:
-    return proposed(settings, poses, prior, velocity, scale, seed, mismatch)[0]
-
-
-def proposed(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, mismatch=lambda poses: np.zeros(len(poses)), regions=None):
-    """Poses and regions, of particles in `regions`, or in none."""
-    velocity, nothing = np.zeros(D) if velocity is None else velocity, np.zeros(len(poses))
-    particles = Particles(poses, nothing, nothing, np.zeros(0, int) if regions is None else regions)
-    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), particles, POSE, velocity, mismatch, scale)
+    velocity = np.zeros(D) if velocity is None else velocity
+    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, mismatch, scale)
 
 
 def many(number: int = 4000) -> np.ndarray:
@@ -159,16 +152,13 @@ def two_regions(names) -> MotionPrior:
     return MotionPrior(regions, np.array([[0.0, 1.0], [1.0, 0.0]]), np.full(2, 0.5), tuple(names))
 
 
-def test_the_next_region_follows_the_one_that_was_drawn_not_the_nearest():
-    """A particle carries its state s (Ni 2008, V-A): its refined pose may lie nearer to another region."""
+def test_the_next_region_follows_the_one_that_the_pose_lies_in():
     names = ["left_knee_flexion", "right_knee_flexion", "chest_y"]
     prior, poses = two_regions(names), many(6)
-    poses[:, SKELETON.dof_indices(names)] = 0.25  # nearest to region 0
-    found, regions = proposed(replace(HYBRID, defensive=0.0), poses, prior, regions=np.array([0, 1, 0, 1, NO_REGION, NO_REGION]))
-    np.testing.assert_array_equal(regions, [1, 0, 1, 0, 1, 1])
-    np.testing.assert_allclose(found[:, SKELETON.dof_indices(names[1:])][:, 0], [0.8, 0.2, 0.8, 0.2, 0.8, 0.8])
-    _, regions = proposed(replace(HYBRID, defensive=0.5), poses, prior)
-    np.testing.assert_array_equal(regions, [NO_REGION] * 3 + [1] * 3)
+    poses[:3, SKELETON.dof_indices(names)] = 0.25  # nearest to region 0
+    poses[3:, SKELETON.dof_indices(names)] = 0.75
+    found = drawn(replace(HYBRID, defensive=0.0), poses, prior)
+    np.testing.assert_allclose(found[:, SKELETON.dof_indices(names[1:])][:, 0], [0.8] * 3 + [0.2] * 3)
 
 
 def test_a_prior_of_all_moves_the_place_too():

@@ -19,7 +19,7 @@ from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.particle_filter import NO_REGION, evaluate
+from shadowpuppet.tracking.particle_filter import evaluate
 from shadowpuppet.tracking.resampling import normalise
 
 FEW = {"particles": 8}
@@ -340,19 +340,6 @@ def test_a_prior_of_the_motion_helps_where_there_are_few_particles(defensive):
     alone = [errors(one, followed(one, seen), poses).mean() for one in (
         tracker(method="particle_filter", prior=prior, defensive=0.0, particles=20, silhouettes=0.0) for prior in (learnt(), None))]
     assert alone[0] < alone[1]
-
-
-def test_particles_carry_the_regions_that_were_drawn_for_them():
-    _, seen = actor.filmed()
-    of = tracker(prior=learnt(), particles=8, defensive=0.5)
-    first, *after = followed(of, seen[:3])
-    assert (first.particles.regions[4:] >= 0).all()  # the cycles after the search draw from the prior
-    for state in after:
-        np.testing.assert_array_equal(state.particles.regions[:4], NO_REGION)
-        assert set(state.particles.regions[4:]) <= set(range(8))
-    selected = after[0].particles.select(np.array([7, 4, 4]))
-    np.testing.assert_array_equal(selected.regions, after[0].particles.regions[[7, 4, 4]])
-    np.testing.assert_array_equal(selected.poses, after[0].particles.poses[[7, 4, 4]])
 
 
 def test_a_prior_of_another_body_is_refused():

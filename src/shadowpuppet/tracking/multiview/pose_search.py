@@ -68,7 +68,7 @@ def _best(found: Particles, number: int) -> Particles:
     """The `number` best particles, best first; repeated if there are fewer."""
     order = found.costs.argsort(kind="stable")[:number]
     order = order[np.arange(number) % len(order)]
-    return found.select(order)
+    return Particles(*(values[order] for values in found))
 
 
 def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) -> Array:

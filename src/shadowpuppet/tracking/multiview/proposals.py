@@ -10,11 +10,9 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.prior.local_pca import Regions
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview.exploration import Exploration
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
-from shadowpuppet.tracking.particle_filter import NO_REGION, Particles
 
 
 class Proposals:
@@ -38,34 +36,30 @@ class Proposals:
         explores = settings.method != "particle_filter" and not by_prior_alone
         self.exploration = Exploration(skeleton, self.sigma, settings.explore) if explores else None
 
-    def __call__(self, rng: np.random.Generator, particles: Particles, last: Array, velocity: Array,
-                 mismatch: Callable[[Array], Array], scale: float = 1.0) -> tuple[Array, Regions]:
-        """Poses x (N, D) and states s (N,) for the next frame, from the selected particles.
+    def __call__(self, rng: np.random.Generator, selected: Array, last: Array, velocity: Array,
+                 mismatch: Callable[[Array], Array], scale: float = 1.0) -> Array:
+        """Poses (N, D) for the next frame, from the `selected` particles' poses (N, D).
 
         The first proposal by noise is the estimate `last` (D,). `velocity` (D,) is the last frame's motion; `mismatch` the silhouette cost
         (M,) of poses (M, D), for `Exploration`; `scale` that of all noise but the prior's own.
         """
-        number, out = len(particles.poses), self._moved_on(particles.poses, velocity)
-        regions = np.full(number, NO_REGION)
+        number, out = len(selected), self._moved_on(selected, velocity)
         noisy = number if self.prior is None else round(self.settings.defensive * number)
         if noisy:  # none in the paper
             out[:noisy] = self.by_noise(rng, out[:noisy], mismatch, scale)
             out[0] = self._moved_on(last[None], velocity)[0]
         if noisy < number:
-            # With proposals by noise many selected particles have no state: the nearest region stands for all. None has one after a search.
-            carried = particles.regions if not noisy and len(particles.regions) else regions
-            out[noisy:], regions[noisy:] = self.by_prior(rng, out[noisy:], carried[noisy:], scale)
-        return self.skeleton.clamp(out), regions
+            out[noisy:] = self.by_prior(rng, out[noisy:], scale)
+        return self.skeleton.clamp(out)
 
-    def by_prior(self, rng: np.random.Generator, poses: Array, regions: Regions, scale: float = 1.0) -> tuple[Array, Regions]:
-        """Poses (N, D) and regions (N,) by the motion prior (eqs. 24-28). What it does not model of the root moves by a Gaussian walk."""
+    def by_prior(self, rng: np.random.Generator, poses: Array, scale: float = 1.0) -> Array:
+        """Poses (N, D) by the motion prior (eqs. 24-28), from the regions that they lie in. What it does not model of the root moves by a
+        Gaussian walk."""
         assert self.prior is not None
         out, walk, modelled = poses.copy(), np.setdiff1d(self.root, self.modelled), poses[:, self.modelled]
-        regions = np.where(regions == NO_REGION, self.prior.encode(modelled).regions, regions)
-        proposal = self.prior.propose(rng, modelled, regions, self.settings.keep)
-        out[:, self.modelled] = proposal.poses
+        out[:, self.modelled] = self.prior.propose(rng, modelled, keep=self.settings.keep).poses
         out[:, walk] += scale * self.sigma[walk] * rng.standard_normal((len(poses), len(walk)))
-        return out, proposal.regions
+        return out
 
     def by_noise(self, rng: np.random.Generator, poses: Array, mismatch: Callable[[Array], Array], scale: float = 1.0) -> Array:
         """Poses (N, D) with Gaussian noise: on all DOF (Table II's particle filter), or as `Exploration` does where poses are refined."""

@@ -93,17 +93,19 @@ class MultiviewTracker:
         """The filter's loop body (V-A), `cycles` times; the steps are numbered as in the paper."""
         s, pose = self.settings, state.pose
         weigh, refine = self.weigh(observation), self.refine(observation, state.pose)
-        particles = state.particles  # step 1: the last frame's particles (s, x, w)
+        # Step 1: the last frame's particles (s, x, w). The state s is the region of the motion prior in which the refined pose x lies:
+        # `proposals` finds it. The paper keeps the region drawn before refinement; this lost a whole film (docs/method.md).
+        particles = state.particles
         for cycle in range(s.cycles):
             # Step 2, selection: draw particles by their weights.
-            selected = particles.select(self.resample(rng, particles.log_weights, self.number))
+            selected = particles.poses[self.resample(rng, particles.log_weights, self.number)]
             # Step 3, sampling: draw each particle's next state and pose (eqs. 24-28).
             velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
-            poses, regions = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
+            poses = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
             poses = poses if refine is None else refine(poses)
             # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
-            particles = Particles(poses, *weigh(poses), regions)
+            particles = Particles(poses, *weigh(poses))
             pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
         return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
