@@ -109,7 +109,7 @@ def meeting_point(cameras: Sequence[Camera]) -> Array | None:
 
 
 def up_direction(cameras: Sequence[Camera]) -> Array:
-    """Mean of the pictures' up directions in the world, of shape (3,), at most 1 long."""
+    """Mean of the pictures' up directions in the world, of shape (3,), of length at most 1."""
     return -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
 
 
@@ -158,7 +158,7 @@ def map_cells(corners: tuple[float, float, float, float]) -> Array:
 
 
 def _seen(cameras: Sequence[Camera], corners: tuple[float, float, float, float]) -> Array:
-    """Number of cameras that see a person standing on the floor, Z = 0, whole, by cells of the map."""
+    """Number of cameras that see the whole of a person standing on the floor (Z = 0), for each cell of the map."""
     places = map_cells(corners)
     people = np.concatenate([np.broadcast_to(places[:, :, None], (*places.shape[:2], len(PERSON_HEIGHTS), 2)),
                              np.broadcast_to(np.array(PERSON_HEIGHTS)[:, None], (*places.shape[:2], len(PERSON_HEIGHTS), 1))], -1)

@@ -1,4 +1,4 @@
-"""Rotation of a camera since it was calibrated, estimated from the silhouettes of all."""
+"""Rotation of a camera since it was calibrated, estimated from the silhouettes of all cameras."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class RotationError:
 def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
     """The rotation of camera `n` that brings its silhouettes' tangents nearest to the others'; None with fewer than two others.
 
-    Its place is taken as right: for a camera that was moved, the rotation is the one that explains the move best.
+    Its position is assumed to be correct: for a camera that was moved, the rotation is the one that explains the move best.
     """
     from scipy.optimize import least_squares
 

@@ -19,13 +19,13 @@ from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 DARKEST_SHADOW = 0.5
-"""Least share of its light that a background keeps in shadow; dark clothes are darker."""
+"""Least share of its brightness that the background keeps in shadow; dark clothes are darker."""
 COLOUR_FLOOR = 0.75
 """Noise floor of colours over that of brightness: codecs average colours over four pixels."""
 NOISE_TAIL_FACTOR = 1.8
 """Factor on the film's measured noise: compression errors have longer tails than a normal distribution."""
 FILM_SAMPLE = 12
-"""Number of frames (at most twice as many) in which the film's noise and the blur of its outlines are measured."""
+"""Number of frames in which the film's noise and the blur of its outlines are measured; at most twice as many are used."""
 MIN_EDGE_CONTRAST = 1.5
 """Least contrast on an outline, over that of a pixel that may be foreground."""
 EDGE_JITTER = 0.05

@@ -49,7 +49,7 @@ class MaskQuality:
     border: dict[str, float]
     """Share of frames in which the person touches the left, right, top and bottom side of the picture."""
     specks: float
-    """Mean number of parts beside the largest."""
+    """Mean number of parts other than the largest."""
     speck_area: float
     """Mean of their area over the largest part's."""
     holes: float
