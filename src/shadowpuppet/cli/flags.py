@@ -82,7 +82,7 @@ def given(flags: Any) -> dict[str, Any]:
 
 
 def options_from(flags: Any, config: Path | None) -> Options:
-    """Options from flags over a file over the defaults. Raises `SettingsError`."""
+    """Options from flags; others from the file `config`, if given; others by default. Raises `SettingsError`."""
     read = read_options(config) if config is not None else {}
     make_options(read, str(config))  # so that an error in the file names the file
     return make_options(merged(read, given(flags)), "flags")

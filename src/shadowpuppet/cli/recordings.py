@@ -1,4 +1,4 @@
-"""The commands about recordings: `info` looks at one, `synthesize` makes one, `humaneva` makes one of a trial of HumanEva."""
+"""The commands about recordings: `info` describes one, `synthesize` makes one, `humaneva` makes one from a trial of HumanEva."""
 
 from __future__ import annotations
 

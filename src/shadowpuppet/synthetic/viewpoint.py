@@ -17,7 +17,7 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 FovDeg = Annotated[float, Field(ge=10, le=170)]
 Height = Annotated[float, Field(ge=0.05, le=6)]
-Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # `Viewpoint` itself refuses them, with all its numbers
+Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # infinite and NaN are refused by `Viewpoint`, whose message shows all numbers
 Distance = Annotated[float, Field(ge=0.8, le=20)]
 MAX_PINHOLE_FOV = 120.0
 """Greatest horizontal field of view of a pinhole lens, degrees."""

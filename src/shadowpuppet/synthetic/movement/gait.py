@@ -42,7 +42,7 @@ class Footprints(NamedTuple):
 
 
 class Walk:
-    """Walking or jogging along a path, from standing to standing."""
+    """Walking or jogging along a path, that begins and ends standing."""
 
     def __init__(self, body: Mannequin, seconds: float, rng: np.random.Generator, jogging: bool = False, speed: float | None = None,
                  path: PathName = "circle", size: float = 1.2) -> None:
@@ -71,7 +71,7 @@ class Walk:
         self.phase = 0.5 + np.cumsum(cadence * CLOCK_STEP) - np.sum(cadence[self.ticks < 0] * CLOCK_STEP)
         slow = 1 / (1 + 0.2 * self.path.bend**2 * (self.cycle.leg / 0.86) ** 2)
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
-        short = min(1.0, stops / (3.0 * period))  # with time for a step or two only, full speed is not reached
+        short = min(1.0, stops / (3.0 * period))  # a walk of one or two steps does not reach full speed
         pace = short * self.speed * starts * smoothstep((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
         self.gone = np.interp(np.cumsum(pace) * CLOCK_STEP, due, self.path.samples)
         quick = np.gradient(self.gone, CLOCK_STEP)

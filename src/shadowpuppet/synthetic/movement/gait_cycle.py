@@ -37,12 +37,12 @@ class Sole(NamedTuple):
 
     @classmethod
     def of(cls, body: Mannequin) -> Sole:
-        """Of a body."""
+        """The sole of a body."""
         long = body.measure("foot_length")
         return cls(0.14 * long, 0.48 * long, 0.72 * long, body.length("ankle"))
 
     def rolled(self, pitch: Array) -> tuple[Array, Array]:
-        """Place of the ankle, forward and up from the point below it when flat, of a foot with `pitch` (rad, toes up).
+        """Ankle of a foot with `pitch` (rad, toes up): forward and up, metres, from the floor point below the ankle of the flat foot.
 
         The foot rolls over the heel or the ball, and from some 20 degrees on also over the tips of the toes.
         """
@@ -94,7 +94,7 @@ JOGGING = Gait(
     lambda p: 5.0 * np.cos(2 * np.pi * (p - 0.03)),
 )
 """Jogging: the pelvis' small motions in the frontal and horizontal plane by the sizes of Novacheck (1998, fig. 4)."""
-assert STANDING_TILT == 10.0  # what WALKING.bow is counted from: 10.3 on average
+assert STANDING_TILT == 10.0  # WALKING.bow is relative to it: 10.3 on average
 
 
 def stride_length(speed: float, leg: float, jogging: bool) -> float:

@@ -57,7 +57,10 @@ class KeyframeMotion:
 
     def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
                  rounding: float = 0.16) -> None:
-        """keys: of `CHANNELS` and `GROUND_CHANNELS`, between 0 and `seconds`; others stand; `rounding`: see `interpolate_keys`."""
+        """keys: values of `CHANNELS` and `GROUND_CHANNELS` at times from 0 to `seconds`; channels not named are as in standing.
+
+        rounding: see `interpolate_keys`.
+        """
         self.body, self.seconds, self.hops, self.rounding = body, seconds, tuple(hops), rounding
         self.leg, self.sole = body.length("thigh") + body.length("shank"), Sole.of(body)
         last = {"turn": max((s.begin, s.turn) for s in steps)[1]} if steps else {}
@@ -104,7 +107,7 @@ class KeyframeMotion:
 
 
 def _last(steps: Sequence[Step], what: str) -> float:
-    """Final place of the pelvis: midway between the feet."""
+    """Final value of the pelvis' `what` (a field of `Step`: aside, ahead, turn): the mean of both feet's."""
     places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):
         places[step.foot] = getattr(step, what)

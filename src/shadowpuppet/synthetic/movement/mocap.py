@@ -59,7 +59,7 @@ def _one(gestures: Sequence[Gesture]) -> tuple[Gesture, Capture]:
 
 
 def _at(table: JointTable, t: Array) -> JointTable:
-    """The table at other times, interpolated by cubics."""
+    """The table at times `t`, interpolated by cubics."""
     from scipy.interpolate import CubicSpline
 
     t = np.clip(t, table.times[0], table.times[-1])

@@ -99,7 +99,7 @@ def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> St
 
 
 def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
-    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`, whose pelvis and feet replace `sway` of the postures.
+    """The figure of `body` in `postures` (T, `CHANNELS`); `stance` gives pelvis and feet, in place of the postures' `sway`.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
     """
