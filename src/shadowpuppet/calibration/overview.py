@@ -24,7 +24,7 @@ MAX_CENTRE_OFFSET = 0.2
 MAX_AIM_OFFSET = 0.35
 """Greatest distance of a camera's axis from the place that all look at, over its distance to the camera."""
 VIEW_DISTANCE = 4.0
-"""Metres before cameras that the top view shows if they do not look at one place; also its least side."""
+"""Metres in front of each camera that the top view shows if the cameras do not look at one place; also its least side."""
 MAP_COLUMNS = 48
 """Columns of the top view; it has half as many rows."""
 

@@ -18,7 +18,7 @@ OUTLIER_PIXELS = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class RotationError:
-    """A rotation that makes a camera agree better; plain values."""
+    """A camera's rotation since its calibration, and how much better the tangents agree with it; plain values."""
 
     right: float
     down: float
@@ -30,11 +30,11 @@ class RotationError:
 
     @property
     def degrees(self) -> float:
-        """Angle of the whole rotation."""
+        """Angle of the whole rotation, degrees."""
         return float(np.linalg.norm([self.right, self.down, self.clockwise]))
 
     def of(self, camera: Camera) -> Camera:
-        """The camera as it is directed now."""
+        """The camera with this rotation applied."""
         return _rotated(camera, np.radians([self.down, -self.right, -self.clockwise]))
 
 

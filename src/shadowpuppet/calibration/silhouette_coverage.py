@@ -17,7 +17,7 @@ from shadowpuppet.geometry import Array
 RAYS_PER_OUTLINE, DEPTHS_PER_RAY = 24, 32
 """Number of outline pixels tested, and of places along the ray of each."""
 DEPTH_RANGE = 0.3
-"""Range of these places before and behind the person's middle, over its distance."""
+"""Range of these places in front of and behind the person's middle, over its distance."""
 COVERAGE_PERCENTILE = 75
 """Percentile over an outline's rays: a misdirected camera errs along a whole side of it, a limb missing in another camera affects fewer."""
 

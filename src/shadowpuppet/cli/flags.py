@@ -89,7 +89,7 @@ def options_from(flags: Any, config: Path | None) -> Options:
 
 
 def _bare(hint: Any) -> Any:
-    """A type without its limits, which `make_options` checks; str if it is parsed from text."""
+    """A setting's type as the type of its flag: without limits, which `make_options` checks; str if the setting is parsed from text."""
     if get_origin(hint) is Annotated:
         read = any(isinstance(item, BeforeValidator) for item in get_args(hint)[1:])
         return str if read else _bare(get_args(hint)[0])

@@ -1,4 +1,4 @@
-"""The look at a recording before tracking, as `track` and `info` show it."""
+"""Tables of the look at a recording before tracking, as `track` and `info` show it."""
 
 from __future__ import annotations
 

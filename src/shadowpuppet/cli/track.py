@@ -173,7 +173,7 @@ def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
 
 
 def _sizes_table(sizes: Any) -> Any:
-    """The named sizes in two columns: a1..a18 of an upper body, or those of a whole body."""
+    """Table of the named sizes in two columns: a1..a18 of an upper body, or those of a whole body."""
     from shadowpuppet.body.sizes import CardboxSizes
 
     names = sizes.names()
@@ -185,7 +185,7 @@ def _sizes_table(sizes: Any) -> Any:
 
 
 def _fit_tables(found: MonocularSubject) -> tuple[list[Any], Sequence[tuple[str, str | None]]]:
-    """Cost over the rounds of Algorithm 1, a row a search of a subset of sizes; and how well the sizes fit."""
+    """Tables of a fit: cost over the rounds of Algorithm 1, one row per search of a subset of sizes; and rows on how well the sizes fit."""
     curves = [(name if n == 1 else "", str(n), str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
               for name, searches in found.fit.curves.items() for n, curve in enumerate(searches, 1)]  # fmt: skip
     overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())

@@ -26,7 +26,7 @@ class Obstacle:
     kind: Literal["table", "chair", "pillar", "cabinet"]
     """Kind: a table 74 cm high, a chair with its back 92 cm high, a round pillar, a cabinet 1.05 m high."""
     ahead: Coordinate = 0.8
-    """Distance before the person, metres; negative behind."""
+    """Distance in front of the person, metres; negative behind."""
     left: Coordinate = 0.0
     """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0

@@ -30,7 +30,7 @@ class Bystander:
     motion: Gesture = Gesture(motion="stand")
     """Motion for the length of the film."""
     ahead: Coordinate = -1.0
-    """Distance before the person, metres; negative behind."""
+    """Distance in front of the person, metres; negative behind."""
     left: Coordinate = 0.9
     """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0

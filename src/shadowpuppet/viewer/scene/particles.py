@@ -107,7 +107,7 @@ class ParticleRerun:
         return VisualHull([each.camera for each in self.cameras], self.options.multiview.hull)
 
     def _root(self) -> Array:
-        """From the body's frame to the world (4, 4)."""
+        """Transform (4, 4) from the body's frame to the world."""
         known = self.motion.known
         if not known.any():
             raise ShadowPuppetError("found no frame with a pose, expected one at least")
