@@ -53,7 +53,7 @@ class Hop(NamedTuple):
 
 
 class KeyframeMotion:
-    """A motion through key postures over stepping feet."""
+    """A motion through key postures, with steps and hops of the feet."""
 
     def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
                  rounding: float = 0.16) -> None:
@@ -84,7 +84,7 @@ class KeyframeMotion:
         return postures, Stance(pelvis, ankles, frames, toes, looks)
 
     def _flight(self, t: Array) -> Array:
-        """Height of both feet by hops, metres."""
+        """Height of both feet in hops at times `t` (T,), metres, of shape (T,)."""
         spans = [(np.clip(t - h.begin, 0, h.seconds), h.seconds) for h in self.hops]
         return sum((0.5 * GRAVITY * past * (whole - past) for past, whole in spans), 0.0 * t)
 
@@ -107,7 +107,7 @@ class KeyframeMotion:
 
 
 def _last(steps: Sequence[Step], what: str) -> float:
-    """Final value of the pelvis' `what` (a field of `Step`: aside, ahead, turn): the mean of both feet's."""
+    """Final shift of the pelvis, leg lengths, midway between the feet; what: "aside" or "ahead"."""
     places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):
         places[step.foot] = getattr(step, what)

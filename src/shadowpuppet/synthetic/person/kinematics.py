@@ -137,7 +137,7 @@ def _yaw(q: dict[str, Array]) -> Array:
 
 
 def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
-    """Clavicle, upper arm, forearm and hand of one side.
+    """Add clavicle, upper arm, forearm and hand of one side to `joint` and `frame`.
 
     The clavicle rises by 0.13 of the arm's elevation beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig et al.
     2009).
