@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 BROKEN, MISTAKE, SOME_FAILED, INTERRUPTED = 1, 2, 3, 130
-"""Exit codes beside 0: the core does not work here (`doctor`), or a mistake of ours; what the user gave cannot be used; some of many runs
+"""Exit codes other than 0: the core does not work on this machine (`doctor`) or a bug of the program; unusable input; some of several runs
 failed (`batch`); Ctrl-C."""
 
 

@@ -1,4 +1,4 @@
-"""Checked settings: frozen dataclasses whose fields are flags of the command line and lines of TOML, each documented by its docstring."""
+"""Checked settings: frozen dataclasses. Each field is a flag of the command line and a line of TOML; the docstring below it is its help."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def from_preset(kind: type[Settings], presets: Mapping[str, Mapping[str, Any]], 
 
 
 def _settings_error(error: ValidationError, kind: Any, source: str) -> SettingsError:
-    """The first mistake in one sentence."""
+    """A `SettingsError` that states the first mistake in one sentence."""
     first = error.errors()[0]
     place = ".".join(str(key) for key in first["loc"])
     if first["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
@@ -98,7 +98,7 @@ def plain_values(settings: Any) -> dict[str, Any]:
 
 
 def merged(*tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables over one another, the last on top; inner tables are merged too."""
+    """One dictionary of several tables, in which later values replace earlier ones; inner tables are merged too."""
     out: dict[str, Any] = {}
     for table in tables:
         for key, value in table.items():

@@ -1,1 +1,1 @@
-"""Do calibrated cameras agree? Epipolar tangency, agreement, time offsets and rotation errors; overview of a calibration."""
+"""Tests of a calibration by silhouettes (epipolar tangency, agreement, time offsets, rotation errors), and its overview."""

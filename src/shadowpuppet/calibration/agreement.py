@@ -1,4 +1,4 @@
-"""Agreement of several cameras' silhouettes: which camera disagrees with the others, by how much, and what would mend it."""
+"""Agreement of several cameras' silhouettes: which camera disagrees with the others, by how much, and the likely remedy."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ BLAME_SHARE = 0.5
 MAX_SHIFT = 12
 """Greatest time shift of a camera that is tried, sets."""
 SETS_COMPARED, SETS_PER_REMEDY = 10, 4
-"""Sets in which cameras are compared, and in which each remedy is tried."""
+"""Number of sets in which cameras are compared, and in which each remedy is tried."""
 MILLIMETRE_HEIGHT = 100.0
-"""Height of the person, metres by the calibration, from which on its unit is taken for millimetres."""
+"""Height of the person in the calibration's metres from which on its lengths are assumed to be millimetres."""
 PERSON_HEIGHTS = (0.5, 2.8)
 """Range of people's heights, metres: sitting, and with raised arms."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """How well cameras fit together; plain values."""
+    """How well the cameras' silhouettes agree; plain values."""
 
     names: tuple[str, ...]
     """Names of the cameras."""
@@ -44,7 +44,7 @@ class Agreement:
     limit: float
     """Disagreement from which on a camera is in doubt, pixels."""
     height: float | None
-    """Median of the silhouettes' greatest extents at the place where they meet, metres by the calibration."""
+    """Height of the person in the calibration's metres: median of the silhouettes' greatest extents at the triangulated person."""
     remedy: str | None = None
     """What would make the cameras agree, if known."""
     hopeless: bool = False
@@ -88,10 +88,10 @@ def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]],
 
 
 def compare_cameras(cameras: Sequence[Camera], rows: Sequence[Row], seconds: float = np.nan, remedies: bool = True) -> Agreement:
-    """How well the cameras' silhouettes fit together.
+    """The `Agreement` of the cameras' silhouettes.
 
-    seconds: time between consecutive sets; without it, sets are not consecutive and no camera is tried for being late.
-    remedies: whether to look for what would mend a disagreement.
+    seconds: time between consecutive sets; NaN if they are not consecutive: then no camera is tested for being late.
+    remedies: whether to look for the cause of a disagreement.
     """
     scene = _Scene(tuple(cameras), rows)
     limit = MAX_DISAGREEMENT * max(max(camera.size) for camera in cameras)
@@ -135,13 +135,13 @@ class _Scene:
         return _median(values.reshape(-1, len(self.cameras), len(self.cameras) + 1))
 
     def total(self) -> float:
-        """One figure for the disagreement of all cameras, pixels."""
+        """Disagreement of all cameras as one number, pixels: the mean of `tangents` plus that of `beyond`."""
         return _mean(self.tangents(SETS_PER_REMEDY)) + float(np.nan_to_num(_mean(self.beyond(SETS_PER_REMEDY)[:, -1])))
 
     def judged(self, limit: float) -> tuple[Array, int | None]:
         """Disagreement of each camera (C,), pixels, and the index of the camera to blame, if it is a single one."""
         tangents, beyond = self.tangents(), self.beyond()
-        lowest = np.array([_lower_median(row) for row in tangents])  # so that one wrong camera blames no other
+        lowest = np.array([_lower_median(row) for row in tangents])  # so that one wrong camera raises no other's value
         apart, C = np.fmax(lowest, beyond[:, -1]), len(tangents)
         if not (apart > limit).any() or C < 3:
             return apart, None
@@ -156,7 +156,7 @@ class _Scene:
         return rest, w
 
     def height(self) -> float | None:
-        """Median of the silhouettes' greatest extents at the place where they meet, metres."""
+        """Median of the silhouettes' greatest extents at the triangulated person, metres; None if unknown."""
         heights = []
         for row in self.spread(SETS_COMPARED):
             outlines = outlines_of(self.cameras, row)
@@ -173,7 +173,7 @@ class _Scene:
 
 
 def _remedy(scene: _Scene, found: Agreement, blamed: int | None, seconds: float) -> str | None:
-    """The one of the known mistakes that explains the disagreement best, with its remedy; None if none does."""
+    """A sentence on the known mistake that explains the disagreement best, and its remedy; None if none explains it."""
     before = scene.total()
     tried = ((changed.total(), sentence) for changed, sentence in _changes(scene, found.names, blamed, seconds))
     after, sentence = min(tried, key=lambda each: each[0])
@@ -183,7 +183,7 @@ def _remedy(scene: _Scene, found: Agreement, blamed: int | None, seconds: float)
 
 
 def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: float) -> Iterator[tuple[_Scene, str]]:
-    """Known mistakes: the scene with each mended, and the sentence to the user."""
+    """For each known mistake, the scene with it corrected, and the sentence to the user."""
     C = len(names)
     for a, b in combinations(range(C), 2):
         if scene.cameras[a].size == scene.cameras[b].size:
@@ -241,7 +241,7 @@ def _mean(values: Array) -> float:
 
 
 def _median(values: Array) -> Array:
-    """Over the first axis, without NaN; NaN where there is nothing else."""
+    """Median over the first axis, ignoring NaN; NaN where all values are."""
     known = np.isfinite(values).any(0)
     out = np.full(values.shape[1:], np.nan)
     out[known] = np.nanmedian(values[:, known], axis=0)
@@ -249,5 +249,5 @@ def _median(values: Array) -> Array:
 
 
 def plain_values(values: Array) -> tuple[float | None, ...]:
-    """Values rounded to 0.01, None for NaN: as they are saved."""
+    """Values rounded to 0.01, None for NaN, as in files."""
     return tuple(round(float(value), 2) if np.isfinite(value) else None for value in values)

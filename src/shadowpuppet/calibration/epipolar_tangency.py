@@ -45,7 +45,7 @@ class Tangents(NamedTuple):
 
 
 def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outline], reference: Array | None = None) -> Tangents | None:
-    """The tangent planes of two outlines; None if the cameras stand at one place or a silhouette surrounds the baseline.
+    """The `Tangents` of two outlines; None if the cameras stand at one place or a silhouette surrounds the baseline.
 
     reference: direction (3,) of angle 0; by default the middle of both silhouettes.
     """

@@ -24,7 +24,7 @@ MAX_CENTRE_OFFSET = 0.2
 MAX_AIM_OFFSET = 0.35
 """Greatest distance of a camera's axis from the place that all look at, over its distance to the camera."""
 VIEW_DISTANCE = 4.0
-"""Metres before cameras that the top view shows if they do not look at one place; also its least side."""
+"""Metres in front of each camera that the top view shows if the cameras do not look at one place; also its least side."""
 MAP_COLUMNS = 48
 """Columns of the top view; it has half as many rows."""
 
@@ -109,7 +109,7 @@ def meeting_point(cameras: Sequence[Camera]) -> Array | None:
 
 
 def up_direction(cameras: Sequence[Camera]) -> Array:
-    """Mean of the pictures' up directions in the world, of shape (3,), at most 1 long."""
+    """Mean of the pictures' up directions in the world, of shape (3,), of length at most 1."""
     return -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
 
 
@@ -158,7 +158,7 @@ def map_cells(corners: tuple[float, float, float, float]) -> Array:
 
 
 def _seen(cameras: Sequence[Camera], corners: tuple[float, float, float, float]) -> Array:
-    """Number of cameras that see a person standing on the floor, Z = 0, whole, by cells of the map."""
+    """Number of cameras that see the whole of a person standing on the floor (Z = 0), for each cell of the map."""
     places = map_cells(corners)
     people = np.concatenate([np.broadcast_to(places[:, :, None], (*places.shape[:2], len(PERSON_HEIGHTS), 2)),
                              np.broadcast_to(np.array(PERSON_HEIGHTS)[:, None], (*places.shape[:2], len(PERSON_HEIGHTS), 1))], -1)

@@ -1,4 +1,4 @@
-"""Rotation of a camera since it was calibrated, estimated from the silhouettes of all."""
+"""Rotation of a camera since it was calibrated, estimated from the silhouettes of all cameras."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OUTLIER_PIXELS = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class RotationError:
-    """A rotation that makes a camera agree better; plain values."""
+    """A camera's rotation since its calibration, and how much better the tangents agree with it; plain values."""
 
     right: float
     down: float
@@ -30,18 +30,18 @@ class RotationError:
 
     @property
     def degrees(self) -> float:
-        """Angle of the whole rotation."""
+        """Angle of the whole rotation, degrees."""
         return float(np.linalg.norm([self.right, self.down, self.clockwise]))
 
     def of(self, camera: Camera) -> Camera:
-        """The camera as it is directed now."""
+        """The camera with this rotation applied."""
         return _rotated(camera, np.radians([self.down, -self.right, -self.clockwise]))
 
 
 def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
     """The rotation of camera `n` that brings its silhouettes' tangents nearest to the others'; None with fewer than two others.
 
-    Its place is taken as right: for a camera that was moved, the rotation is the one that explains the move best.
+    Its position is assumed to be correct: for a camera that was moved, the rotation is the one that explains the move best.
     """
     from scipy.optimize import least_squares
 

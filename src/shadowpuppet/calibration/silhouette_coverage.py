@@ -1,6 +1,6 @@
-"""How far silhouettes reach beyond what the other cameras allow: every ray of an outline must meet all silhouettes.
+"""Consistency of silhouettes: every viewing ray of an outline must meet the silhouettes of all other cameras, and by how much it misses.
 
-Three cameras reveal what tangents of two cannot: a shift along the baseline.
+With three cameras this reveals an error that the tangents of two cannot: a shift along the baseline.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from shadowpuppet.geometry import Array
 RAYS_PER_OUTLINE, DEPTHS_PER_RAY = 24, 32
 """Number of outline pixels tested, and of places along the ray of each."""
 DEPTH_RANGE = 0.3
-"""Range of these places before and behind the person's middle, over its distance."""
+"""Range of these places in front of and behind the person's middle, over its distance."""
 COVERAGE_PERCENTILE = 75
-"""Percentile over an outline: a misdirected camera is off along a whole side of it, a limb missing in another camera affects less."""
+"""Percentile over an outline's rays: a misdirected camera errs along a whole side of it, a limb missing in another camera affects fewer."""
 
 
 def pixels_beyond(cameras: Sequence[Camera], row: Row) -> Array:
-    """By how many pixels the other cameras' silhouettes would have to grow for each camera's outline to fit, in one set.
+    """Pixels by which the other cameras' silhouettes would have to grow for each camera's outline to fit, in one set.
 
-    Of shape (C, C + 1): row k, column w is camera k's without camera w; the last column leaves out none. NaN where fewer than two
-    other cameras see the person.
+    Of shape (C, C + 1). Row k: the outline of camera k; column w: without camera w; the last column leaves out no camera. NaN if fewer
+    than two other cameras see the person.
     """
     outlines = outlines_of(cameras, row)
     out, middle = np.full((len(cameras), len(cameras) + 1), np.nan), triangulated_centre(cameras, outlines)
@@ -39,7 +39,7 @@ def pixels_beyond(cameras: Sequence[Camera], row: Row) -> Array:
         places = cameras[k].centre + rays[:, None] * depth[:, None]
         others = {n: other for n, other in enumerate(row) if n != k and other is not None}
         if len(others) > 1:
-            away = np.zeros((len(cameras), *places.shape[:2]))  # 0 in a silhouette, and where a camera says nothing
+            away = np.zeros((len(cameras), *places.shape[:2]))  # 0 in a silhouette, and if a camera does not see the place
             for n, other in others.items():
                 away[n] = _sampled(other.distance, cameras[n].project(places))
             out[k] = _percentiles(away)
@@ -66,7 +66,10 @@ def _sampled(distance: NDArray[np.float32], pixels: Array) -> Array:
 
 
 def _percentiles(away: Array) -> Array:
-    """Percentile over rays of the least over depths of the greatest over cameras (C, P, Z): without each camera, with all, (C + 1,)."""
+    """Percentile over rays (P) of the least over depths (Z) of the greatest distance over cameras (C); of shape (C + 1,).
+
+    away: distances (C, P, Z). Entry w of the result leaves out camera w; the last leaves out none.
+    """
     order = np.sort(away, axis=0)
     most, next_most, which = order[-1], order[-2], away.argmax(0)
     without = [np.where(which == n, next_most, most) for n in range(len(away))]

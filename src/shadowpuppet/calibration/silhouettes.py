@@ -17,9 +17,9 @@ from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 
 CONTOUR_STEP = 2
-"""Every how many pixels a contour is sampled."""
+"""Sampling step along a contour, pixels."""
 BORDER_MARGIN = 2
-"""Pixels from the picture's border within which an outline is cut off, not seen."""
+"""Distance from the picture's border, pixels, within which an outline may be the border's, not the person's."""
 MIN_CONTOUR_SHARE = 0.1
 """Contours shorter than this share of the longest are specks."""
 
@@ -36,7 +36,7 @@ class Outline(NamedTuple):
 
 
 class Silhouette:
-    """A mask (H, W), stored as bits; what is computed from it is kept."""
+    """A mask (H, W), stored as bits, with its contours, distances and outlines, each computed once."""
 
     def __init__(self, mask: Mask) -> None:
         """Of a mask (H, W)."""
@@ -71,12 +71,12 @@ class Silhouette:
         if id(camera) not in self._outlines:
             pixels, firm = self.contour
             rays = camera.rays(pixels) @ camera.T_camera_world[:3, :3]
-            # The camera is kept, so that no other gets its id.
+            # The camera is stored too: while it exists, no other camera gets its id.
             self._outlines[id(camera)] = camera, Outline(pixels, firm, rays / np.linalg.norm(rays, axis=1, keepdims=True))
         return self._outlines[id(camera)][1]
 
     def mirrored(self) -> Silhouette:
-        """The same with left and right exchanged."""
+        """The silhouette with left and right exchanged."""
         return Silhouette(self.mask[:, ::-1])
 
 
@@ -84,7 +84,7 @@ Row = Sequence[Silhouette | None]
 
 
 def silhouettes_of(masks: Sequence[Mask | None]) -> list[Silhouette | None]:
-    """One set; None for a camera without a picture, and for a mask that is empty or nearly full."""
+    """The silhouettes of one set; None for a camera without a picture, and for a mask that is empty or nearly full."""
     return [Silhouette(mask) if mask is not None and may_be_person(mask) else None for mask in masks]
 
 

@@ -23,7 +23,7 @@ from shadowpuppet.geometry import Array
 MIN_COMMON_SETS = 24
 """Least number of sets that two signals must share."""
 TRIM_PERCENTILE = 80
-"""Percentile up to which differences are averaged: a limb missing in one silhouette is no difference in time."""
+"""Percentile up to which differences are averaged: the greatest come from limbs missing in one silhouette."""
 MAX_RESIDUAL_SHARE = 0.6
 """Two signals give an offset if at most this share of their median difference is left at the best shift."""
 SOLVER_ROUNDS = 30
@@ -39,7 +39,7 @@ class TimeOffsets:
     frames: tuple[float | None, ...]
     """Sets by which each film is late (negative: early); None if its silhouettes move too little to tell."""
     spread: tuple[float | None, ...]
-    """Median deviation of a camera's pairs from that, sets: its uncertainty."""
+    """Uncertainty of each offset: median deviation of the camera's pairs from it, sets."""
     pairs: tuple[tuple[float | None, ...], ...]
     """Sets by which the second film of a pair is later than the first; None if unknown."""
 
@@ -51,12 +51,12 @@ class _Pair:
     first: int
     second: int
     shift: float
-    """Sets by which the second is later."""
+    """Sets by which the second camera's film is later."""
     weight: float
 
 
 def time_offsets(cameras: Sequence[Camera], rows: Sequence[Row]) -> TimeOffsets:
-    """How late each film is, from consecutive sets of silhouettes."""
+    """Time offset of each film, from consecutive sets of silhouettes."""
     most = min(len(rows) - MIN_COMMON_SETS, len(rows) // 2)
     outlines = [outlines_of(cameras, row) for row in rows]
     pairs = [pair for i, j in combinations(range(len(cameras)), 2)
@@ -88,7 +88,7 @@ def tangent_signals(cameras: Sequence[Camera], outlines: Sequence[Sequence[Outli
 
 
 def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
-    """The shift at which two cameras' signals differ least; None if there is no distinct minimum."""
+    """Time offset of two cameras: the shift at which their signals differ least; None if there is no distinct minimum."""
     shifts = np.arange(-most, most + 1)
     cost = np.array([_difference(signals, s) for s in shifts.tolist()])
     if np.isfinite(cost).sum() < 5:
@@ -126,10 +126,10 @@ def _solved(count: int, pairs: Sequence[_Pair]) -> tuple[Array, NDArray[np.bool_
         A, b = np.zeros((len(pairs) + 1, count)), np.zeros(len(pairs) + 1)
         for n, (pair, weight) in enumerate(zip(pairs, np.sqrt(weights))):
             A[n, [pair.first, pair.second]], b[n] = (-weight, weight), weight * pair.shift
-        A[-1] = 1e-3  # all may be shifted together
+        A[-1] = 1e-3  # fixes the common shift, which the pairs leave open
         late = np.asarray(np.linalg.lstsq(A, b, rcond=None)[0], float)
         off = np.array([abs(late[pair.second] - late[pair.first] - pair.shift) for pair in pairs])
         weights = np.array([pair.weight for pair in pairs]) / np.maximum(off, 0.05)
     if known.sum() == 2:
-        return late - late[np.argmax(known)], known  # the second against the first
+        return late - late[np.argmax(known)], known  # the second film's offset against the first's
     return late - (np.sort(late[known])[(known.sum() - 1) // 2] if known.any() else 0.0), known

@@ -19,7 +19,7 @@ COMMANDS = {
     "evaluate": "evaluation:evaluate", "bench": "bench:bench", "batch": "batch:batch", "view": "viewer:view",
     "settings": "app:settings", "completion": "app:completion", "doctor": "doctor:doctor",
 }  # fmt: skip
-"""Commands, by the module in this room and the function; loaded when they are used."""
+"""Module in this package and function of each command, by the command's name; loaded when used."""
 
 
 def _version() -> str:

@@ -58,7 +58,7 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
 
 
 def _summary(batch: Batch) -> Any:
-    """A row a recording and choice of settings: mean and standard deviation over the seeds."""
+    """Table with a row per recording and choice of settings: mean and standard deviation over the seeds."""
     import numpy as np
     from rich.text import Text
 

@@ -19,11 +19,11 @@ from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome
 
 LINES = 16
-"""Workers shown."""
+"""Greatest number of workers shown."""
 BAR = 30
-"""Greatest width of the bar."""
+"""Greatest width of the progress bar, characters."""
 PAUSE = 30.0
-"""Seconds between two lines without a screen."""
+"""Seconds between two lines if standard error is not a screen."""
 
 
 class BatchTerminal(BatchListener):

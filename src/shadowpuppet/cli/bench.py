@@ -1,4 +1,4 @@
-"""The command `bench`: how fast it is on this machine."""
+"""The command `bench`: measures the speed on this machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from shadowpuppet.cli.flags import Quiet, Switch
 from shadowpuppet.cli.tables import pairs, show, table
 
-# what was timed, its name, factor to the unit, unit, and the key of its ratio to the row above
+# key of the time, name, factor to the unit, unit, and key of its ratio to the row above
 MONO_ROWS = (
     ("particle", "a particle of cardbox, pose to cost", 1e6, "us", ""),
     ("opencv", "  OpenCV, its polygons ready-made", 1e6, "us", "mono.ratio_opencv_full"),
@@ -33,14 +33,14 @@ CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "wr
 
 
 def bench(*, json: Path | None = None, quick: Switch = False, quiet: Quiet = False) -> None:
-    """Measure how fast it is here: particles and frames beside OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
+    """Measure the speed on this machine: particles and frames against OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
 
     Parameters
     ----------
     json
         File that gets all figures, by flat keys such as "mono.particle_us".
     quick
-        Fewer rounds, a shorter film, nothing compiled anew.
+        Fewer rounds and a shorter film; compilation and start are not timed.
     """
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.evaluation.bench.run import check_writable, run_bench, write_figures

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shadowpuppet.pipeline.check_calibration import CalibrationCheck
 
 ARROWS = "→↗↑↖←↙↓↘"
-"""By eighths of a turn, counter-clockwise from +x."""
+"""Arrows by viewing direction, in eighths of a turn counter-clockwise from +x."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 """Names of cameras in the top view; + for any further."""
 
@@ -121,7 +121,7 @@ def _letter(n: int) -> str:
 
 
 def top_view(look: CalibrationLook) -> Text:
-    """The scene from above in characters: cameras with arrows the way they look, and how many cameras see all of a standing person."""
+    """The scene from above in characters: cameras, arrows in their viewing directions, and how many cameras see a standing person whole."""
     from shadowpuppet.calibration.overview import MAP_COLUMNS
 
     x0, y0, x1, y1 = look.corners

@@ -1,4 +1,4 @@
-"""The command `doctor`: tries what works on this machine, and says how to mend the rest. Loads nothing that may be broken."""
+"""The command `doctor`: tests what works on this machine, and states a remedy for the rest. Loads nothing that may be broken."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Finding:
     """`missing`: absent, but not needed to track films."""
     told: str
     remedy: str = ""
-    """What would mend it; may be empty."""
+    """How to repair it; may be empty."""
     needed: bool = False
     """Whether tracking is impossible without it."""
 
@@ -73,7 +73,7 @@ def doctor(*, as_json: Annotated[bool, Parameter(name="--json", group="Other", n
 
 
 def _tables(found: Sequence[Finding]) -> Iterator[Any]:
-    """A row a check, with its remedy below, and the outcome in a sentence."""
+    """Table with a row per check and its remedy below, and the outcome in a sentence."""
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True, style="bold")
     table.add_column(no_wrap=True)
@@ -134,7 +134,7 @@ def _libraries() -> Iterator[Finding]:
 
 
 def _kernels() -> Iterator[Finding]:
-    """Joints of a body, by a compiled kernel."""
+    """Check that a compiled kernel computes the joints of a body."""
     import numpy as np
 
     from shadowpuppet.body.models import average_sizes, make_body
@@ -162,7 +162,7 @@ def _cache() -> Iterator[Finding]:
 
 
 def _films() -> Iterator[Finding]:
-    """Write and read a film, and a lossless one."""
+    """Check that films, lossy and lossless, can be written and read."""
     import numpy as np
 
     from shadowpuppet.video import open_frames, write_frames
@@ -236,7 +236,7 @@ def _browser() -> Iterator[Finding]:
 
 
 def _cameras() -> Iterator[Finding]:
-    """Cameras that Linux lists; not opened, as their lights would go on."""
+    """Find the cameras that Linux lists; they are not opened, as their lights would go on."""
     if platform.system() != "Linux":
         yield Finding("cameras", "works", "not looked for here; `live --camera 0` tries the first")
         return

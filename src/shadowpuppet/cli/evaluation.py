@@ -1,4 +1,4 @@
-"""The command `evaluate`: how good a run is, as tables, as figures in a file, as a page."""
+"""The command `evaluate`: errors and other measures of a run, as tables, as numbers in a file, as a page."""
 
 from __future__ import annotations
 

@@ -82,14 +82,14 @@ def given(flags: Any) -> dict[str, Any]:
 
 
 def options_from(flags: Any, config: Path | None) -> Options:
-    """Options from flags over a file over the defaults. Raises `SettingsError`."""
+    """Options from flags; others from the file `config`, if given; others by default. Raises `SettingsError`."""
     read = read_options(config) if config is not None else {}
     make_options(read, str(config))  # so that an error in the file names the file
     return make_options(merged(read, given(flags)), "flags")
 
 
 def _bare(hint: Any) -> Any:
-    """A type without its limits, which `make_options` checks; str if it is parsed from text."""
+    """A setting's type as the type of its flag: without limits, which `make_options` checks; str if the setting is parsed from text."""
     if get_origin(hint) is Annotated:
         read = any(isinstance(item, BeforeValidator) for item in get_args(hint)[1:])
         return str if read else _bare(get_args(hint)[0])

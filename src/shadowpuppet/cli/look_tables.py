@@ -1,4 +1,4 @@
-"""The look at a recording before tracking, as `track` and `info` show it."""
+"""Tables of the look at a recording before tracking, as `track` and `info` show it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shadowpuppet.pipeline.look import CameraLook, Look, RigLook
 
 
 def look_table(look: Look) -> RenderableType:
-    """The look at a recording of one camera."""
+    """Table of the look at a recording of one camera."""
     exact_plain = f"; those of the plain rule by {look.exact_overlap_plain:.3f}" if look.exact_overlap_plain is not None else ""
     exact = f"these silhouettes overlap the ready ones by {look.exact_overlap:.3f}{exact_plain}" if look.exact_overlap is not None else None
     return pairs([
@@ -57,7 +57,7 @@ def _person(person: Mapping[str, Any]) -> str:
 
 
 def rig_look_table(look: RigLook) -> RenderableType:
-    """The look at a recording of several cameras, a row a camera."""
+    """Table of the look at a recording of several cameras, one row per camera."""
     count = f"{look.frames} sets" if look.frames else "sets not counted"
     above = [("recording", look.recording), ("cameras", f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second")]
     cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.2f}" for value in camera.place),

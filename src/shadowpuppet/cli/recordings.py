@@ -1,4 +1,4 @@
-"""The commands about recordings: `info` looks at one, `synthesize` makes one, `humaneva` makes one of a trial of HumanEva."""
+"""The commands about recordings: `info` describes one, `synthesize` makes one, `humaneva` makes one from a trial of HumanEva."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, w
 
 
 def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -> Spec:
-    """Spec of a synthetic recording: flags over a file or a named spec. Raises `SettingsError`."""
+    """Spec of a synthetic recording: a file or a named spec, changed by flags. Raises `SettingsError`."""
     if path is not None and like is not None:
         raise SettingsError(f"flags: found a file ({path}) and --like {like}, expected one of them")
     named = named_specs()
@@ -152,7 +152,7 @@ def _spec_line(spec: Spec) -> str:
 
 
 def _recording_table(spec: Spec, recording: Recording) -> Any:
-    """Contents of a synthetic recording, and commands to use it with."""
+    """Table of the contents of a synthetic recording, and commands to use it with."""
     views, seconds, path = spec.views(), sum(gesture.seconds for gesture in spec.motion), recording.path
     first, cameras = views[0], f"{len(views)} cameras" if len(views) > 1 else "1 camera"
     extras = [thing.kind for thing in spec.scene.obstacles] + ["another person"] * len(spec.scene.bystanders)
@@ -174,7 +174,7 @@ def _gestures(spec: Spec) -> str:
 
 
 def _trial_table(found: HumanEva, folder: Path) -> Any:
-    """Contents of a trial of HumanEva, and commands to use it with."""
+    """Table of the contents of a trial of HumanEva, and commands to use it with."""
     views, duration = found.recording.views, found.recording.duration
     names = ", ".join(view.camera.name for view in views)
     return pairs([

@@ -31,7 +31,7 @@ def show_json(value: Any) -> None:
 
 
 def pairs(rows: Iterable[tuple[str, str | None]]) -> Table:
-    """Names beside their values; rows whose value is None are left out."""
+    """Table of names and values; rows without a value (None) are left out."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True, style="bold")
     grid.add_column(overflow="fold")

@@ -110,7 +110,7 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
             yield listener
         except KeyboardInterrupt as interrupt:
             if interrupt.args:
-                raise  # it says by itself what was kept
+                raise  # its message already says what was kept
             kept = f"the {listener.frames} frames so far are in {folder}" if listener.frames and folder else nothing
             raise KeyboardInterrupt(kept) from None
         finally:

@@ -155,7 +155,7 @@ def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File th
 
 
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
-    """Metrics of a run and its files."""
+    """Print the metrics and files of a run."""
     stages = ", ".join(f"{stage} {value:.1f}" for stage, value in metrics["ms_per_frame"].items())
     speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
@@ -164,7 +164,7 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
 
 
 def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
-    """How well a live session kept up."""
+    """Rows on the latency, speed and interruptions of a live session."""
     late, frames = live["latency_ms"], live["latency_frames"]
     return [("latency", f"{late['median']:.0f} ms from capture to pose ({frames['median']:.2f} of a frame's time); 5 % of frames over "
                         f"{late['p95']:.0f} ms ({frames['p95']:.2f})"),
@@ -173,7 +173,7 @@ def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
 
 
 def _sizes_table(sizes: Any) -> Any:
-    """The named sizes in two columns: a1..a18 of an upper body, or those of a whole body."""
+    """Table of the named sizes in two columns: a1..a18 of an upper body, or those of a whole body."""
     from shadowpuppet.body.sizes import CardboxSizes
 
     names = sizes.names()
@@ -185,7 +185,7 @@ def _sizes_table(sizes: Any) -> Any:
 
 
 def _fit_tables(found: MonocularSubject) -> tuple[list[Any], Sequence[tuple[str, str | None]]]:
-    """Cost over the rounds of Algorithm 1, a row a search of a subset of sizes; and how well the sizes fit."""
+    """Tables of a fit: cost over the rounds of Algorithm 1, one row per search of a subset of sizes; and rows on how well the sizes fit."""
     curves = [(name if n == 1 else "", str(n), str(len(curve)), f"{curve[0]:.0f}", f"{curve[-1]:.0f}", sparkline(curve))
               for name, searches in found.fit.curves.items() for n, curve in enumerate(searches, 1)]  # fmt: skip
     overlaps = ", ".join(f"{name} {value:.2f}" for name, value in found.fit.overlaps.items())
@@ -195,7 +195,7 @@ def _fit_tables(found: MonocularSubject) -> tuple[list[Any], Sequence[tuple[str,
 
 
 def _rig_fit_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | None]]:
-    """How well sizes from several cameras fit."""
+    """Rows on how well sizes from several cameras fit."""
     residual = summary["residual"]
     return [("overlap", f"{summary['overlap']:.2f} of body and silhouettes, in {summary['frames']} frames"),
             ("surface", f"{1000 * residual:.1f} mm (rms) from the points of the hulls" if abs(residual) < float("inf") else None),
@@ -203,7 +203,7 @@ def _rig_fit_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | None]]:
 
 
 def sparkline(values: Any, width: int = 30) -> str:
-    """Numbers as a line of bars."""
+    """Numbers as a line of `width` bars at most, in characters."""
     import numpy as np
 
     chosen = np.asarray(values, float)[np.unique(np.linspace(0, len(values) - 1, width).astype(int))]

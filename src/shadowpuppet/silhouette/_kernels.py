@@ -15,9 +15,9 @@ def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, aske
     """Label (H, W) pixels: 0 background, 1 differing by `weak` standard deviations, 2 by `strong`.
 
     `planes` uint8, `mean`, `inverse_sigma` float32, all of shape (H, W, 3): Y, Cr, Cb. The channels of `keyed` (3,), 0 or 1,
-    are compared. A pixel is background if `within` (H, W) is not 0, or if the background darkened to no less than `darkest` (1: not at
-    all) explains its channels of `shadowed` (3,); in the latter case it gets label 3 if it has less than `asked` of the background's
-    brightness.
+    are compared. A pixel is background if `within` (H, W) is not 0. It is also background, in shadow, if its channels of `shadowed` (3,)
+    match the background darkened to a share of at least `darkest` (1: no darkening); such a pixel gets label 3 instead of 0 if it has
+    less than `asked` of the background's brightness.
     """
     weak, strong, centre = weak * weak, strong * strong, np.float32(NEUTRAL)
     for y in range(planes.shape[0]):
@@ -55,7 +55,10 @@ def contrast(planes, mean, seen, out):
 
 @compiled(nogil=True)
 def far_from_samples(image, samples, squared_radius, needed, out):
-    """Mark pixels (H, W) of an image (H, W, C) that fewer than `needed` of the samples (N, H, W, C) are near to, all uint8."""
+    """Set `out` (H, W) to 1 for pixels of an image (H, W, C) that are near to fewer than `needed` of the samples (N, H, W, C), else to 0.
+
+    All are uint8; near: within `squared_radius`, the square of a distance in grey levels.
+    """
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
             near = 0

@@ -93,9 +93,9 @@ class _Sums:
 
 
 def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
-    """The empty scene (H, W, 3) or (H, W): the median of `count` to twice as many frames spread over a film, pixel by pixel.
+    """The empty scene (H, W, 3) or (H, W) of a film: the median, pixel by pixel, of `count` to 2 * `count` frames spread over it.
 
-    Memory does not grow with the film. A pixel is right if the person is elsewhere for more than half of the film; a person who stands
+    Memory does not grow with the film. A pixel is correct if the person covers it in less than half of the film; a person standing
     still becomes background. Raises `SilhouetteError` for fewer than 3 frames.
     """
     frames = sample_frames(images, count)
@@ -111,10 +111,10 @@ def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
 
 
 class FrameSampler:
-    """Keeps copies of `count` to twice as many of the frames added, evenly spread; all if there are fewer."""
+    """Keeps copies of `count` to 2 * `count` of the added frames, evenly spread; all of them if there are fewer."""
 
     def __init__(self, count: int) -> None:
-        """Empty."""
+        """A sampler without frames."""
         self.kept: list[Image] = []
         self._count, self._step, self._seen = count, 1, 0
 
@@ -136,10 +136,10 @@ def sample_frames(images: Iterable[Image], count: int) -> list[Image]:
 
 
 def film_noise(frames: list[Image], mean: Floats) -> NDArray[np.float64]:
-    """Noise of a film: standard deviation of its Y, Cr, Cb (3,), grey levels, from the smoothed background `mean` (H, W, 3).
+    """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, about the smoothed background `mean` (H, W, 3).
 
-    It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution), so that a person who
-    covers less than a third of the picture hardly changes it.
+    It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution): a person covering less
+    than a third of the picture hardly changes it.
     """
     differences = [np.abs(smoothed(to_planes(f).astype(np.float32)) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
     return np.percentile(np.concatenate(differences), 68, axis=0)

@@ -1,4 +1,4 @@
-"""A person's outline: placed at half the contrast, and how blurred outlines are in a film."""
+"""Placement of a person's outline at half the contrast, and the width of the outlines' blur in a film."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SHARP_WIDTH = 2
 MAX_WIDTH = 8
 """Greatest width of outlines, pixels."""
 LIMB_WIDTH_SHARE = 0.04
-"""Greatest width over the root of the person's area: half a forearm. In small pictures folds and stripes of clothes are as narrow as
+"""Greatest width over the square root of the person's area: half a forearm. In small pictures folds and stripes of clothes are as narrow as
 outlines and look like blur."""
 RISE_END_SHARE = 0.88
 """Share of the inner contrast at which an outline's blur ends."""
@@ -63,9 +63,10 @@ def at_half_contrast(mask: Labels, contrast: Contrast, outline: EdgeProfile) -> 
 
 
 def _around(mask: Labels, inner: Labels, contrast: Contrast, width: int) -> Contrast:
-    """Contrast of the person near each pixel: mostly the mean over the mask's inner part; the greatest where there is none.
+    """Contrast (H, W) of the person near each pixel: mean over the mask's inner part, mixed with the greatest by `PEAK_WEIGHT`; the
+    greatest alone if no inner part is near.
 
-    With the greatest alone, an arm would count as the blurred outline of a brighter shirt beside it.
+    If the greatest were always used, an arm next to a brighter shirt would count as the shirt's blurred outline.
     """
     import cv2
 

@@ -1,4 +1,4 @@
-"""Choice of the key (brightness, colour or both) that would set a person off best from a background."""
+"""Choice of the key (brightness, colour or both) that separates a person best from a background."""
 
 from __future__ import annotations
 

@@ -24,13 +24,14 @@ if TYPE_CHECKING:
 KEY_CHANNELS = {"brightness": (1, 0, 0), "colour": (0, 1, 1), "both": (1, 1, 1)}
 """Channels of Y, Cr, Cb that each key compares."""
 SHADOW_CHANNELS = {"brightness": (1, 1, 1), "colour": (0, 1, 1), "both": (1, 1, 1)}
-"""Channels that a shadow must explain: colour tells it from dark clothes even if brightness alone is the key."""
+"""Channels in which a pixel must match the darkened background to be a shadow. Colour is tested even if brightness is the key: without it,
+dark clothes would look like shadow."""
 CERTAIN_FACTOR = 2.0
-"""A pixel surely belongs to a person if it differs this many times more than one that perhaps does."""
+"""Threshold of pixels that surely belong to a person, over that of pixels that may."""
 SAMPLE_RADIUS = 20
 """Grey levels within which a pixel is near to a sample of the background (OpenCV's dist2Threshold is its square)."""
 MIN_NEAR_SAMPLES = 2
-"""Number of samples that a background pixel is near to."""
+"""Least number of samples that a background pixel is near to."""
 MIN_SAMPLES = 7
 """Number of samples kept, at most twice as many."""
 ROUNDING_MARGIN = 1 - 1e-4
@@ -42,7 +43,8 @@ Classifier = Callable[[Image], Labels]
 
 @dataclass(frozen=True, eq=False)
 class ChannelClassifier:
-    """Pixels that differ by `factor` standard deviations in the key's channels together, and are no shadow."""
+    """Classifier by the difference from the background: foreground pixels differ by `factor` standard deviations over the key's channels
+    together, and are no shadow."""
 
     key: str
     mean: Floats
@@ -51,7 +53,7 @@ class ChannelClassifier:
     """Inverse of the assumed standard deviation, of shape (H, W, 3)."""
     factor: float
     darkest: float
-    """Least share of its light that a background keeps in shadow; 1 if nothing is taken for shadow."""
+    """Least share of its brightness that the background keeps in shadow; 1: no pixel counts as shadow."""
 
     def __call__(self, image: Image) -> Labels:
         """Labels (H, W) of a picture (H, W, 3) or (H, W)."""
@@ -80,7 +82,7 @@ class ChannelClassifier:
 
     @cached_property
     def surely_background(self) -> tuple[Image, Image]:
-        """Least and greatest Y, Cr, Cb (H, W, 3) that are background for certain: most pixels are decided by this box."""
+        """Least and greatest Y, Cr, Cb (H, W, 3) that are certainly background: a quick test that decides most pixels."""
         keyed = np.array(KEY_CHANNELS[self.key], np.float32)
         reach = np.where(keyed > 0, ROUNDING_MARGIN * self.factor / (self.inverse_sigma * np.sqrt(keyed.sum())), np.float32(256))
         lowest, highest = np.ceil(self.mean - reach), np.floor(self.mean + reach)
@@ -89,7 +91,8 @@ class ChannelClassifier:
 
 @dataclass(frozen=True, eq=False)
 class AveragingClassifier:
-    """Liu 2011, eq. 1: |I_B - I_t| >= factor * sigma_B, as the range of whole numbers that are background, pixel by pixel."""
+    """Classifier by Liu 2011, eq. 1: |I_B - I_t| >= factor * sigma_B. Stored as the range of whole grey levels that are background, pixel
+    by pixel."""
 
     lowest: Image
     highest: Image
@@ -135,7 +138,7 @@ class MixtureClassifier:
         self._subtractor = cv2.createBackgroundSubtractorMOG2(detectShadows=shadow)
 
     def add(self, image: Image) -> None:
-        """The next picture of the empty scene."""
+        """Learn from the next picture of the empty scene."""
         self._subtractor.apply(image)
 
     def __call__(self, image: Image) -> Labels:
@@ -145,16 +148,17 @@ class MixtureClassifier:
 
 @dataclass(frozen=True, eq=False)
 class NeighbourClassifier:
-    """Pixels near to hardly any picture of the empty scene (Zivkovic & van der Heijden 2006).
+    """Classifier by nearest neighbours: foreground pixels are near to hardly any picture of the empty scene (Zivkovic & van der Heijden
+    2006).
 
-    The constants are those of OpenCV's KNN subtractor. That itself cannot be used: it learns even at a learning rate of 0, so that a
-    mask would depend on earlier frames.
+    The constants are those of OpenCV's KNN subtractor. OpenCV's class cannot be used: it learns even at a learning rate of 0, so a mask
+    would depend on earlier frames.
     """
 
     samples: NDArray[np.uint8]
     """Pictures of the empty scene, of shape (N, H, W, C)."""
     shadows: ChannelClassifier | None
-    """Classifier whose background, shadows included, is background here too; None for none."""
+    """If given, pixels that this classifier labels background, shadows included, are background too."""
 
     def __call__(self, image: Image) -> Labels:
         """Labels (H, W), 0 or 2, of a picture (H, W, 3) or (H, W)."""
@@ -167,14 +171,14 @@ class NeighbourClassifier:
 
 
 class EmptyScene(NamedTuple):
-    """What a classifier is made of."""
+    """What a method builds its classifier from."""
 
     background: Background
     channels: ChannelClassifier
-    """The comparison in all channels, with the noise that is assumed."""
+    """A classifier that compares all channels, with the assumed noise."""
     settings: SilhouetteSettings
     observer: Any
-    """The method's own observer, after all pictures of the empty scene."""
+    """The method's observer, after all pictures of the empty scene were added to it."""
 
 
 class Method(NamedTuple):
@@ -182,7 +186,8 @@ class Method(NamedTuple):
 
     build: Callable[[EmptyScene], Classifier]
     observer: Callable[[SilhouetteSettings], Any] = lambda settings: None
-    """Makes an object whose `add(image)` is called with every picture of the empty scene; None if the statistics are enough."""
+    """Returns an object with a method `add(image)`, called with every picture of the empty scene; None if the method needs only the
+    background's statistics."""
     needs_colour: bool = False
     """Whether a grey film is refused."""
     contrast: tuple[int, int, int] = (1, 1, 1)

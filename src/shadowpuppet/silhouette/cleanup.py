@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, at_half_contrast, disc
 
 Window = tuple[slice, slice]
-"""Rows and columns."""
+"""Rows and columns of a picture."""
 MIN_PART_SHARE = 0.02
-"""Least size, over the largest part's, of another part that belongs to the person: a hand."""
+"""Least size of another part of the person (a hand), over the largest part's."""
 MAX_PART_GAP = 0.06
-"""Greatest distance of such a part, over the root of the largest part's area: half a neck."""
+"""Greatest distance of such a part (half a neck), over the square root of the largest part's area."""
 MAX_HOLE_SHARE = 0.004
 """Holes of up to this share of the person's area are filled."""
 
@@ -78,7 +78,7 @@ def fill_small_holes(mask: Labels) -> Labels:
     """The mask with its small holes filled; background that touches the border is no hole."""
     import cv2
 
-    # OpenCV's function that counts pixels as well takes ten times as long.
+    # OpenCV's function that also counts pixels takes ten times as long.
     _, labels = cv2.connectedComponents(1 - mask, connectivity=4)
     parts = np.asarray(labels, np.intp)
     filled = np.bincount(parts.ravel()) <= MAX_HOLE_SHARE * np.count_nonzero(mask)

@@ -1,4 +1,4 @@
-"""From pictures of the empty scene, and some frames of the film, to a segmenter."""
+"""Learning of a segmenter from pictures of the empty scene and some frames of the film."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 DARKEST_SHADOW = 0.5
-"""Least share of its light that a background keeps in shadow; dark clothes are darker."""
+"""Least share of its brightness that the background keeps in shadow; dark clothes are darker."""
 COLOUR_FLOOR = 0.75
 """Noise floor of colours over that of brightness: codecs average colours over four pixels."""
 NOISE_TAIL_FACTOR = 1.8
 """Factor on the film's measured noise: compression errors have longer tails than a normal distribution."""
 FILM_SAMPLE = 12
-"""Number of frames (at most twice as many) in which the film's noise and the blur of its outlines are measured."""
+"""Number of frames in which the film's noise and the blur of its outlines are measured; at most twice as many are used."""
 MIN_EDGE_CONTRAST = 1.5
 """Least contrast on an outline, over that of a pixel that may be foreground."""
 EDGE_JITTER = 0.05
-"""Standard deviation added at the background's edges, over the change of its value across a pixel: cameras tremble."""
+"""Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 MAX_GREY_CHROMA = 2
 """Greatest deviation of colours from neutral in a film without colour, grey levels."""
 
 
 def learn_background(images: Iterable[Image], settings: SilhouetteSettings | None = None, *,
                      film: Iterable[Image] | None = None) -> Segmenter:
-    """Learn the empty scene from its pictures (H, W, 3) or (H, W): a film, a single picture, or `background_from_film`.
+    """The `Segmenter` learnt from pictures (H, W, 3) or (H, W) of the empty scene: a film, one picture, or that of `background_from_film`.
 
     film: the frames to be segmented, or some spread over them: their noise and the blur of their outlines are measured. Without them the
     noise is that of `images`, and outlines count as sharp. Raises `SilhouetteError` for pictures that do not fit, and `SettingsError`
@@ -71,8 +71,8 @@ def _channel_classifier(background: Background, frames: list[Image], settings: S
 
 
 def assumed_sigma(background: Background, frames: list[Image], noise_floor: float) -> np.ndarray:
-    """Standard deviation (H, W, 3) of Y, Cr, Cb that is assumed of the empty scene: the greatest of the learnt one, the film's noise and
-    the floor, and more at the background's edges."""
+    """Standard deviation (H, W, 3) of Y, Cr, Cb assumed for the empty scene: the greatest of the learnt one, the film's noise and
+    the floor, increased at the background's edges."""
     import cv2
 
     mean = scene.smoothed(background.mean)

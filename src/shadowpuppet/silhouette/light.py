@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shadowpuppet.silhouette.background import Image
 
 SAMPLED = 5000
-"""Pixels, on a grid, that a gain is estimated from."""
+"""Number of pixels, on a grid, from which a gain is estimated."""
 DARK, BRIGHT = 40, 245
 """Grey levels between which a pixel shows the gain: below, it is noise; above, it may be clipped."""
 MIN_PIXELS = 300
@@ -25,12 +25,12 @@ WINDOW = 15
 SHIFTS = 5
 """Steps of the mean shift."""
 NEGLIGIBLE = 0.02
-"""Log gain up to which a frame is left as it is: rounding and codecs make as much, and clean film stays untouched."""
+"""Log gain up to which a frame is left unchanged: rounding and codecs alone cause as much."""
 
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """The light of the empty scene, with which that of each frame is compared."""
+    """Estimates, and removes from a frame, changes of light since the empty scene."""
 
     scene: Image
     """Mean picture of the empty scene, of shape (H, W, 3), blue green red, or (H, W)."""
@@ -38,7 +38,7 @@ class Light:
     def gains(self, image: Image) -> NDArray[np.float64]:
         """Gain of each channel (C,) of a picture like the scene: the mode of the ratio picture to scene over pixels.
 
-        The mode is the background's even where the person covers nearly half of the picture. 1 where too few pixels show it.
+        The mode is the background's even if the person covers nearly half of the picture. The gain is 1 if too few pixels show it.
         """
         levels, informative = self._sampled
         step = self._step
@@ -48,9 +48,9 @@ class Light:
         return np.array([_mode(bins[use, c]) for c, use in enumerate(informative.T)])
 
     def normalised(self, image: Image) -> Image:
-        """The picture divided by its gains; the picture itself where these are negligible.
+        """The picture divided by its gains; the picture itself if they are negligible.
 
-        Where the scene under this light is clipped, clipped pixels of the picture become the scene's.
+        Clipped pixels of the picture are replaced by the scene's where the scene under this light would be clipped too.
         """
         import cv2
 
@@ -70,7 +70,7 @@ class Light:
 
     @cached_property
     def _sampled(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        """Log levels of the scene's sampled pixels (n, C), and where they can show a gain."""
+        """Log levels of the scene's sampled pixels (n, C), and whether each can show a gain (n, C)."""
         pixels = self.scene[:: self._step, :: self._step].reshape(-1, self.scene.shape[2] if self.scene.ndim == 3 else 1)
         return LOG[pixels], (pixels > DARK) & (pixels < BRIGHT)
 
@@ -80,7 +80,7 @@ LOG = np.log(np.maximum(np.arange(256), 1)).astype(np.float32)
 
 
 def _mode(bins: NDArray[np.intp]) -> float:
-    """The gain at the mode of a histogram of log gains, by mean shift from its highest stretch."""
+    """The gain at the mode of log gains, given as histogram bins; by mean shift from the fullest part of the histogram."""
     if len(bins) < MIN_PIXELS:
         return 1.0
     counts = np.bincount(np.clip(bins, 0, BINS - 1), minlength=BINS).astype(float)

@@ -17,7 +17,7 @@ MIN_AREA = 0.003
 AREA_JUMP = 0.25
 """Relative change of the area between frames that no motion causes: a part of the person was lost or found."""
 MIN_CONTACT = 2
-"""Pixels on a side of the picture from which on the person touches it; one may be noise."""
+"""Least number of pixels on a side of the picture for the person to touch it; one may be noise."""
 
 # Limits of the warnings. Exact silhouettes of walking, running and waving people reach at most a third of these.
 WARN_CONTACT = 0.02
@@ -44,18 +44,18 @@ class MaskQuality:
     flicker: float
     """Median over frames of the pixels that differ from both the frame before and the one after, over the person's area.
 
-    Motion causes such pixels only where something thinner than its own step passes: few in a typical frame.
+    Motion causes few such pixels in a typical frame: only where something passes that is thinner than its step between frames.
     """
     border: dict[str, float]
     """Share of frames in which the person touches the left, right, top and bottom side of the picture."""
     specks: float
-    """Mean number of parts beside the largest."""
+    """Mean number of parts other than the largest."""
     speck_area: float
-    """Mean of their area over the largest part's."""
+    """Mean of the total area of these parts over the largest part's."""
     holes: float
     """Mean number of holes in the largest part."""
     hole_area: float
-    """Mean of their area over the largest part's."""
+    """Mean of the total area of these holes over the largest part's."""
     empty: int
     """Frames without any silhouette."""
     full: int

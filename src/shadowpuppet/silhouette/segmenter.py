@@ -40,18 +40,18 @@ class Segmenter:
     """Statistics of the empty scene."""
     settings: SilhouetteSettings
     key: str
-    """What is compared (brightness, colour, both), or the name of a method that compares otherwise."""
+    """The channels compared (brightness, colour or both), or the name of another method."""
     reason: str
-    """Why, in one sentence."""
+    """Why that key is used, in one sentence."""
     edge: EdgeProfile
     """Blur of outlines in the film."""
     classifier: Classifier
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
     light: Light | None = None
-    """The light of the empty scene; None: frames are compared as they come."""
+    """The light of the empty scene; None: changes of light are not corrected."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
-        """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if nobody is in it.
+        """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if it shows no person.
 
         Raises `SilhouetteError` for a frame that does not fit the background.
         """

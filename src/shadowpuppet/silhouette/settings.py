@@ -20,11 +20,12 @@ class SilhouetteSettings:
     """How a person is segmented from the background. The defaults suit any film; `averaging` is Liu 2011, eq. 1, unchanged."""
 
     method: Method = "auto"
-    """What is compared: brightness, colour (Cr and Cb) or both, of which `auto` chooses the one that suits the background; or another
-    method: eq. 1 (`averaging`), a mixture of Gaussians (`mog2`) or nearest neighbours (`knn`), frozen after learning."""
+    """Segmentation method. `brightness`, `colour` (Cr and Cb) and `both` name the channels that are compared with the background; `auto`
+    chooses the one of these three that suits the background. `averaging` is eq. 1; `mog2`, a mixture of Gaussians, and `knn`, nearest
+    neighbours, are frozen after learning."""
     factor: Annotated[float, Field(gt=0, le=100)] = 2.0
-    """Number of standard deviations by which a foreground pixel differs (eq. 1). With brightness, colour and both it must also be
-    connected to pixels that differ by twice as much; mog2 and knn have thresholds of their own."""
+    """Least difference of a foreground pixel from the background, standard deviations (eq. 1). With brightness, colour and both it must
+    also be connected to pixels that differ by twice as much; mog2 and knn have thresholds of their own."""
     noise_floor: Annotated[float, Field(ge=0, le=100)] = 2.5
     """Least assumed standard deviation (grey levels; three quarters of it for colour). Not used by `averaging`."""
     shadow: bool = True

@@ -26,8 +26,8 @@ MIN_PART_PIXELS = 12
 MAX_LIMB_LIGHT = 0.8
 """Greatest share of the background's light in a limb. Soft shadows in well-lit rooms leave more."""
 NECK_CONTACT, BROAD_CONTACT, ENCLOSED_CONTACT = 0.1, 0.35, 0.7
-"""Share of a part's edge along the rest of the person: that of a head at the neck; that of most limbs; and the share from which on the
-rest of the edge does not matter."""
+"""Share of a part's edge that borders on the rest of the person: least share of a head at the neck, and of most limbs; and the share from
+which on the sharpness of the rest of the edge does not matter."""
 SHARP_EDGE, VERY_SHARP_EDGE = 0.3, 0.5
 """Share of the lost light regained across a sharp, and a very sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
 MAX_EVEN_SPREAD, MAX_NEUTRAL_HUE, MIN_UNEVEN_SPREAD = 0.6, 0.4, 1.0
@@ -60,7 +60,7 @@ def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: F
 
 
 def _limbs(sums: np.ndarray) -> Labels:
-    """Which parts are limbs, of shape (K,); sums: `_part_sums` (K, 11)."""
+    """1 for each part that is a limb, else 0, of shape (K,); sums: `_part_sums` (K, 11)."""
     size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge

@@ -20,7 +20,7 @@ def demo_spec() -> Spec:
 
 
 def demo_ring_spec() -> Spec:
-    """The recording of several cameras of `shadowpuppet demo`: a person walks and turns before four small cameras, 5.6 s."""
+    """The recording of several cameras of `shadowpuppet demo`: a person walks and turns in front of four small cameras, 5.6 s."""
     ring = Ring(count=4, radius=3.8, start_deg=35, jitter=0.5, fov_deg=42, seed=5)
     scene, gestures = Scene(clothing=8, room=3, empty_seconds=1.5), parse_gestures("walk 2, turn_around 2")
     return Spec(name="demo_ring", body=Mannequin(stature=1.70, build=0.2), motion=gestures, ring=ring, scene=scene, rate=20)

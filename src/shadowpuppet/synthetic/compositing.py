@@ -1,4 +1,4 @@
-"""Layers, each what a camera sees of one object alone, and their composition by depth."""
+"""Layers (images of one object alone, with alpha and depth) and their composition by depth."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FAR = 1e9
 
 
 class Layer(NamedTuple):
-    """One object (a person, the furniture) as a camera sees it."""
+    """Image of one object (a person, the furniture) by one camera."""
 
     picture: Array
     """Light, premultiplied by alpha, of shape (H, W, 3), RGB, about 0 to 1."""
@@ -30,14 +30,14 @@ class Layer(NamedTuple):
 
     @property
     def reach(self) -> Array:
-        """The depth (H, W); for pixels covered in part but not at their centre that of the nearest neighbour."""
+        """Depth (H, W), metres; pixels covered in part but not at their centre have the least depth of their neighbours."""
         import cv2
 
         around = cv2.erode(self.depth, np.ones((3, 3)))
         return np.where((self.depth >= FAR) & (self.alpha > 0), around, self.depth)
 
     def part(self, box: tuple[slice, slice]) -> Layer:
-        """A window of rows and columns."""
+        """The layer within a window of rows and columns."""
         return Layer(self.picture[box], self.alpha[box], self.depth[box])
 
     def over(self, below: Array) -> Array:
@@ -46,7 +46,7 @@ class Layer(NamedTuple):
 
 
 def composite_people(room: Array, people: Sequence[Layer], things: Sequence[Layer]) -> Array:
-    """`composite` of people and things over the room's picture (H, W, 3), restricted to where people are for speed."""
+    """`composite` of people and things over the room's picture (H, W, 3); faster, as people are drawn in their bounding box only."""
     picture = composite(room, things)
     covered = np.any([layer.alpha > 0 for layer in people], axis=0)
     rows, columns = (np.flatnonzero(covered.any(axis)) for axis in (1, 0))
@@ -76,7 +76,7 @@ def composite(room: Array, layers: Sequence[Layer]) -> Array:
 
 
 def visible(layer: Layer, others: Sequence[Layer]) -> np.ndarray:
-    """Where a layer is nearer than all others at pixel centres, of shape (H, W)."""
+    """Mask (H, W) of the pixels at whose centres a layer is nearer than all others."""
     shown = layer.depth < FAR
     for other in others:
         shown &= layer.depth < other.depth

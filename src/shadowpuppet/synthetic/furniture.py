@@ -26,7 +26,7 @@ class Obstacle:
     kind: Literal["table", "chair", "pillar", "cabinet"]
     """Kind: a table 74 cm high, a chair with its back 92 cm high, a round pillar, a cabinet 1.05 m high."""
     ahead: Coordinate = 0.8
-    """Distance before the person, metres; negative behind."""
+    """Distance in front of the person, metres; negative behind."""
     left: Coordinate = 0.0
     """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
@@ -35,7 +35,7 @@ class Obstacle:
     """Seed of its colour."""
 
     def __post_init__(self) -> None:
-        """Refuse the person's place."""
+        """Check that the obstacle does not stand at the person's place."""
         if np.hypot(self.ahead, self.left) < MIN_DISTANCE:
             raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; "
                              f"expected {MIN_DISTANCE} m of distance")
@@ -71,7 +71,7 @@ class Furniture:
     """All obstacles of a scene, in the world."""
 
     def __init__(self, things: Sequence[Obstacle]) -> None:
-        """Of the spec's obstacles."""
+        """things: the spec's obstacles."""
         self.things = tuple(things)
 
     def __bool__(self) -> bool:
@@ -98,7 +98,7 @@ class Furniture:
         return nearest, normals, places, which
 
     def layer(self, eye: Array, rays: Array, fine: Array, lights: Array) -> Layer:
-        """What a camera at `eye` sees, from unit rays (H, W, 3) at pixel centres and `fine` ones (2H, 2W, 3), four per pixel."""
+        """The obstacles seen from `eye`: unit rays (H, W, 3) at pixel centres, and `fine` (2H, 2W, 3), four per pixel."""
         depth = self.intersect(eye, rays)[0]
         _, normals, places, which = self.intersect(eye, fine)
         hit = which >= 0

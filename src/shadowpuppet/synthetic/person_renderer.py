@@ -41,13 +41,13 @@ class PersonRenderer:
         self.sine, self.cosine = np.sin(angle), np.cos(angle)
 
     def fine_rays(self) -> Array:
-        """Unit rays (2H, 2W, 3), world, four per pixel: for what is drawn once."""
+        """Unit rays (2H, 2W, 3), world, four per pixel: for objects that are drawn once."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         return _unit(self.camera.rays(grid) @ inverse(self.camera.T_camera_world)[:3, :3].T)
 
     def draw(self, figure: Figure, index: int) -> Layer:
-        """The figure's posture `index`."""
+        """The figure in its posture `index`."""
         from shadowpuppet.synthetic import _ray_marching
 
         s, (width, height), eye = self.surface, self.camera.size, self.camera.centre

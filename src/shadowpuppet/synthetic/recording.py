@@ -75,7 +75,7 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
-    """A bystander's figure in `count` frames, at its place."""
+    """The figure of a bystander in `count` frames, at the bystander's place."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
     always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
@@ -86,7 +86,7 @@ def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Genera
 
 
 def _wall(figure: Figure, others: list[Figure]) -> float:
-    """Least distance of the wall behind the origin, metres: 0 if nobody leaves their place, for which all walls are far enough."""
+    """Least distance of the wall behind the origin, metres; 0 if all people stay in place: every wall is far enough for that."""
     people = [one.joints[..., :2] for one in (figure, *others)]
     behind, aside = max(float(one[..., 1].max()) for one in people), max(float(np.abs(one).max()) for one in people)
     return max(behind if others or behind > 1.15 else -0.4, aside if aside > 5.6 else -0.4) + 0.4
@@ -130,7 +130,7 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
 
 
 def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
-    """Write what is no film: calibration, the subject's data, truth, and for several cameras a training motion.
+    """Write everything but films: calibration, the subject's data, truth, and for several cameras a training motion.
 
     The training motion is another performance, with other random numbers, of the same or of other gestures by the same body.
     """

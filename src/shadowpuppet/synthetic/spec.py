@@ -28,16 +28,16 @@ class Bystander:
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of body and clothes."""
     motion: Gesture = Gesture(motion="stand")
-    """What they do, for the length of the film."""
+    """Motion for the length of the film."""
     ahead: Coordinate = -1.0
-    """Distance before the person, metres; negative behind."""
+    """Distance in front of the person, metres; negative behind."""
     left: Coordinate = 0.9
     """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Rotation to their left, degrees; 0 looks where the person looks."""
 
     def __post_init__(self) -> None:
-        """Refuse the person's place."""
+        """Check that the bystander does not stand at the person's place."""
         if np.hypot(self.ahead, self.left) < 0.5:
             raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; expected 0.5 m of distance")
 
@@ -84,16 +84,16 @@ def _seed(value: Any) -> int | tuple[int, ...]:
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Spec:
-    """A recording to be made: body, motion, cameras and scene are chosen independently."""
+    """A synthetic recording: body, motion, cameras and scene, chosen independently."""
 
     name: Name = "made"
-    """Its name in tables."""
+    """Name of the recording in tables."""
     body: Mannequin = Mannequin()
     """The person."""
     motion: Annotated[tuple[Gesture, ...], Field(min_length=1)] = (Gesture(motion="wave_hands"),)
     """Gestures, performed one after another."""
     training: tuple[Gesture, ...] | None = None
-    """Gestures of the training motion of several cameras; by default those of `motion` again; an empty list: no training motion."""
+    """Gestures of the training motion, for several cameras only; by default those of `motion` again; an empty list: no training motion."""
     begin: Annotated[float, Field(ge=0, le=3600)] = 0.0
     """Seconds of the motion, including its 0.8 s of standing, before the film and the training motion begin."""
     frames: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
@@ -113,12 +113,12 @@ class Spec:
     still: Annotated[float, Field(ge=0, le=3)] = 1.0
     """Factor on sway and tremor; 0: none."""
     tells: Literal["height and distance", "height", "distance", "nothing"] = "height and distance"
-    """What recording.toml says of the subject."""
+    """Data of the subject that recording.toml states."""
     seed: Annotated[int | tuple[int, ...], PlainValidator(_seed)] = 0
     """Seed of motion and noise if no generator is given: a whole number, or several."""
 
     def __post_init__(self) -> None:
-        """Refuse equal camera names, and cameras inside an obstacle or a person."""
+        """Check that camera names differ, and that no camera is inside an obstacle or a bystander."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")
@@ -174,7 +174,7 @@ TABLES: dict[str, Any] = {"body": Mannequin, "motion": Gesture, "cameras": Viewp
 
 
 def _siblings(place: tuple[int | str, ...]) -> str:
-    """Names of the settings beside the one at `place`."""
+    """Names of all settings in the table of the one at `place`."""
     from dataclasses import fields
 
     kind: Any = Spec

@@ -19,13 +19,13 @@ from shadowpuppet.synthetic.walls import WallStyle
 
 OCCLUDERS: dict[str, dict[str, float]] = {"table": {"ahead": 0.75}, "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
                                           "pillar": {"ahead": 0.9, "left": 0.2}, "cabinet": {"ahead": 0.7, "left": 0.35}}
-"""Places of `occluder`."""
+"""Place (m) and rotation (degrees) of each kind of `occluder`."""
 SECOND_PERSONS: dict[str, dict[str, Any]] = {
     "behind": {"ahead": -1.0, "left": -0.6},
     "aside": {"ahead": 0.0, "left": 1.0},
     "passing": {"ahead": -1.3, "left": 0.0, "turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 3.0}},
 }
-"""Bystanders of `second_person`."""
+"""The bystander of each choice of `second_person`."""
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -74,7 +74,7 @@ class SpecChanges:
     drift: float | None = None
     """Relative change of the light by the end of the film; negative: it fades."""
     crf: int | None = None
-    """Compression of the films, H.264's crf: 0 the best, 18 as usual, 51 the worst."""
+    """Compression of the films, H.264's crf: 0 the best, 18 the default, 51 the worst."""
     occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
     """Obstacle between the person and the first camera: table, chair, pillar or cabinet."""
     second_person: Literal["behind", "aside", "passing"] | None = None

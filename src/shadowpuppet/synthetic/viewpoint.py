@@ -17,7 +17,7 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 FovDeg = Annotated[float, Field(ge=10, le=170)]
 Height = Annotated[float, Field(ge=0.05, le=6)]
-Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # `Viewpoint` itself refuses them, with all its numbers
+Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # infinite and NaN are refused by `Viewpoint`, whose message shows all numbers
 Distance = Annotated[float, Field(ge=0.8, le=20)]
 MAX_PINHOLE_FOV = 120.0
 """Greatest horizontal field of view of a pinhole lens, degrees."""
@@ -46,7 +46,7 @@ class Viewpoint:
     distance: Distance = 2.0
     """Horizontal distance from the person's place, metres."""
     azimuth_deg: Angle = 0.0
-    """Direction from the person to the camera, degrees: 0 before the person, 90 on their left."""
+    """Direction from the person to the camera, degrees: 0 in front of the person, 90 on their left."""
     pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
     """Angle below the horizontal, degrees."""
     distortion: tuple[Coefficient, ...] = ()
@@ -102,7 +102,7 @@ class Ring:
     height: Height = 1.6
     """Height over the floor, metres."""
     start_deg: Angle = 0.0
-    """Direction from the person to the first camera, degrees: 0 before the person, 90 on their left; the others follow to the left."""
+    """Direction from the person to the first camera, degrees: 0 in front of the person, 90 on their left; the others follow to the left."""
     jitter: Annotated[float, Field(ge=0, le=1)] = 0.3
     """Irregularity of place, direction and focal length: 0 a perfect ring; 1 up to 7 degrees, 25 cm, 7 % of the radius."""
     seed: Annotated[int, Field(ge=0)] = 1

@@ -1,1 +1,1 @@
-"""Runs, recordings, priors and files to look at in space and time, on a page that this machine serves to itself, or in one file."""
+"""3D viewer of runs, recordings, priors and files over time: on a page that this machine serves to itself, or in one file."""

@@ -12,7 +12,7 @@ from shadowpuppet.synthetic.movement.keyframes import HALF_STANCE, Hop, Keyframe
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GUARD = both(front=38, side=12, roll=6, elbow=122, supination=10, curl=85, wrist_flex=0)
-"""Fists before the chin, elbows in."""
+"""Guard of a boxer: fists in front of the chin, elbows in."""
 
 
 def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:

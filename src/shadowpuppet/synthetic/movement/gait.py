@@ -20,11 +20,11 @@ from shadowpuppet.synthetic.person.mannequin import Mannequin
 CLOCK_STEP = 0.002
 """Step of the integration of speed and cadence, seconds."""
 TRACK_HALF_WIDTH = {False: 0.055, True: 0.03}
-"""Half the distance between the feet's tracks, leg lengths, walking and jogging."""
+"""Half the distance between the feet's tracks, leg lengths: walking (False) and jogging (True)."""
 MAX_LEAN = np.radians(13)
 """Greatest lean into a turn, rad; small leans balance weight and centrifugal force."""
 COMFORTABLE_SPEED = {False: 1.35, True: 2.6}
-"""Comfortable speeds of an adult, m/s; others at equal Froude number."""
+"""Comfortable speeds of an adult, m/s: walking (False) and jogging (True). Bodies of other sizes: the same Froude number."""
 HEEL_RISE_PHASE, FLAT_PHASE = 0.3, 0.22
 """Phases of the leg at which the heel begins to rise and the foot lies flat again."""
 
@@ -42,7 +42,7 @@ class Footprints(NamedTuple):
 
 
 class Walk:
-    """Walking or jogging along a path, from standing to standing."""
+    """A walk or jog along a path, which begins and ends in standing."""
 
     def __init__(self, body: Mannequin, seconds: float, rng: np.random.Generator, jogging: bool = False, speed: float | None = None,
                  path: PathName = "circle", size: float = 1.2) -> None:
@@ -71,7 +71,7 @@ class Walk:
         self.phase = 0.5 + np.cumsum(cadence * CLOCK_STEP) - np.sum(cadence[self.ticks < 0] * CLOCK_STEP)
         slow = 1 / (1 + 0.2 * self.path.bend**2 * (self.cycle.leg / 0.86) ** 2)
         due = np.concatenate([[0], np.cumsum(np.diff(self.path.samples) / slow[1:])])
-        short = min(1.0, stops / (3.0 * period))  # with time for a step or two only, full speed is not reached
+        short = min(1.0, stops / (3.0 * period))  # a walk of one or two steps does not reach full speed
         pace = short * self.speed * starts * smoothstep((stops - self.ticks) / ramp) * (1 + 0.015 * band_noise(self.ticks, 0.3, rng))
         self.gone = np.interp(np.cumsum(pace) * CLOCK_STEP, due, self.path.samples)
         quick = np.gradient(self.gone, CLOCK_STEP)
@@ -155,7 +155,7 @@ class Walk:
 
     def _arm(self, phase: Array) -> dict[str, Array]:
         """Channels of the arm on the side of a leg with this phase; it swings back when the leg is forward."""
-        swing = -np.cos(2 * np.pi * (phase - 0.02))  # -1 back, 1 before
+        swing = -np.cos(2 * np.pi * (phase - 0.02))  # -1 backward, 1 forward
         bend = 0.5 - 0.5 * np.cos(2 * np.pi * (phase - 0.1))
         if self.jogging:
             amplitude = 26 * self.arms * np.clip(self.speed / 2.6, 0.7, 1.4)

@@ -1,8 +1,8 @@
 """One cycle of walking or jogging: published joint angles fitted to a body and a speed.
 
 The angles alone would let the feet slide and sink a little. So the cycle is split into a constraint (a foot stands still from contact to
-toe-off, rolling over heel and ball) and what remains of the angles: the swing of the foot and the rise and fall of the pelvis. `gait.py`
-combines them over footprints.
+toe-off, rolling over heel and ball) and two motions computed from the angles: the swing of the foot, and the rise and fall of the pelvis.
+`gait.py` combines them over footprints.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ class Sole(NamedTuple):
     heel: float
     """Distance of the heel's roll-off behind the ankle."""
     ball: float
-    """Distance of the ball before the ankle."""
+    """Distance of the ball in front of the ankle."""
     tip: float
-    """Distance of the tips of the toes before the ankle."""
+    """Distance of the tips of the toes in front of the ankle."""
     ankle: float
     """Height of the ankle over the floor."""
 
     @classmethod
     def of(cls, body: Mannequin) -> Sole:
-        """Of a body."""
+        """The sole of a body."""
         long = body.measure("foot_length")
         return cls(0.14 * long, 0.48 * long, 0.72 * long, body.length("ankle"))
 
     def rolled(self, pitch: Array) -> tuple[Array, Array]:
-        """Place of the ankle, forward and up from the point below it when flat, of a foot with `pitch` (rad, toes up).
+        """Ankle of a foot with `pitch` (rad, toes up): forward and up, metres, from the floor point below the ankle of the flat foot.
 
         The foot rolls over the heel or the ball, and from some 20 degrees on also over the tips of the toes.
         """
@@ -62,7 +62,7 @@ class Gait(NamedTuple):
     bow: float
     """Forward tilt of the pelvis against standing, degrees."""
     thigh: Callable[[Array], Array]
-    """Angle of the thigh before the vertical at a phase, degrees."""
+    """Angle of the thigh forward of the vertical at a phase, degrees."""
     knee: Callable[[Array], Array]
     """Flexion, degrees."""
     ankle: Callable[[Array], Array]
@@ -94,7 +94,7 @@ JOGGING = Gait(
     lambda p: 5.0 * np.cos(2 * np.pi * (p - 0.03)),
 )
 """Jogging: the pelvis' small motions in the frontal and horizontal plane by the sizes of Novacheck (1998, fig. 4)."""
-assert STANDING_TILT == 10.0  # what WALKING.bow is counted from: 10.3 on average
+assert STANDING_TILT == 10.0  # WALKING.bow is relative to it: 10.3 on average
 
 
 def stride_length(speed: float, leg: float, jogging: bool) -> float:
@@ -123,7 +123,7 @@ class GaitCycle:
         base, drop = self._foot(phase, thigh, shank, pitch)
         carried = phase <= gait.carries
         self.lead = float(base[carried].mean())
-        """Distance of a foot before the pelvis at contact, metres."""
+        """Distance of a foot in front of the pelvis at contact, metres."""
         self.middle = self.lead / stride
         """Phase at which the foot is below the pelvis."""
         self.height = _harmonics(phase, drop + self.sole.rolled(pitch)[1], np.where(phase < 0.8 * gait.carries, 1.0, 0.02) * carried)
@@ -144,7 +144,7 @@ class GaitCycle:
         return np.where(phase % 1 > self.gait.carries, self._lift(np.maximum(phase % 1, self.gait.carries)), 0.0)
 
     def _angles(self, phase: Array, amplitude: float) -> tuple[Array, Array, Array]:
-        """Thigh and shank before the vertical and the foot's pitch, rad, swinging `amplitude` times as wide as published."""
+        """Angles of thigh and shank forward of the vertical, and pitch of the foot, rad; swing: `amplitude` times the published one."""
         whole = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
         mean, more = self.gait.thigh(whole).mean(), np.sqrt(amplitude)
         least = self.gait.knee(whole).min()

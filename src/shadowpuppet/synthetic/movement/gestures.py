@@ -1,7 +1,7 @@
 """Gestures of arms and trunk: key postures over time, interpolated smoothly, plus involuntary motion.
 
-A gesture is a function of its length (s) and a generator that returns key postures `(time, {channel: value})`; channels it does not name
-stay as in standing. Time is continuous: the same spec at another frame rate is the same motion.
+A gesture is a function of a length (s) and a random generator. It returns key postures `(time, {channel: value})`; channels not named
+are as in standing. Time is continuous: the same spec at another frame rate is the same motion.
 """
 
 from __future__ import annotations

@@ -53,11 +53,14 @@ class Hop(NamedTuple):
 
 
 class KeyframeMotion:
-    """A motion through key postures over stepping feet."""
+    """A motion through key postures, with steps and hops of the feet."""
 
     def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
                  rounding: float = 0.16) -> None:
-        """keys: of `CHANNELS` and `GROUND_CHANNELS`, between 0 and `seconds`; others stand; `rounding`: see `interpolate_keys`."""
+        """keys: values of `CHANNELS` and `GROUND_CHANNELS` at times from 0 to `seconds`; channels not named are as in standing.
+
+        rounding: see `interpolate_keys`.
+        """
         self.body, self.seconds, self.hops, self.rounding = body, seconds, tuple(hops), rounding
         self.leg, self.sole = body.length("thigh") + body.length("shank"), Sole.of(body)
         last = {"turn": max((s.begin, s.turn) for s in steps)[1]} if steps else {}
@@ -81,7 +84,7 @@ class KeyframeMotion:
         return postures, Stance(pelvis, ankles, frames, toes, looks)
 
     def _flight(self, t: Array) -> Array:
-        """Height of both feet by hops, metres."""
+        """Height of both feet in hops at times `t` (T,), metres, of shape (T,)."""
         spans = [(np.clip(t - h.begin, 0, h.seconds), h.seconds) for h in self.hops]
         return sum((0.5 * GRAVITY * past * (whole - past) for past, whole in spans), 0.0 * t)
 
@@ -104,7 +107,7 @@ class KeyframeMotion:
 
 
 def _last(steps: Sequence[Step], what: str) -> float:
-    """Final place of the pelvis: midway between the feet."""
+    """Final shift of the pelvis, leg lengths, midway between the feet; what: "aside" or "ahead"."""
     places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):
         places[step.foot] = getattr(step, what)

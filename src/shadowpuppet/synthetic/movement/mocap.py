@@ -42,7 +42,7 @@ def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: 
 
 
 def mocap_seconds(gestures: Sequence[Gesture]) -> float:
-    """Seconds of the file of `gestures`."""
+    """Length of the motion, seconds: that of the gesture, at most the rest of its file."""
     gesture, capture = _one(gestures)
     there = (len(capture.root) - 1) / gesture.file_rate - gesture.start
     if there <= 0:
@@ -59,7 +59,7 @@ def _one(gestures: Sequence[Gesture]) -> tuple[Gesture, Capture]:
 
 
 def _at(table: JointTable, t: Array) -> JointTable:
-    """The table at other times, interpolated by cubics."""
+    """The table at times `t`, interpolated by cubics."""
     from scipy.interpolate import CubicSpline
 
     t = np.clip(t, table.times[0], table.times[-1])
@@ -69,10 +69,10 @@ def _at(table: JointTable, t: Array) -> JointTable:
 
 
 def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
-    """`body` in the postures of `table`, one per row; rest: one row, the same skeleton upright, arms level, facing -Y.
+    """The figure of `body` in the postures of `table`, one per row; rest: one row, the same skeleton upright, arms level, facing -Y.
 
-    Both have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. The pelvis follows the measured one, scaled by the length of the
-    legs; the lowest soles are brought to the floor.
+    Both tables have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. The pelvis follows the measured one, scaled by the length of
+    the legs; the lowest soles are brought to the floor.
     """
     p: Points = dict(zip(table.names, table.positions.swapaxes(0, 1)))
     calm: Points = dict(zip(rest.names, rest.positions.swapaxes(0, 1)))
@@ -110,7 +110,7 @@ def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
 
 
 def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thoracic: Array, joint: Points, frame: dict) -> None:
-    """Clavicle, upper arm, forearm, hand."""
+    """Add clavicle, upper arm, forearm, hand and fingers of one side to `joint` and `frame`."""
     sign = 1.0 if side == "left" else -1.0
     now = _unit(np.einsum("tji,tj->ti", thorax, p[f"{side}_shoulder"] - p["neck"]))
     clavicle = thorax @ _swing(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now)
@@ -133,7 +133,7 @@ def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thora
 
 
 def _leg(body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict) -> None:
-    """Thigh, shank, foot, toes."""
+    """Add thigh, shank, foot and toes of one side to `joint` and `frame`."""
     hip, knee, ankle = (p[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))
     ahead = _steady_normals(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
     thigh, shank = (_along_z(_unit(a - b), -ahead) for a, b in ((hip, knee), (knee, ankle)))

@@ -31,7 +31,7 @@ class Gesture:
     size: Annotated[float, Field(ge=0.5, le=20)] = 1.2
     """Radius of the circle, half the longer axis of the ellipse, length of the line, metres."""
     file: str | None = None
-    """Motion capture to play (`mocap`): a .amc file; its skeleton, the .asf file, lies beside it."""
+    """Motion capture to play (`mocap`): a .amc file; its skeleton, a .asf file, is in the same folder."""
     start: Annotated[float, Field(ge=0)] = 0.0
     """Seconds of the file to skip."""
     file_rate: Annotated[float, Field(gt=0, le=1000)] = 120.0

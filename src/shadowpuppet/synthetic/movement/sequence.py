@@ -108,7 +108,7 @@ def _middle(parts: Sequence[MotionPart], turn: float) -> Array:
 
 
 def _goes(gestures: Sequence[Gesture]) -> bool:
-    """Whether the person walks or jogs."""
+    """Whether any part is walking or jogging."""
     return any(gesture.motion in ("walk", "jog") for gesture in gestures)
 
 

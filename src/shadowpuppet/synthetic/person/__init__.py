@@ -1,1 +1,1 @@
-"""Made people: a mannequin of rounded limbs, that shares nothing with the fitted bodies."""
+"""Synthetic people: a mannequin of rounded limbs, which shares nothing with the bodies that trackers fit."""

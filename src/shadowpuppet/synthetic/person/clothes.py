@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Clothes:
-    """A shirt, trousers, shoes, hair and a skin."""
+    """Shirt, trousers, shoes, hair and skin of one person."""
 
     looseness: float = 0.012
     """Looseness of shirt and trousers, metres."""

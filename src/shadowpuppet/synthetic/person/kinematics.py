@@ -99,7 +99,7 @@ def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> St
 
 
 def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
-    """The figure of `body` in `postures` (T, `CHANNELS`) over `stance`, whose pelvis and feet replace `sway` of the postures.
+    """The figure of `body` in `postures` (T, `CHANNELS`); `stance` gives pelvis and feet, in place of the postures' `sway`.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
     """
@@ -137,7 +137,7 @@ def _yaw(q: dict[str, Array]) -> Array:
 
 
 def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
-    """Clavicle, upper arm, forearm and hand of one side.
+    """Add clavicle, upper arm, forearm and hand of one side to `joint` and `frame`.
 
     The clavicle rises by 0.13 of the arm's elevation beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig et al.
     2009).

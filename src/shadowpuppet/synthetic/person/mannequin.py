@@ -44,7 +44,7 @@ HAND_POINT = 0.18
 """Place of the joint `*_hand`, fraction of the hand's length from the wrist: the root of the metacarpals, as in the project's shared
 recordings (0.019 of stature beyond the wrist)."""
 KNUCKLES = 0.46
-"""Place of the knuckles, where the fingers bend, likewise."""
+"""Place of the knuckles, where the fingers bend, as the same fraction."""
 
 BODY_MASS = (25.6, 27.8)
 """Mean body mass index (kg/m2) of the same women and men."""
@@ -85,7 +85,7 @@ class Mannequin:
              age: float | None = None) -> Mannequin:
         """A random plausible person; by default of a random kind (every sixth a child).
 
-        stature: metres; bmi: body mass index, kg/m2, which sets the girths; age: of a child, 4 to 14 years. What is not given is drawn:
+        stature: metres; bmi: body mass index, kg/m2, which sets the girths; age: of a child, 4 to 14 years. Values not given are drawn:
         standard deviations follow ANSUR II (stature 64 and 69 mm, girths about 8 %, biacromial breadth 5 %), children are 6 to 12 years
         old (Snyder et al. 1977). A child of given age or stature has a child's legs and girths (`GROWTH`).
         Raises `SettingsError` if there is no such person.
@@ -112,7 +112,7 @@ class Mannequin:
     def girth_of(self, bmi: float) -> float:
         """The factor on girths that gives a body mass index (kg/m2). Raises `SettingsError` beyond the possible factors.
 
-        Mass goes as stature and the square of girths, but for the head, whose mass goes as the stature alone.
+        Mass is taken as proportional to stature times the square of girths; the head's mass as proportional to stature alone.
         """
         mean, stature = (float(np.interp(self.build, (0, 1), pair)) for pair in (BODY_MASS, STATURE))
         scale = self.stature / stature

@@ -28,7 +28,7 @@ class Loft:
     """One part of the surface."""
 
     segment: str
-    """The segment that carries it, of `SEGMENTS`."""
+    """The segment it moves with, one of `SEGMENTS`."""
     start: Array
     """Start of the axis, of shape (3,), metres, in the segment's frame, from its joint."""
     frame: Array
@@ -44,7 +44,7 @@ class Loft:
     change: float = 9.0
     """Place along the axis where the second material begins, metres."""
     group: str = "trunk"
-    """Of `GROUPS`."""
+    """Group of parts that it blends with, one of `GROUPS`."""
 
     def mirrored(self) -> Loft:
         """The mirrored part on the right."""
@@ -72,13 +72,13 @@ class Surface(NamedTuple):
     table: Array
     """Half width, half depth, centre, sampled evenly along the axis, of shape (P, SAMPLES, 4), metres."""
     length: Array
-    """Of the axes, of shape (P,), metres."""
+    """Lengths of the axes, of shape (P,), metres."""
     caps: Array
-    """Of shape (P, 2), metres."""
+    """Heights of the rounded ends, of shape (P, 2), metres."""
     blend: Array
-    """Of shape (P,), metres."""
+    """Widths of the smooth unions, of shape (P,), metres."""
     change: Array
-    """Of shape (P,), metres."""
+    """Places along the axes where the second material begins, of shape (P,), metres."""
     code: np.ndarray
     """Index into `GROUPS` and twice into `MATERIALS`, of shape (P, 3)."""
 
@@ -99,7 +99,7 @@ class Surface(NamedTuple):
 
 
 def loft_between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **more: Any) -> Loft:
-    """A loft from `start` to `end` (world of the T-pose) on the segment whose joint is `joint`; rows by fraction of length."""
+    """A loft from `start` to `end` on a segment with its joint at `joint` (all (3,), world, T-pose); rows: places as shares of length."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     axis = axis / length
@@ -115,14 +115,14 @@ def frame_of(axis: Array, depth: Array) -> Array:
 
 
 def stations_of(rows: Rows, scale: float = 1.0) -> Array:
-    """Rows filled up to five numbers, the place along the axis times `scale`, from 0."""
+    """`Loft.stations` (n, 5) of rows: missing centres are 0; places along the axis are counted from the first and multiplied by `scale`."""
     table = np.array([(*row, *(5 - len(row)) * (0.0,)) for row in rows], float)
     table[:, 0] = (table[:, 0] - table[0, 0]) * scale
     return table
 
 
 def ellipsoid(segment: str, joint: Array, middle: Array, radii: tuple[float, float, float], **more: Any) -> Loft:
-    """An ellipsoid of half `radii` (x, y, z): a short loft with long caps."""
+    """An ellipsoid with half axes `radii` (x, y, z), metres: a short loft with long caps."""
     half, cap = np.array([0, 0, 0.02 * radii[2]]), 0.98 * radii[2]
     rows: Rows = [(0, radii[0], radii[1]), (1, radii[0], radii[1])]
     return loft_between(segment, joint, middle - half, middle + half, rows, caps=(cap, cap), **more)

@@ -52,7 +52,7 @@ def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
 
 
 def shoulders(body: Mannequin, clothes: Clothes) -> list[Loft]:
-    """From neck to shoulder, moving with the clavicle, and a woman's breasts."""
+    """Lofts from neck to shoulder, moving with the clavicle, and of a woman's breasts."""
     H, joints, neck = body.stature, body.rest(), body.measure("neck") / (2 * np.pi)
     breast, unit = body.measure("chest_depth") / 2 + 0.5 * clothes.looseness, H / 1.75
     shirt = {"materials": ("shirt", "shirt")}

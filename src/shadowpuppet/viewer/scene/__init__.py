@@ -1,1 +1,1 @@
-"""What there is to be shown of runs, recordings, priors and files, as plain data."""
+"""Scenes of runs, recordings, priors and files, as plain data for the viewer."""

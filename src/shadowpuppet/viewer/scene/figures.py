@@ -18,22 +18,22 @@ from shadowpuppet.viewer.scene.scene import Figure
 DOT = 0.06
 """Length of the mark of a joint without bones, metres."""
 MIDPOINTS = {"neck": ("left_shoulder", "right_shoulder"), "pelvis": ("left_hip", "right_hip")}
-"""Joints that, if missing, are put between two others."""
+"""Joints that, if missing, are added midway between two others."""
 
 
 def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, kind: str = "estimate", **more) -> Figure:
-    """A moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `Figure`."""
+    """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `Figure`."""
     places, turns = animation.world()
     return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind, **more)
 
 
 def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, kind: str = "estimate") -> Figure:
-    """A body in poses (T, D); `root` (4, 4): the body's frame to the world."""
+    """Figure of a body in poses (T, D); `root` (4, 4): the body's frame to the world."""
     return animation_figure(name, BodyTree(body).animation(times, poses, root), body_mesh(body), kind)
 
 
 def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -> Figure:
-    """Joints alone: a stick for every bone between them, a dot for each other joint. `more`: fields of `Figure`."""
+    """Figure of joints without a skeleton: a stick for every bone between them, a dot for each other joint. `more`: fields of `Figure`."""
     table = _with_midpoints(table)
     names = list(table.names)
     pairs = [(names.index(a), names.index(b)) for a, b in BONES if a in names and b in names]
@@ -45,7 +45,7 @@ def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -
 
 
 def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]], kind: str, **more) -> Figure:
-    """Sticks between moving points (T, 3), each of its median length."""
+    """Figure of sticks between moving points (T, 3), each of constant length: the median."""
     T, J = len(times), len(ends) + 1
     lengths = [_median(np.linalg.norm(b - a, axis=1)) for a, b, _ in ends]
     offsets = np.zeros((J, 3))
@@ -61,7 +61,7 @@ def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]]
 
 
 def _rotations_along(along: Array) -> Array:
-    """Rotations (T, 3, 3) whose z is along vectors (T, 3), and that turn little about it from frame to frame."""
+    """Rotations (T, 3, 3) with z along vectors (T, 3) and little rotation about z from frame to frame."""
     lengths = np.linalg.norm(along, axis=1, keepdims=True)
     good = np.isfinite(lengths[:, 0]) & (lengths[:, 0] > 1e-9)
     z = np.where(good[:, None], along / np.where(good[:, None], lengths, 1), [0.0, 0.0, 1.0])

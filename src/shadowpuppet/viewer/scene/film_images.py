@@ -57,7 +57,7 @@ class FilmImages:
             return self._masked[1]
 
     def _tried(self, time: float) -> Mask | None:
-        """A silhouette; if that fails, warns once and returns None from then on."""
+        """Silhouette (H, W), or None if there is none. A failure is a warning and sets `trouble`: no more silhouettes are made."""
         try:
             return self._mask(time)
         except (SilhouetteError, VideoError) as error:

@@ -92,7 +92,7 @@ def _still(name: str, body: Body, pose: Array, place: tuple[float, float, float]
 
 
 def _place(n: int, count: int) -> tuple[float, float, float]:
-    """Position in rows behind the origin, seen from the front, +X."""
+    """Position, metres, of the `n`-th of `count` figures in rows behind the origin, seen from the front, +X."""
     columns = max(int(np.ceil(np.sqrt(1.8 * count))), 1)
     row, column = divmod(n, columns)
     return -BEHIND - APART * row, APART * (column - (min(columns, count) - 1) / 2), 0.0

@@ -32,7 +32,7 @@ def recording_scene(path: str | Path, options: Options) -> Scene:
 
 
 def cameras_of(recording: Recording, options: Options, ready: bool | None = None) -> tuple[tuple[SceneCamera, ...], list[Footage], bool]:
-    """The cameras with their films; and whether ready silhouettes are shown, by default if every camera has some."""
+    """The cameras; their footage; and whether ready silhouettes are shown: `ready`, by default whether every camera has some."""
     views = chosen_views(recording, options.camera)
     ready = all(view.masks is not None for view in views) if ready is None else ready
     options = replace(options, masks=ready)
@@ -45,7 +45,7 @@ def frame_times(footage: Sequence[Footage]) -> Array:
     rates = [film.rate if np.isfinite(film.rate) else ASSUMED_RATE for film in (each.film() for each in footage)]
     n = int(np.argsort(rates)[(len(rates) - 1) // 2])
     count = footage[n].count
-    if count is None:  # the film is read once
+    if count is None:  # unknown length: read the whole film once
         return np.array([shot.time for shot in footage[n].frames(ready=False)])
     return np.arange(max(count, 1)) / rates[n]
 

@@ -46,7 +46,7 @@ def run_scene(folder: str | Path, truth: str | Path | None = None, recording: st
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A run and its parts, each made once."""
+    """A run and its parts, each loaded or computed once."""
 
     run: Run
     truth: str | Path | None
@@ -87,7 +87,7 @@ class _Run:
 
     @property
     def known(self) -> dict:
-        """Fields of the estimate's figure."""
+        """Fields of `Figure` for the estimate: status, overlap, joints and their standard deviations."""
         motion = self.run.motion
         return {"status": motion.status, "overlap": motion.overlap, "joints": motion.joints, "joint_sd": motion.joint_sd}
 
@@ -134,12 +134,12 @@ class _Run:
         return tuple(SceneCamera(camera) for camera in read_calibration(path)) if path.exists() else ()
 
     def rerun(self, cameras: tuple[SceneCamera, ...]) -> ParticleRerun:
-        """The filter, run again on single frames."""
+        """The particle filter, to be run again on single frames."""
         return ParticleRerun(self.body, self.run.motion, self.options, cameras)
 
     @staticmethod
     def _tried(problems: list[str], what: str, make):
-        """The result of `make`; None, and a problem, if it fails."""
+        """The result of `make()`; if it fails, None, and a sentence is added to `problems`."""
         try:
             return make()
         except ShadowPuppetError as error:
@@ -150,7 +150,7 @@ class _Run:
 
 
 def errors_of(measured: Evaluation) -> Iterator[Chart]:
-    """Mean and greatest joint error over time, millimetres."""
+    """Chart of mean and greatest joint error over time, millimetres."""
     if measured.errors is None or measured.table is None:
         return
     errors = 1000 * np.where(measured.errors.known & ~measured.errors.lost, measured.errors.distance, np.nan)
@@ -161,13 +161,13 @@ def errors_of(measured: Evaluation) -> Iterator[Chart]:
 
 
 def fit_of(motion: Motion) -> Iterator[Chart]:
-    """Overlap of the drawn body and the silhouettes."""
+    """Chart of the overlap of the drawn body and the silhouettes."""
     if np.isfinite(motion.overlap).any():
         yield Chart("overlap", "of 1", motion.times, {"overlap": motion.overlap})
 
 
 def angles_of(motion: Motion) -> Iterator[Chart]:
-    """Degrees of freedom over time, degrees or metres; a chart each for limbs, trunk and head, and position."""
+    """Charts of the degrees of freedom over time, degrees or metres: one each for limbs, trunk and head, and position."""
     groups: dict[tuple[str, str], dict[str, Array]] = {}
     for name, values in zip(motion.dof_names, motion.poses.T):
         unit = "m" if dof_unit(name) == "m" else "°"

@@ -1,4 +1,4 @@
-"""A frame's particles: the run does not keep them, so that its filter is run again on that frame, from the pose before it."""
+"""Particles of a frame. A run does not store them, so its filter runs again on that frame, from the pose of the frame before."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from shadowpuppet.tracking.resampling import normalise
 from shadowpuppet.viewer.scene.scene import Ellipsoids, ParticleCloud, SceneCamera
 
 SEED = 0
-"""Makes the particles of a frame the same every time."""
+"""Seed, so that the particles of a frame are the same every time."""
 SHORTEST_AXIS = 1e-4
 """Shortest axis of an ellipsoid, metres."""
 
@@ -31,8 +31,8 @@ SHORTEST_AXIS = 1e-4
 class ParticleRerun:
     """`rerun(time)`: particles of the frame nearest to a time (s); None if it has no silhouette, or it or the one before has no pose.
 
-    The run does not keep its particles: the same filter runs again, with the same settings, from the run's pose a frame before; with
-    several cameras by plain dynamics, without a motion prior.
+    The run's filter runs again with the same settings, from the run's pose a frame before; with several cameras by plain dynamics,
+    without a motion prior.
     """
 
     def __init__(self, body: Body, motion: Motion, options: Options, cameras: Sequence[SceneCamera]) -> None:
@@ -107,7 +107,7 @@ class ParticleRerun:
         return VisualHull([each.camera for each in self.cameras], self.options.multiview.hull)
 
     def _root(self) -> Array:
-        """From the body's frame to the world (4, 4)."""
+        """Transform (4, 4) from the body's frame to the world."""
         known = self.motion.known
         if not known.any():
             raise ShadowPuppetError("found no frame with a pose, expected one at least")

@@ -50,7 +50,7 @@ class HullPoints(NamedTuple):
     points: Array
     """World, metres, of shape (P, 3)."""
     cameras: NDArray[np.int64]
-    """Index of the camera on whose contour each point lies, of shape (P,)."""
+    """Index of the camera that each point was found with (it lies on that camera's contour), of shape (P,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +206,7 @@ class Scene:
 
     @cached_property
     def floor(self) -> float:
-        """Height of the floor, metres: 0 if people stand about there, else below the lowest joint."""
+        """Height of the floor, metres: 0 if the lowest joint is near it, else below the lowest joint."""
         low = float(self.box[0][2])
         return 0.0 if -0.15 < low < 0.35 else low - 0.1
 

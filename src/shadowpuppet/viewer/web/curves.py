@@ -21,7 +21,7 @@ HEIGHT = 170
 
 
 class CurvePlot:
-    """A plot of one chart, which the user chooses."""
+    """A plot of one chart, chosen by the user."""
 
     def __init__(self, server: viser.ViserServer, charts: Sequence[Chart], first: Chart) -> None:
         """`first`: the chart shown at first."""
@@ -39,12 +39,12 @@ class CurvePlot:
         return self.charts[self.choice.value]
 
     def to(self, now: float) -> None:
-        """Plot around a time, seconds."""
+        """Plot the curves around the time `now`, seconds."""
         self.now = now
         self.plot.data = data_around(self.chart, now)
 
     def _replace(self) -> None:
-        """Plot another chart."""
+        """Replace the plot by that of the chosen chart."""
         chart, low, high = self.chart, *limits(self.chart)
         names = list(chart.curves)[: len(COLOURS)]
         series = [{"label": "s"}, *({"label": name, "stroke": COLOURS[n], "width": 1.6, "points": {"show": False}} for n, name in
@@ -69,7 +69,7 @@ def limits(chart: Chart) -> tuple[float, float]:
 
 
 def data_around(chart: Chart, now: float) -> tuple[Array, ...]:
-    """Times (K,), the curves there, and the vertical line at `now`: NaN but at two equal times."""
+    """Times (K,), the curves' values at them, and a vertical line at `now`: NaN except at two equal times."""
     low, high = limits(chart)
     near = np.flatnonzero(np.abs(chart.times - now) <= AROUND)
     before, after = near[chart.times[near] <= now], near[chart.times[near] > now]

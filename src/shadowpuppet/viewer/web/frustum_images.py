@@ -1,4 +1,4 @@
-"""Images of a camera as its frustum shows them."""
+"""Images shown in a camera's frustum: undistorted pictures and silhouettes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def frustum_image(images: CameraImages, undistort: Undistorter, time: float, mod
 
 
 class Undistorter:
-    """Makes pictures of a camera into those of a pinhole camera with a central axis, scaled: those of a frustum."""
+    """Undistorts and scales a camera's pictures: to those of a pinhole camera with a central principal point, as a frustum needs them."""
 
     def __init__(self, camera: Camera, width: int) -> None:
         """`width`: of the result, pixels."""

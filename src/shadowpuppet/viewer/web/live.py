@@ -1,4 +1,4 @@
-"""A live session in space: the puppet, the camera and what it sees, on the viewer's page, with the session's buttons."""
+"""A live session in 3D on the viewer's page: the puppet, the camera and its picture, and the session's buttons."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
 from shadowpuppet.viewer.web.server import address_of, close_server, open_server
 
 MOST_A_SECOND = 10.0
-"""Views that are drawn a second; more cost the tracker time."""
+"""Greatest number of views drawn per second; more would slow the tracker."""
 BUTTONS = {"Stop": "stop", "Learn the background anew": "learn", "Measure the person anew": "measure"}
 WIDE, QUALITY = 320, 80
-"""Pixels of the picture's width, and how well it is kept."""
+"""Width of the picture, pixels, and its JPEG quality."""
 
 
 class ViewerDisplay(Display):
-    """Serves the viewer's page from its `with` block's beginning to its end; it is drawn by a thread of its own, the newest view only."""
+    """Display on the viewer's page, served until the end of its `with` block. A thread draws the newest view; older ones are dropped."""
 
     def __init__(self, listen: str = "127.0.0.1", port: int | None = None, footer: str = "") -> None:
-        """`footer`: what the page says at its foot. Raises as `open_server` does."""
+        """`footer`: text below the controls. Raises the errors of `open_server`."""
         self.server = open_server(listen, port)
         self.where = f"at {address_of(self.server)}"
         gui = self.server.gui
@@ -51,12 +51,12 @@ class ViewerDisplay(Display):
         self._stage: _LiveScene | None = None
 
     def __enter__(self) -> Self:
-        """Begin to draw."""
+        """Start the drawing thread."""
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Draw the last view, and close."""
+        """End the drawing thread and close the server."""
         with self._changed:
             self._over = True
             self._changed.notify_all()
@@ -64,15 +64,15 @@ class ViewerDisplay(Display):
         close_server(self.server)
 
     def show(self, view: View) -> None:
-        """The next view; what was not drawn is left out."""
+        """Pass the next view to the drawing thread; it replaces one that is not yet drawn."""
         if view.image is None and not view.trouble and view.phase == self._phase:
-            return  # nothing new: what was seen last stays
+            return  # nothing new: the last view stays
         with self._changed:
             self._view, self._phase = view, view.phase
             self._changed.notify_all()
 
     def command(self) -> str:
-        """The last button that was pressed."""
+        """Command of the last button pressed since the last call; empty if none was."""
         command, self._command = self._command, ""
         return command
 
@@ -105,7 +105,7 @@ class ViewerDisplay(Display):
 
 
 class _LiveScene:
-    """What there is to be drawn once a person is known; made anew when they are measured anew."""
+    """Puppet and camera of a measured person in the viewer; a new measurement makes a new one."""
 
     def __init__(self, server: Any, picture: Picture) -> None:
         self.picture = picture
@@ -116,7 +116,7 @@ class _LiveScene:
         server.scene.reset()
         show = Scene(title="live", times=np.zeros(1), figures=(self.figure,), cameras=(SceneCamera(picture.camera),))
         self.stage = SceneView(server, show, ViewOptions(), width=WIDE)
-        for client in server.get_clients().values():  # who looks already
+        for client in server.get_clients().values():  # pages that are already open
             client.camera.position, client.camera.look_at = show.viewpoint, show.middle
         self.plain = Undistorter(picture.camera, WIDE)
 
@@ -134,7 +134,7 @@ class _LiveScene:
         self.stage.server.flush()
 
     def _fitted(self, image: np.ndarray) -> np.ndarray:
-        """A picture of any size as the frustum has it."""
+        """A picture of any size, undistorted and scaled for the frustum."""
         import cv2
 
         width, height = self.picture.camera.size
@@ -142,19 +142,19 @@ class _LiveScene:
 
 
 def open_viewer(listen: str = "127.0.0.1", port: int | None = None, record: bool = False) -> ViewerDisplay:
-    """The display for `--show viewer`. Raises `SettingsError` where it cannot be had there, `ShadowPuppetError` without viser."""
+    """The display for `--show viewer`. Raises `SettingsError` if the address or port is not free, `ShadowPuppetError` without viser."""
     return ViewerDisplay(listen, port, FOOTERS[record])
 
 
 def posed(body: Body, tree: BodyTree, mesh: Any, pose: Array, root: Array) -> Figure:
-    """A body in one pose (D,), its frame at `root` (4, 4) in the world."""
+    """Figure of a body in one pose (D,); `root` (4, 4): the body's frame to the world."""
     animation = tree.animation(np.zeros(1), np.asarray(pose, float)[None], root)
     places, turns = animation.world()
     return Figure(body.name, animation.times, mesh, animation.rest, places, turns)
 
 
 def _small(image: np.ndarray) -> np.ndarray:
-    """A picture (H, W, 3) blue green red as the page has it: of its width, red green blue."""
+    """A picture (H, W, 3), blue green red, scaled to the page's width, red green blue."""
     import cv2
 
     height, width = image.shape[:2]
@@ -162,7 +162,7 @@ def _small(image: np.ndarray) -> np.ndarray:
 
 
 def words(view: View) -> str:
-    """A view's state and figures, for the head of the page."""
+    """Status line of a view: its phase, message, latency, frame rate, overlap and countdown."""
     figures = view.figures()
     said = [f"**{figures['chip']}**", figures["message"]]
     if figures["latency"] is not None:

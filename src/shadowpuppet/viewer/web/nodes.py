@@ -32,7 +32,7 @@ class FigureNodes:
     """Nodes of a figure: a skinned mesh for each colour."""
 
     def __init__(self, server: viser.ViserServer, figure: Figure, name: str, transparent: bool) -> None:
-        """`transparent` from the start: the page rebuilds a mesh that changes later, which would show in a file at every loop."""
+        """`transparent`: set at the start, as the page rebuilds a mesh if this changes; in a file that would be visible at every loop."""
         self.figure = figure
         self.frame = server.scene.add_frame(name, show_axes=False, position=figure.shift)
         mesh, opacity = figure.mesh, TRANSPARENT_OPACITY if transparent and figure.kind != "truth" else None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MAX_RATE = 30.0
 """Highest drawing rate, frames/s."""
 FREE = "free"
-"""The choice of no camera to look through."""
+"""Menu entry for looking through no camera."""
 NAMES = {"estimate": "puppet", "truth": "truth", "other": "the other run", "mean": "mean postures"}
 """Names of figures by kind."""
 PLOT_WIDTH = 320
@@ -51,7 +51,7 @@ class Panel:
         self._commands()
 
     def follow(self, done: Callable[[], bool] = lambda: False) -> None:
-        """Draw as the timeline and the controls say, until `stop` is called or `done` returns True."""
+        """Keep drawing the frame and layers chosen by timeline and controls, until `stop` is called or `done` returns True."""
         while not (done() or self._done):
             began = time.monotonic()
             self.draw()
@@ -241,5 +241,5 @@ def _value(chart: Chart, now: float) -> str:
 
 
 def _plain(text: str) -> str:
-    """Escaped text: names come from files of others."""
+    """Text escaped for HTML: names may come from other people's files."""
     return html.escape(str(text), quote=True)

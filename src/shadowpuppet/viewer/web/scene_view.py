@@ -1,4 +1,4 @@
-"""A scene drawn with viser: its nodes are made once and then set to one time after another."""
+"""A scene drawn with viser: its nodes are created once and updated for each time."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ViewOptions:
     """Ellipsoids of the stated uncertainty; of the spread of the particles if the run states none."""
     particles: bool = False
     through: int | None = None
-    """Index of the camera that is looked through."""
+    """Index of the camera from which the scene is seen; None: from a free viewpoint."""
 
 
 class SceneView:
@@ -73,9 +73,9 @@ class SceneView:
         server.initial_camera.up = (0.0, 0.0, 1.0)
 
     def to(self, time: float) -> None:
-        """Set everything that `options` show to a time, seconds; all at once, after it was read or computed."""
+        """Show everything chosen by `options` at a time, seconds: read and compute it, then update all nodes at once."""
         self.time = time
-        if not self._warm:  # learning the backgrounds takes a while, for which the figures need not wait
+        if not self._warm:  # learning the backgrounds is slow: show the figures before
             self.people(time)
         mode = self.options.pictures
         images = list(self._pool.map(lambda frustum: frustum.image(time, mode), self.frustums)) if self.options.cameras else []
@@ -94,7 +94,7 @@ class SceneView:
 
     @property
     def reads_first(self) -> bool:
-        """Whether the next call of `to` learns backgrounds first."""
+        """Whether the next call of `to` has to learn backgrounds."""
         return not self._warm and self.options.cameras and any(each.images is not None for each in self.scene.cameras)
 
     def people(self, time: float) -> None:
@@ -116,7 +116,7 @@ class SceneView:
                 figure.set_opacity(TRANSPARENT_OPACITY if transparent else None)
 
     def look_through(self, n: int | None) -> None:
-        """Move the image of camera `n` behind the figures, to be looked through; None: of no camera."""
+        """Move the image of camera `n` behind the figures, for a view from that camera; None: move every image to its frustum."""
         self.options.through = n
         for k, frustum in enumerate(self.frustums):
             distance = float(np.linalg.norm(self.scene.cameras[k].camera.centre - self.scene.middle))
@@ -136,12 +136,12 @@ class SceneView:
         return float(np.clip(share * self.scene.size, *FRUSTUM_LENGTHS))
 
     def _particles(self, time: float, unstated: bool) -> ParticleCloud | None:
-        """Particles, if they or, without a stated uncertainty, their spread are shown."""
+        """Particles at a time, s; None unless they are shown, or their spread is in place of an uncertainty that the run does not state."""
         wanted = self.options.particles or (self.options.uncertainty and unstated)
         return self.scene.cloud(time) if wanted and self.scene.cloud is not None else None
 
     def _stated(self, time: float) -> Ellipsoids | None:
-        """The uncertainty that the run states, if it is shown."""
+        """The uncertainty stated by the run at a time, s; None if it is not shown or not stated."""
         for figure in self.scene.figures if self.options.uncertainty else ():
             n = figure.at(time) if figure.kind == "estimate" else None
             if n is not None and (stated := figure.uncertainty(n)) is not None:

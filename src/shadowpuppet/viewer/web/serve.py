@@ -33,7 +33,10 @@ def serve_scene(scene: Scene, listen: str = "127.0.0.1", port: int | None = None
 
 @contextmanager
 def serving(scene: Scene, options: ViewOptions, **more: int) -> Iterator[tuple[str, Panel]]:
-    """Serve a scene in a thread of its own: the page's address and its controls. `more`: of `SceneView`. Raises as `serve_scene`."""
+    """Serve a scene from a thread; yields the page's address and its controls.
+
+    `more`: arguments of `SceneView`. Raises the errors of `serve_scene`.
+    """
     server = open_server(port=0)
     panel = Panel(server, SceneView(server, scene, options, **more))
     thread = threading.Thread(target=panel.follow)

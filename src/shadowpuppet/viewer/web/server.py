@@ -1,4 +1,4 @@
-"""A viser server that this machine serves to itself: no other site's page can look at what it shows."""
+"""A viser server that pages of other sites cannot read; by default only this machine can reach it."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     import viser
 
 PORT = 8610
-"""Tried first where none is asked for."""
+"""Port tried first if none is given."""
 POLICY = ("default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; worker-src blob: data:; "
           "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; connect-src 'self' data: blob:; "
           "base-uri 'none'; form-action 'none'")  # fmt: skip
-"""What a browser may fetch for the page: what is in it, and from where it came."""
+"""Content security policy of the page: a browser fetches only what the page contains, or what comes from its own server."""
 HEADERS = page_headers(POLICY)
 _starting = threading.Lock()
 _leaving: dict[viser.ViserServer, Callable[[], None]] = {}
-"""What stops each open server where the program ends before somebody else did."""
+"""Exit handlers of the servers that are still open."""
 
 
 def check_viser() -> None:
-    """Raise `ShadowPuppetError` where viser is not installed."""
+    """Raise `ShadowPuppetError` if viser is not installed."""
     import importlib.util
 
     if importlib.util.find_spec("viser") is None:
@@ -39,9 +39,9 @@ def check_viser() -> None:
 
 
 def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.ViserServer:
-    """A server at an address and port: that asked for, else `PORT` or any that is free. To be stopped by `close_server`.
+    """Start a server at an address and port, by default `PORT` or any that is free; stop it with `close_server`.
 
-    Raises `SettingsError` where it cannot be had there, `ShadowPuppetError` without viser. Warns where others can reach it.
+    Raises `SettingsError` if the address or port is not free, `ShadowPuppetError` without viser. Warns if other machines can reach it.
     """
     check_viser()
     import viser
@@ -56,7 +56,7 @@ def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.Vis
             close_server(server)
             raise ShadowPuppetError(f"the page cannot be served at port {free}: " + (
                 "it was taken just now" if installed() else f"this version of viser, {viser.__version__}, cannot be kept from other sites"))
-    server.request_share_url = lambda verbose=True: None  # nothing is shared over the network, whoever asks
+    server.request_share_url = lambda verbose=True: None  # disables viser's public share links
     if not is_loopback(listen):
         warnings.warn(f"the page is served at {listen}: everybody who reaches this machine can see what it shows", ShadowPuppetWarning,
                       stacklevel=2)
@@ -64,7 +64,7 @@ def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.Vis
 
 
 def close_server(server: viser.ViserServer) -> None:
-    """Stop a server; nothing where it was stopped before."""
+    """Stop a server; does nothing if it was stopped before."""
     leave = _leaving.pop(server, None)
     if leave is not None:
         atexit.unregister(leave)
@@ -73,16 +73,16 @@ def close_server(server: viser.ViserServer) -> None:
 
 
 def address_of(server: viser.ViserServer) -> str:
-    """Where a browser finds it."""
+    """Address of a server for a browser."""
     return f"http://{shown_host(server.get_host())}:{server.get_port()}/"
 
 
 @contextlib.contextmanager
 def guarded(loopback: bool) -> Iterator[Callable[[], bool]]:
-    """Within it, servers that begin ask each request whence it comes: a page of another site, or a name that leads here by another's doing,
-    is refused. Gives a function that says whether one did begin so.
+    """Context in which newly started servers check the origin of each request. They refuse pages of other sites, and other host names that
+    were made to resolve to this machine (DNS rebinding). Yields a function that returns whether such a server was started.
 
-    viser has no setting for that, and a WebSocket is open to pages of all sites: so the function that opens it is wrapped.
+    viser has no setting for this, and a WebSocket is open to pages of all sites: so the function that opens it is wrapped.
     """
     import websockets.asyncio.server as library
 
@@ -100,7 +100,7 @@ def guarded(loopback: bool) -> Iterator[Callable[[], bool]]:
 
 
 def _asking(answer: Any, loopback: bool) -> Any:
-    """A function that answers a request, for ours alone."""
+    """A request handler that refuses foreign requests, passes the others to `answer`, and adds `HEADERS` to its responses."""
     from http import HTTPStatus
 
     def asking(connection: Any, request: Any) -> Any:
@@ -116,7 +116,7 @@ def _asking(answer: Any, loopback: bool) -> Any:
 
 
 def _free_port(listen: str, port: int | None) -> int:
-    """A free port: `port`, or if it is None `PORT` or any. Raises `SettingsError` where there is none."""
+    """A free port: `port`, or if it is None `PORT` or any. Raises `SettingsError` if there is none."""
 
     def probed(tried: int) -> int:
         with socket.socket(address_family(listen), socket.SOCK_STREAM) as probe:
@@ -129,6 +129,6 @@ def _free_port(listen: str, port: int | None) -> int:
 
 @contextlib.contextmanager
 def _silent() -> Iterator[None]:
-    """viser prints of itself."""
+    """Context that suppresses what viser prints."""
     with contextlib.redirect_stdout(io.StringIO()):
         yield

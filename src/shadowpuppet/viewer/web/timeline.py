@@ -1,4 +1,4 @@
-"""A timeline: the current frame, by a clock, a speed, and the user's commands."""
+"""The viewer's timeline: the current frame, determined by a clock, the playback speed and the user's commands."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Timeline:
 
     @property
     def playing(self) -> bool:
-        """Whether it plays."""
+        """Whether the timeline is playing."""
         return self._began is not None
 
     @property
