@@ -24,7 +24,7 @@ from shadowpuppet.cli.tables import show
 from shadowpuppet.errors import BROKEN
 
 OLDEST_PYTHON = (3, 11)
-MODULES = {"av": "av", "opencv-python-headless": "cv2", "tomli-w": "tomli_w"}
+MODULES = {"opencv-python-headless": "cv2", "python-osc": "pythonosc"}
 """Import names of distributions, where they differ."""
 EXTRAS = {
     "view": (("viser",), "the viewer"), "report": (("matplotlib",), "pages and plots about runs"),
