@@ -48,6 +48,13 @@ def test_a_picture_too_dark_to_tell_is_left_as_it_is():
     assert Light(scene).normalised(black) is black
 
 
+def test_a_channel_that_shows_no_gain_has_that_of_the_others():
+    scene = scene_of()
+    scene[..., 2] = 5  # a blue room: red is noise
+    found = Light(scene).gains(filmed(scene, (1.2, 1.3, 1.3)))
+    np.testing.assert_allclose(found, (1.2, 1.3, np.sqrt(1.2 * 1.3)), rtol=0.02)
+
+
 def test_clipped_pixels_of_a_bright_scene_are_not_taken_for_a_person():
     scene = scene_of()
     scene[:20] = 225

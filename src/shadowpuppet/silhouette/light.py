@@ -14,8 +14,8 @@ SAMPLED = 5000
 """Number of pixels, on a grid, from which a gain is estimated."""
 DARK, BRIGHT = 40, 245
 """Grey levels between which a pixel shows the gain: below, it is noise; above, it may be clipped."""
-MIN_PIXELS = 300
-"""Least number of such pixels."""
+MIN_SHARE = 0.25
+"""Least share of such pixels in a channel whose own gain is estimated."""
 CLIPPED = 254
 """Grey level from which a pixel of the frame counts as clipped."""
 BINS, BIN = 512, 0.008
@@ -38,14 +38,17 @@ class Light:
     def gains(self, image: Image) -> NDArray[np.float64]:
         """Gain of each channel (C,) of a picture like the scene: the mode of the ratio picture to scene over pixels.
 
-        The mode is the background's even if the person covers nearly half of the picture. The gain is 1 if too few pixels show it.
+        The mode is the background's even if the person covers nearly half of the picture. A channel in which too few pixels
+        show a gain, such as red in a blue room, has the mean of the others; all have 1 if no channel shows one.
         """
         levels, informative = self._sampled
         step = self._step
         after = image[::step, ::step].reshape(levels.shape)
         informative = informative & (after > DARK // 2) & (after < BRIGHT)
         bins = np.rint((LOG[after] - levels) / BIN).astype(np.intp) + BINS // 2
-        return np.array([_mode(bins[use, c]) for c, use in enumerate(informative.T)])
+        logs = np.array([_mode(bins[use, c]) if use.mean() >= MIN_SHARE else np.nan for c, use in enumerate(informative.T)])
+        known = np.isfinite(logs)
+        return np.exp(np.where(known, logs, logs[known].mean() if known.any() else 0.0))
 
     def normalised(self, image: Image) -> Image:
         """The picture divided by its gains; the picture itself if they are negligible.
@@ -80,9 +83,7 @@ LOG = np.log(np.maximum(np.arange(256), 1)).astype(np.float32)
 
 
 def _mode(bins: NDArray[np.intp]) -> float:
-    """The gain at the mode of log gains, given as histogram bins; by mean shift from the fullest part of the histogram."""
-    if len(bins) < MIN_PIXELS:
-        return 1.0
+    """The mode of log gains, given as histogram bins; by mean shift from the fullest part of the histogram."""
     counts = np.bincount(np.clip(bins, 0, BINS - 1), minlength=BINS).astype(float)
     total, moment = (np.concatenate([[0], np.cumsum(values)]) for values in (counts, counts * np.arange(BINS)))
     narrow = WINDOW // 3
@@ -90,4 +91,4 @@ def _mode(bins: NDArray[np.intp]) -> float:
     for _ in range(SHIFTS):
         first, last = max(0, round(middle) - WINDOW), min(BINS, round(middle) + WINDOW + 1)
         middle = (moment[last] - moment[first]) / (total[last] - total[first])
-    return float(np.exp((middle - BINS // 2) * BIN))
+    return (middle - BINS // 2) * BIN
