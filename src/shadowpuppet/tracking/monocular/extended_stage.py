@@ -1,6 +1,6 @@
-"""What our default adds to a stage of Liu 2011: costs beside eq. 2, candidates beside the particles, the mean as estimate.
+"""Extensions of a stage of Liu 2011 in the default preset: further costs, further candidates, and the mean as estimate.
 
-All of it is off in the preset `liu2011`, whose stages are plain `FilterStage`s.
+All are off in the preset `liu2011`, which has plain `FilterStage`s.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from shadowpuppet.tracking.silhouette_cost import Cost, Observation
 TORSO_SPREAD, LIMB_SPREAD = 0.3, 0.2
 """Standard deviations (rad) of explored candidates: the torso's angles about upright, a limb's about a coarse posture."""
 MEAN_TEMPERATURE = 50.0
-"""For the mean estimate: a particle whose cost is this much higher (pixels at 320 x 240) weighs 1/e."""
+"""For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
 
 
 def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None) -> FilterStage:

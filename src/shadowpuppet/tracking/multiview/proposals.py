@@ -1,4 +1,4 @@
-"""Poses proposed for the next frame: by the motion prior (Ni 2008, V-A, step 3), and by noise where there is none or the settings ask."""
+"""Poses proposed for the next frame: by the motion prior (Ni 2008, V-A, step 3), and by noise without a prior or if the settings say so."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Proposals:
     """Draws poses of a skeleton. Raises `ShadowPuppetError` for a motion prior of another body."""
 
     def __init__(self, skeleton: Skeleton, settings: MultiviewSettings, prior: MotionPrior | None = None) -> None:
-        """`prior`: of poses at the film's rate."""
+        """`prior`: motion prior at the film's frame rate."""
         self.skeleton, self.settings, self.prior = skeleton, settings, prior
         sigma = [settings.sigma_heading if dof.name == "root_heading" else settings.sigma_translation if dof.kind == "translation"
                  else settings.sigma_rotation for dof in skeleton.dofs]  # fmt: skip
@@ -42,8 +42,11 @@ class Proposals:
                  mismatch: Callable[[Array], Array], scale: float = 1.0) -> tuple[Array, Regions]:
         """Poses x (N, D) and states s (N,) for the next frame, from the selected particles.
 
-        The first proposal by noise is the estimate `last` (D,). `velocity` (D,) is the last frame's motion; `mismatch` the silhouette cost
-        (M,) of poses (M, D), for `Exploration`; `scale` that of all noise but the prior's own.
+        Args:
+            last: the last estimate (D,), which is the first proposal by noise.
+            velocity: the estimate's change (D,) in the last frame.
+            mismatch: silhouette cost (M,) of poses (M, D), for `Exploration`.
+            scale: factor of all noise except the prior's own.
         """
         number, out = len(particles.poses), self._moved_on(particles.poses, velocity)
         regions = np.full(number, NO_REGION)
@@ -52,13 +55,13 @@ class Proposals:
             out[:noisy] = self.by_noise(rng, out[:noisy], mismatch, scale)
             out[0] = self._moved_on(last[None], velocity)[0]
         if noisy < number:
-            # With proposals by noise many selected particles have no state: the nearest region stands for all. None has one after a search.
+            # Selected particles have no state after a search, and many have none with proposals by noise: then all take the nearest region.
             carried = particles.regions if not noisy and len(particles.regions) else regions
             out[noisy:], regions[noisy:] = self.by_prior(rng, out[noisy:], carried[noisy:], scale)
         return self.skeleton.clamp(out), regions
 
     def by_prior(self, rng: np.random.Generator, poses: Array, regions: Regions, scale: float = 1.0) -> tuple[Array, Regions]:
-        """Poses (N, D) and regions (N,) by the motion prior (eqs. 24-28). What it does not model of the root moves by a Gaussian walk."""
+        """Poses (N, D) and regions (N,) by the motion prior (eqs. 24-28). Root DOF that it does not model move by a Gaussian walk."""
         assert self.prior is not None
         out, walk, modelled = poses.copy(), np.setdiff1d(self.root, self.modelled), poses[:, self.modelled]
         regions = np.where(regions == NO_REGION, self.prior.encode(modelled).regions, regions)
@@ -74,7 +77,7 @@ class Proposals:
         return self.exploration(rng, poses, mismatch, scale)
 
     def _moved_on(self, poses: Array, velocity: Array) -> Array:
-        """Poses (N, D) whose place and heading go on at the `velocity` (D,) of the last frame."""
+        """Poses (N, D) with position and heading advanced by the settings' share of `velocity` (D,)."""
         out = poses.copy()
         out[:, self.root] += self.settings.velocity * velocity[self.root]
         return out
