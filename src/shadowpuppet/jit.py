@@ -12,7 +12,7 @@ BLOCK = 32
 KERNEL_OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "error_model": "numpy"}
 """Kernels get all arrays from their caller and allocate none, so Numba's reference counts are off: where arrays are sliced in inner loops,
 counting took longer than the work. Division checks are off, which would prevent vectorisation: no kernel divides by zero. The GIL is
-released, so several cameras are worked on at once; a caller that reuses work arrays must lock them.
+released, so several cameras are processed at once; a caller that reuses work arrays must lock them.
 
 Numba's cache only notices changes of a kernel's own file: after a change in a file that the kernel calls into, remove `__pycache__`."""
 

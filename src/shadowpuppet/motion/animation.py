@@ -58,7 +58,7 @@ class Animation:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Indices of the joints, except the root, that move relative to their parent."""
+        """Indices of the joints, except the root, whose position relative to the parent changes."""
         strays = np.abs(self.shifts[self.known] - self.offsets).max((0, 2), initial=0.0)
         return tuple(j for j in range(1, len(self.names)) if strays[j] > SAME_PLACE)
 

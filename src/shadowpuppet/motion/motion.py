@@ -68,8 +68,8 @@ class MotionFrame(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """A tracked motion; `motion[10:20]` is a part of it. Unknown values are not a number; poses and joints of lost and absent frames
-    always are. Raises `ShadowPuppetError` for wrong shapes, times that do not increase, or an unknown status."""
+    """A tracked motion; `motion[10:20]` is a part of it. Unknown values are not a number, and so are all poses and joints of lost
+    and absent frames. Raises `ShadowPuppetError` for wrong shapes, times that do not increase, or an unknown status."""
 
     body_name: str
     dof_names: tuple[str, ...]

@@ -10,7 +10,7 @@ import numpy as np
 SETTLE_CYCLES = 10
 """Number of estimation cycles on the same frame after a search."""
 OVERLAP_DROP = 0.2
-"""With several cameras, a search starts if the overlap falls by more than this in a frame: even a wrong pose may overlap too much for `lost`."""
+"""With several cameras, a fall of the overlap by more than this in a frame starts a search: wrong poses may overlap too much for `lost`."""
 
 
 class TrackerState(Protocol):

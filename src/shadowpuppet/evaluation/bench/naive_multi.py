@@ -1,7 +1,7 @@
 """A naive version of Ni 2008's refinement (V-B) in NumPy: all points at once, part by part, one degree of freedom after another.
 
 The distance of a point to a part is of first order, as in the kernels: the level of the part's own function over the length of its
-gradient. From it come the paper's eqs. 29-41, and the normal equations of the distances to tangent planes.
+gradient. It is used in the paper's eqs. 29-41 and in the normal equations of the distances to tangent planes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FLAT = 1e-4
 
 
 class Surface(NamedTuple):
-    """Closest points of points to one part, or of each to its own part."""
+    """The points on one part, or on each point's own part, that are closest to some points."""
 
     distance: Array
     """Signed, negative inside, of shape (P,), metres."""
@@ -96,7 +96,7 @@ def _moved(skeleton: Skeleton) -> NDArray[np.bool_]:
 
 
 def closest(limbs: Limbs, s: int, T: Array, points: Array) -> Surface:
-    """Closest points of points (P, 3), world, to part `s`, whose joint has the transform T (4, 4)."""
+    """The points on part `s` closest to points (P, 3), world; T (4, 4): the transform of the part's joint."""
     R = T[:3, :3] @ limbs.rotations[s]
     origin = T[:3, :3] @ limbs.starts[s] + T[:3, 3]
     distance, feet, normals = _closest((points - origin) @ R, limbs.lengths[s], limbs.shears[s], limbs.radii[s], limbs.caps[s])

@@ -33,7 +33,7 @@ SPACING = 0.5
 MAX_VIEWS = 5
 """Cameras shown side by side: those that see the person largest."""
 MAX_WIDTH = 1280
-"""Of a picture in the page, pixels."""
+"""Largest width of a picture in the page, pixels."""
 MIN_HEIGHT = 440
 """Height of a picture at which thin lines look good, pixels."""
 QUALITY = 82

@@ -41,7 +41,7 @@ class Proposal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MotionPrior:
-    """A learnt model of motion. Raises `ShadowPuppetError` for arrays that do not fit together and for numbers that are no probabilities."""
+    """A learnt model of motion. Raises `ShadowPuppetError` for arrays that do not fit together and for invalid probabilities."""
 
     subspaces: Subspaces
     """M regions of poses of D numbers."""

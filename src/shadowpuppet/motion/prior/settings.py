@@ -24,7 +24,7 @@ class PriorSettings:
     tolerance: NonNegative = 1e-4
     """Learning ends with a round that improves the error by less than this share, or the log likelihood per frame by less than this."""
     noise: Positive = 1e-3
-    """Smallest variance in any direction, as a share of the training poses' mean variance: regions of few frames have none in most directions."""
+    """Smallest variance in any direction, as a share of the training poses' mean variance: small regions have none in most directions."""
     leave: Annotated[float, Field(ge=0, lt=1)] = 0.01
     """Smallest share of the transitions from a region that is spread over all regions, so that the filter can leave any region."""
     dofs: Literal["articulation", "all"] = "articulation"

@@ -34,7 +34,7 @@ Measured = TypeVar("Measured", bound=Sizes)
 SIZE_STEP = 1e-3
 """Step (m) of the finite differences with respect to the sizes."""
 POINT_NOISE, INDEPENDENT_POINTS = 0.01, 30.0
-"""Standard deviation (m) of a surface point from its body; effective number of independent points per frame (neighbours' errors correlate)."""
+"""Standard deviation (m) of a surface point from its body; effective number of independent points per frame (neighbours correlate)."""
 ROUNDS = 10
 MAX_SIZE_STEP, MAX_POSE_STEP = 0.03, 0.3
 """Largest step of a size (m) and of a DOF (rad or m) in a round."""
