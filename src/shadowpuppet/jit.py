@@ -1,4 +1,4 @@
-"""Numba decorators of the kernels, and how many poses a kernel works on at once."""
+"""Numba decorators of the kernels, and the number of poses that a kernel processes at once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Numba's cache only notices changes of a kernel's own file: after a change in a f
 
 
 def compiled(**options: Any) -> Callable[[Any], Any]:
-    """Numba's `njit` with its cache on disk, or without it where the folder cannot be written."""
+    """Numba's `njit` with its cache on disk, or without a cache if the folder cannot be written."""
 
     def made(function: Any) -> Any:
         try:

@@ -176,7 +176,7 @@ class CylinderSizes(BoneSizes):
 
 @dataclass(frozen=True)
 class AnatomicalSizes(BoneSizes):
-    """Sizes of `anatomical`: the bones, and widths (girth / pi where a limb is round)."""
+    """Sizes of `anatomical`: the bones, and widths (girth / pi for round limbs)."""
 
     lumbar_height: float
     """From the pelvis up to the joint of the chest."""

@@ -38,7 +38,7 @@ from shadowpuppet.motion.synchronization import at_common_times, at_times, find_
 
 @dataclass(frozen=True)
 class Comparison:
-    """How a run is compared with its truth."""
+    """Options of a comparison of a run with its truth."""
 
     joints: Sequence[str] | None = None
     """Joints to compare, or names of `metrics.GROUPS`; None: `metrics.default_joints`."""

@@ -86,8 +86,7 @@ def _check_sides(table: JointTable, trunk: Array, source: str) -> None:
 
 
 def _bends(table: JointTable, ahead: Array, chain: tuple[str, str, str], sign: int, hanging: Array | None = None) -> tuple[int, int]:
-    """Counts over frames and sides: how often a chain's middle joint bends against `sign` along `ahead` (T, 3), and how often it is
-    bent."""
+    """Number of frames and sides in which a chain's middle joint bends against `sign` along `ahead` (T, 3), and in which it is bent."""
     wrong = total = 0
     for side in SIDES:
         a, b, c = (positions_of(table, f"{side}_{name}") for name in chain)

@@ -14,7 +14,7 @@ from shadowpuppet.motion.motion import JointTable
 MAX_GAP = 1.5
 """Largest gap, in steps, that is interpolated."""
 NEAREST_WITHIN = 0.1
-"""A frame this near (in steps) is used as it is where nothing can be interpolated, so that rounded times lose no frames at the ends."""
+"""A frame this near (in steps) is used as it is if nothing can be interpolated, so that rounded times lose no frames at the ends."""
 DENSER_TRUTH = 0.75
 """If the truth's step is less than this times the run's, the truth is interpolated, not the run."""
 MIN_SHARED, MIN_SPEEDS = 0.5, 12
@@ -44,8 +44,8 @@ def step_of(times: ArrayLike) -> float:
 
 
 def at_times(table: JointTable, times: ArrayLike) -> JointTable:
-    """A table's joints at other times (T,), seconds, increasing, by linear interpolation. Not a number where a neighbouring frame lacks
-    the joint, the two are more than 1.5 steps apart, or beyond the ends; there a frame within a tenth of a step is used as it is."""
+    """A table's joints at other times (T,), seconds, increasing, by linear interpolation. Not a number if a neighbouring frame lacks
+    the joint, if the two are more than 1.5 steps apart, and beyond the ends, where a frame within a tenth of a step is used."""
     times, own, places = np.asarray(times, float), table.times, table.positions
     if len(own) == 0:
         return JointTable(times, table.names, np.full((len(times), *places.shape[1:]), np.nan))

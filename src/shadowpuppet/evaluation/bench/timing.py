@@ -39,7 +39,7 @@ def in_turns(contenders: Mapping[str, Contender], rounds: int) -> dict[str, Time
 
 
 class Figures(NamedTuple):
-    """Which figures follow from the times of contenders, by key."""
+    """Figures to compute from the times of contenders, by key."""
 
     times: Mapping[str, tuple[float, str]]
     """Units in a second (1e3 for ms) and contender: median time."""

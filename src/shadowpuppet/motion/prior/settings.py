@@ -11,7 +11,7 @@ from shadowpuppet.settings import NonNegative, Positive, checked
 
 @checked
 class PriorSettings:
-    """How a motion prior is learnt (Ni 2008, IV). The values are the paper's where it gives any."""
+    """Settings for learning a motion prior (Ni 2008, IV). The values are the paper's, if it gives any."""
 
     regions: Annotated[int, Field(ge=1, le=10_000)] = 20
     """Number of regions of poses, M. More regions fit the training motion better and other motion worse; 10 to 20 suit most motions."""

@@ -34,7 +34,7 @@ class PartSettings:
 
 @checked
 class MonocularSettings:
-    """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
+    """Settings of the one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
     body: BodyName = "rounded"
     """The body's model: of the upper body (cardbox, boxes, rounded) or of the whole person."""

@@ -35,7 +35,7 @@ PULL = 1e-4
 
 def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: MultiviewObservation, library: ArrayLike | None,
            weigh: Weigh, number: int) -> Particles:
-    """The `number` best poses (number, D) for a frame's surface points, weighed by `weigh`.
+    """The `number` best poses (number, D) for a frame's surface points, with the costs and weights of `weigh`.
 
     `library`: initial poses (L, D); their position and heading are ignored.
     """

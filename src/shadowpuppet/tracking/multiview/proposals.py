@@ -18,7 +18,7 @@ from shadowpuppet.tracking.particle_filter import NO_REGION, Particles
 
 
 class Proposals:
-    """Draws poses of a skeleton. Raises `ShadowPuppetError` for a motion prior of another body."""
+    """Draws poses of a skeleton for the next frame. Raises `ShadowPuppetError` for a motion prior of another body."""
 
     def __init__(self, skeleton: Skeleton, settings: MultiviewSettings, prior: MotionPrior | None = None) -> None:
         """`prior`: motion prior at the film's frame rate."""

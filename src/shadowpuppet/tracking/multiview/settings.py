@@ -83,7 +83,7 @@ class ForceSettings:
 
 @checked
 class MultiviewSettings:
-    """The tracker for several cameras (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
+    """Settings of the several-camera tracker (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
 
     body: WholeBodyName = "anatomical"
     """Body model."""
@@ -125,7 +125,7 @@ class MultiviewSettings:
     recover: bool = True
     """Search for the person again after a loss, a jump or an absence. The paper's filter continues from its last particles."""
     surface: SurfaceSettings = SurfaceSettings()
-    """How poses are weighed by surface points."""
+    """How poses are weighted by surface points."""
     gauss_newton: GaussNewtonSettings = GaussNewtonSettings()
     """Refinement by Gauss-Newton."""
     forces: ForceSettings = ForceSettings()

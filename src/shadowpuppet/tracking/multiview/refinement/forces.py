@@ -85,7 +85,7 @@ def _add_forces(q, number, rows, near, tau, bounded, modulated, out, lanes):  # 
 @device
 def _move_joints(pose, chain, T, screws, origin, sums, force, gains, step):  # pragma: no cover
     """Move a pose (D,) by the force on its root and the moments about its joints. The paper's weights rho and lambda are here the gain
-    divided by the mass or inertia of the points that act, so that a step does not depend on how many there are."""
+    divided by the mass or inertia of the points that act, so that a step does not depend on their number."""
     for d in range(pose.size):
         own, joint, s = sums[chain.owners[d]], T[chain.owners[d]], screws[d]
         mass = own[6] + 1e-9
