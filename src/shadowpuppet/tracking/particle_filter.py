@@ -28,7 +28,7 @@ class Particles(NamedTuple):
     log_weights: Array
     """Of shape (N,), not normalised."""
     regions: Indices = np.zeros(0, np.int64)
-    """State s of each particle in Ni 2008: its region of the motion prior, or `NO_REGION`, of shape (N,); empty in other methods."""
+    """State s of each in Ni 2008, its region of the motion prior, or `NO_REGION`, of shape (N,); empty in methods without."""
 
     @property
     def best(self) -> Array:
@@ -36,7 +36,7 @@ class Particles(NamedTuple):
         return self.poses[np.argmin(self.costs)]
 
     def select(self, ancestors: Indices) -> Particles:
-        """The particles at the indices `ancestors`, with all fields."""
+        """The particles of some indices, each with all that it carries."""
         regions = self.regions[ancestors] if len(self.regions) else self.regions
         return Particles(self.poses[ancestors], self.costs[ancestors], self.log_weights[ancestors], regions)
 

@@ -55,13 +55,13 @@ class Proposals:
             out[:noisy] = self.by_noise(rng, out[:noisy], mismatch, scale)
             out[0] = self._moved_on(last[None], velocity)[0]
         if noisy < number:
-            # Selected particles have no state after a search, and many have none with proposals by noise: then all take the nearest region.
+            # With proposals by noise many selected particles have no state: the nearest region stands for all. None has one after a search.
             carried = particles.regions if not noisy and len(particles.regions) else regions
             out[noisy:], regions[noisy:] = self.by_prior(rng, out[noisy:], carried[noisy:], scale)
         return self.skeleton.clamp(out), regions
 
     def by_prior(self, rng: np.random.Generator, poses: Array, regions: Regions, scale: float = 1.0) -> tuple[Array, Regions]:
-        """Poses (N, D) and regions (N,) by the motion prior (eqs. 24-28). Root DOF that it does not model move by a Gaussian walk."""
+        """Poses (N, D) and regions (N,) by the motion prior (eqs. 24-28). What it does not model of the root moves by a Gaussian walk."""
         assert self.prior is not None
         out, walk, modelled = poses.copy(), np.setdiff1d(self.root, self.modelled), poses[:, self.modelled]
         regions = np.where(regions == NO_REGION, self.prior.encode(modelled).regions, regions)
