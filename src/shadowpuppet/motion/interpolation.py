@@ -31,8 +31,8 @@ class UniformSampling(NamedTuple):
 
 
 def uniform_sampling(times: ArrayLike) -> UniformSampling:
-    """Uniform times for frames at times (T,), seconds: the uniform times that the frames lie on, some possibly missing; if there are none,
-    steps of the median. Raises `ShadowPuppetError` without any frame, or if far too many would be missing."""
+    """Uniform times for frames at times (T,), seconds: if the frames lie on uniform times, some possibly without a frame, these; else
+    times in steps of their median. Raises `ShadowPuppetError` without any frame, or if far too many would be missing."""
     times = np.asarray(times, float)
     if len(times) < 2:
         if not len(times):

@@ -33,7 +33,7 @@ class CoarsePose(NamedTuple):
 
 def search_pose(picture: Picture, mask: NDArray[np.bool_]) -> CoarsePose:
     """The upright pose, facing the camera, with the coarse limbs of least cost (eq. 2) in a mask (H, W); legs do not count for an upper
-    body. The torso is moved sideways without arms; then one arm is tried alone, the other beside it, and the first once more; then the
+    body. The torso is moved sideways without arms; then one arm is tried alone, the other with the first, and the first once more; then the
     legs of a whole body, which are straight until then."""
     skeleton = picture.body.skeleton
     arms, legs = ([limb for limb in limbs_of(skeleton) if limb.endswith(kind)] for kind in ("arm", "leg"))

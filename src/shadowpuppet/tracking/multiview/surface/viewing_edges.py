@@ -2,7 +2,7 @@
 
 Interval arithmetic along each ray (Matusik et al. 2000, "Image-based visual hulls"). Silhouettes are polygons on the plane z = 1 of their
 camera, where another camera's ray is a straight line. Runs of a polygon's sides that the line cannot cross are skipped by bounding circles.
-A view denies a place on a ray if it sees the place outside its silhouette.
+A view denies a place on a ray if the place is in the empty area of its picture.
 """
 
 from __future__ import annotations
