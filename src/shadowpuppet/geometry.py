@@ -66,7 +66,7 @@ def transform(T: ArrayLike, points: ArrayLike) -> Array:
 
 
 MIN_POINTS = 3
-"""Points that determine a rotation."""
+"""Smallest number of points that determine a rotation."""
 
 
 class Alignment(NamedTuple):

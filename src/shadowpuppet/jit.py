@@ -1,4 +1,4 @@
-"""Numba decorators of the kernels, and how many poses a kernel works on at once."""
+"""Numba decorators of the kernels, and the number of poses that a kernel processes at once."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ BLOCK = 32
 KERNEL_OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "error_model": "numpy"}
 """Kernels get all arrays from their caller and allocate none, so Numba's reference counts are off: where arrays are sliced in inner loops,
 counting took longer than the work. Division checks are off, which would prevent vectorisation: no kernel divides by zero. The GIL is
-released, so several cameras are worked on at once; a caller that reuses work arrays must lock them.
+released, so several cameras are processed at once; a caller that reuses work arrays must lock them.
 
 Numba's cache only notices changes of a kernel's own file: after a change in a file that the kernel calls into, remove `__pycache__`."""
 
 
 def compiled(**options: Any) -> Callable[[Any], Any]:
-    """Numba's `njit` with its cache on disk, or without it where the folder cannot be written."""
+    """Numba's `njit` with its cache on disk, or without a cache if the folder cannot be written."""
 
     def made(function: Any) -> Any:
         try:

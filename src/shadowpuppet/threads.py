@@ -15,16 +15,16 @@ THREAD_VARIABLES = (THREADS_VARIABLE, *(f"{library}_NUM_THREADS" for library in 
 
 
 def child_environment(variables: Mapping[str, str]) -> dict[str, str]:
-    """Environment of a Python process that imports from where this one does, with `variables` set. Start the process with `-P`, or else
-    modules of the current folder come first."""
+    """Environment of a Python process that imports from the same folders as this one, with `variables` set. Start the process with `-P`,
+    or else modules of the current folder come first."""
     path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
     return {**os.environ, "PYTHONPATH": path, "PYTHONUTF8": "1", **variables}
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Context in which BLAS uses one thread. Our matrices are small: more threads gain nothing, and on busy cores waiting for one
-    another made the whole seven times slower."""
+    """Context in which BLAS uses one thread. Our matrices are small: more threads gain nothing, and on busy cores their waiting for one
+    another made the program seven times slower."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):

@@ -11,7 +11,7 @@ from shadowpuppet.geometry import Array, euler_angles, smoothest_path, unit
 
 
 def rotation_angles(rotations: Array, dofs: Sequence[Dof]) -> Array:
-    """Values (N, 3) of three DOF that make rotations (N, 3, 3); of the possible triples the one that exceeds the limits least."""
+    """Values (N, 3) of three DOF that make rotations (N, 3, 3): the possible triple that exceeds the limits least."""
     candidates, low, high = _candidates(rotations, dofs)
     return candidates[np.arange(len(candidates)), _excess(candidates, low, high).argmin(1)]
 

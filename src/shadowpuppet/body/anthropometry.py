@@ -12,7 +12,7 @@ from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.geometry import Array
 
 AVERAGE_HEIGHT = 1.70
-"""Stature (m) where neither height nor distance is known: the mean adult of ANSUR II (Gordon et al. 2014), women and men."""
+"""Stature (m) if neither height nor distance is known: the mean adult of ANSUR II (Gordon et al. 2014), women and men."""
 SOLE = 0.025
 """Height of shoes, included in a given height, metres."""
 

@@ -1,4 +1,4 @@
-"""Bones of the skeleton that joints.csv draws: pairs of joint names."""
+"""Bones between the joints of joints.csv: pairs of joint names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forward kinematics of one pose with its Jacobian: where the joints are, and the screw of each degree of freedom.
+"""Forward kinematics of one pose with its Jacobian: the joints' transforms, and the screw of each degree of freedom.
 
 A DOF moves a point x by omega x (x - c) = (omega, c x omega) . (x x n, n) along a direction n; (omega, c x omega) is its screw. All
 derivatives at a pose are dot products of screws with six sums over the points (Featherstone 2008, "Rigid Body Dynamics Algorithms",

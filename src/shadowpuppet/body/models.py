@@ -16,7 +16,7 @@ from shadowpuppet.body.whole_body import anatomical, cylinders
 from shadowpuppet.errors import ShadowPuppetError, choices
 
 Make = Callable[[Any], Body]
-"""Sizes to a body."""
+"""Function from sizes to a body."""
 Whole = TypeVar("Whole", bound=BoneSizes)
 
 
@@ -26,7 +26,7 @@ class BodyModel(NamedTuple):
     make: Make
     """Makes a body of the sizes."""
     sizes: type[Sizes]
-    """The class of its sizes; of a whole body, which stands in the world, one of `BoneSizes`."""
+    """The class of its sizes; for a whole body, which stands in the world, a subclass of `BoneSizes`."""
     shares: Mapping[str, tuple[float, float]]
     """The average person's sizes as fractions of the stature, and their deviations."""
 
@@ -48,14 +48,14 @@ else:
 
 
 def sizes_kind(name: str) -> type[Sizes]:
-    """The class of the sizes that a body is made from. Raises `ShadowPuppetError` with the names there are."""
+    """The class of the sizes that a body is made from. Raises `ShadowPuppetError` with the valid names."""
     if name not in MODELS:
         raise ShadowPuppetError(f"unknown body {name!r}; there are: {choices(MODELS)}")
     return MODELS[name].sizes
 
 
 def kind_of(sizes: Sizes) -> str:
-    """The name of a body that is made from these sizes; the first where there are several."""
+    """The name of a body that is made from these sizes; the first if there are several."""
     return next(name for name, model in MODELS.items() if isinstance(sizes, model.sizes))
 
 
@@ -93,7 +93,7 @@ WIDTHS_FROM_UPPER = {
 }  # fmt: skip
 """Widths of whole bodies, and the size of an upper body that they are scaled by."""
 MIN_STOUTNESS, MAX_STOUTNESS = 0.75, 1.35
-"""Bounds of that scale, over the average person's width."""
+"""Bounds of that scale, relative to the average person's width."""
 
 
 def whole_from_upper(name: str, sizes: CardboxSizes, height: float) -> BoneSizes:

@@ -23,9 +23,9 @@ def _both(torso: tuple[str, ...], arm: tuple[str, ...], leg: tuple[str, ...]) ->
 SEGMENT_JOINTS = _both(("pelvis", "torso", "chest", "head"), ("shoulder", "elbow"), ("hip", "knee", "ankle"))
 """Joints that each segment may have."""
 PULLED_POINTS = _both(("left_shoulder", "right_shoulder"), ("elbow", "hand"), ("knee", "ankle"))
-"""Landmarks by which the motion cost pulls each segment to where it was."""
+"""Landmarks by which the motion cost pulls each segment to its last position."""
 UNOBSERVED_DOFS = ("root_x",)
-"""DOF that one camera's silhouettes do not show: the person's distance is kept as it was found."""
+"""DOF that one camera's silhouettes do not show: the person's distance stays as initialised."""
 
 
 def segments_of(skeleton: Skeleton) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ def coarse_limbs(skeleton: Skeleton, limb: str) -> Array:
 
 
 def keep_limb_directions(skeleton: Skeleton, before: Array, poses: Array, limbs: Iterable[str]) -> Array:
-    """Poses (N, D) with some limbs turned in their first joint so that they point as in the pose `before` (D,), within limits."""
+    """Poses (N, D) with some limbs turned in their first joint to their directions in the pose `before` (D,), within limits."""
     poses, (low, high) = poses.copy(), skeleton.limits
     for limb in limbs:
         joint = skeleton.joint_index(SEGMENT_JOINTS[limb][0])

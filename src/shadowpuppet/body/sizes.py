@@ -22,7 +22,7 @@ def is_within(value: object, limits: tuple[float, float]) -> bool:
 
 
 def expected_metres(value: object, limits: tuple[float, float]) -> str:
-    """The end of an error message: the range in metres, and a hint where the value would fit in centimetres."""
+    """The end of an error message: the range in metres, and a hint if the value would fit in centimetres."""
     hint = f" ({value:g} cm are {value / 100:g})" if isinstance(value, (int, float, np.integer)) and is_within(value / 100, limits) else ""
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
@@ -98,7 +98,7 @@ class CardboxSizes(Sizes):
     upper_arm_length: float
     upper_arm_width: float
     forearm_length: float
-    """From the elbow to the end of the fist (or of the fingers, where the hands are open)."""
+    """From the elbow to the end of the fist (or of the fingers, if the hands are open)."""
     elbow_width: float
     """Width of the forearm at the elbow."""
     hand_width: float
@@ -176,7 +176,7 @@ class CylinderSizes(BoneSizes):
 
 @dataclass(frozen=True)
 class AnatomicalSizes(BoneSizes):
-    """Sizes of `anatomical`: the bones, and widths (girth / pi where a limb is round)."""
+    """Sizes of `anatomical`: the bones, and widths (girth / pi for round limbs)."""
 
     lumbar_height: float
     """From the pelvis up to the joint of the chest."""
@@ -217,5 +217,5 @@ class AnatomicalSizes(BoneSizes):
 
     @classmethod
     def offsets(cls) -> tuple[str, ...]:
-        """Those of the bones; toes may point inward."""
+        """The bones' offsets, and `toe_out`: toes may point inward."""
         return *super().offsets(), "toe_out"

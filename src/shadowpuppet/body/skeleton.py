@@ -113,7 +113,7 @@ class Skeleton:
     def tree(self) -> tuple:
         """The skeleton as arrays for kernels: parents (J,), first DOF of each joint (J + 1,), axis, sign and kind of each DOF (D,),
         joint and DOF of each coupling (C, 2) and its shift (C, 3), and the indices of all joints (J,)."""
-        from shadowpuppet.body.forward_kinematics import DOF_KINDS  # late, as below: bodies are named without loading Numba
+        from shadowpuppet.body.forward_kinematics import DOF_KINDS  # late, as below: naming a body does not load Numba
 
         parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
         owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)

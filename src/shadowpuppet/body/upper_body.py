@@ -23,7 +23,7 @@ def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     """Joints and DOF of an arm, which hangs straight down, thumb forward, when all angles are zero.
 
     Abduction turns the arm in the frontal plane, forward out of that plane toward the front: every direction is reachable, and the
-    singular one is straight ahead, far from where people begin. Roll turns the elbow's hinge about the upper arm: 0 bends the forearm
+    singular one is straight ahead, far from usual initial postures. Roll turns the elbow's hinge about the upper arm: 0 bends the forearm
     forward, +90 degrees bends it up when the arm is level.
     """
     out, turn = ("x", "z") if side == "left" else ("-x", "-z")
@@ -194,7 +194,7 @@ def rounded(sizes: CardboxSizes) -> Body:
         parts[f"{side}_forearm"] = [ball(elbow, -0.06 * s.forearm_length, fore), ball(elbow, -WRIST_SHARE * s.forearm_length, wrist)]
         parts[f"{side}_hand"] = [ball(elbow, -0.75 * s.forearm_length, palm), ball(elbow, palm / 2 - s.forearm_length, palm / 2)]
     most = max(map(len, parts.values()))
-    shapes = [part + [part[-1]] * (most - len(part)) for part in parts.values()]  # an ellipsoid twice changes no hull
+    shapes = [part + [part[-1]] * (most - len(part)) for part in parts.values()]  # a repeated ellipsoid does not change a hull
     joints, centres, radii = (np.array([[ellipsoid[i] for ellipsoid in shape] for shape in shapes]) for i in range(3))
     return Body("rounded", skeleton, Hulls(joints.astype(np.int64), centres.astype(float), radii.astype(float)), tuple(parts),
                 _landmarks(sizes), _hem(sizes))

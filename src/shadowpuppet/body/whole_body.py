@@ -1,4 +1,4 @@
-"""Bodies of the whole person: `anatomical`, with tapered limbs that lie off the bone, and `cylinders`, the ten parts of Ni 2008 (II).
+"""Bodies of the whole person: `anatomical`, with tapered limbs offset from the bones, and `cylinders`, the ten parts of Ni 2008 (II).
 
 Each is a skeleton and a table of limbs, which are both compared with surface points and drawn as silhouettes. The body's frame is X
 forward, Y to the person's left, Z up.
@@ -155,7 +155,7 @@ def _drawn(limbs: Limbs) -> Hulls:
 
 
 def _landmarks(sizes: BoneSizes, neck: tuple[str, float]) -> dict[str, tuple[str, Three]]:
-    """The 17 joints that a motion reports. `neck`: the joint that carries the base of the neck, and how far above it that lies."""
+    """The 17 joints that a motion reports. `neck`: the joint that carries the base of the neck, and the height (m) of that above it."""
     points = {"pelvis": ("pelvis", (0.0, 0.0, 0.0)), "neck": (neck[0], (0.0, 0.0, neck[1])),
               "head": ("head", (sizes.head_forward, 0.0, sizes.neck_length))}  # fmt: skip
     for side in SIDES:
@@ -198,7 +198,7 @@ def _trunk(s: AnatomicalSizes) -> list[_Limb]:
 
 
 def _arm(side: str, s: AnatomicalSizes) -> list[_Limb]:
-    """An arm; the upper arm lies behind the bone at the shoulder, before it at the elbow, and the palm faces the thigh."""
+    """An arm; the upper arm lies behind the bone at the shoulder, in front of it at the elbow, and the palm faces the thigh."""
     elbow, fist = f"{side}_elbow", s.forearm_length + s.hand_length - 0.2 * s.hand_width
     bend, wrist = _section(s.elbow_width, 1.16, 0.84), _section(s.wrist_width, 1.16, 0.84)
     return [
@@ -212,7 +212,7 @@ def _arm(side: str, s: AnatomicalSizes) -> list[_Limb]:
 
 
 def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
-    """A leg; the thigh lies before the bone, the calf behind it, and the toes of the flat foot are turned out."""
+    """A leg; the thigh lies in front of the bone, the calf behind it, and the toes of the flat foot are turned out."""
     heel, toes, out = 0.45 * s.ankle_height, 0.22 * s.ankle_height, s.toe_out if side == "left" else -s.toe_out
     return [
         _Limb(f"{side}_thigh", f"{side}_hip", "down", (0.0, s.thigh_length),

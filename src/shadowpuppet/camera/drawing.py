@@ -11,11 +11,11 @@ from shadowpuppet.body.bones import BONES
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, transform
 
-if TYPE_CHECKING:  # both bring much with them
+if TYPE_CHECKING:  # slow to import
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image
 
-# Colours (blue, green, red) that people who see colours differently tell apart: Okabe & Ito 2008.
+# Colours (blue, green, red) that colour-blind people can tell apart: Okabe & Ito 2008.
 BLACK, GREY, WHITE = (0, 0, 0), (96, 96, 96), (255, 255, 255)
 MODEL_ONLY, SILHOUETTE_ONLY = (0, 159, 230), (233, 180, 86)
 SIDE_COLOURS = {"left": (115, 158, 0), "right": (167, 121, 204)}
@@ -32,9 +32,9 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
     """The three rows (3 H, W, 3), blue green red, of a frame.
 
     Top: the model over the darkened picture, cards brighter the more they face the camera. Middle: where model and silhouette `mask` (H,
-    W) agree (white) or differ, and what does not count, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
-    the status and the overlap. A `pose` (D,) that is not finite is not drawn. Raises `ShadowPuppetError` for a picture that has not the
-    camera's size.
+    W) agree (white) or differ, and ignored pixels, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
+    the status and the overlap. A `pose` (D,) that is not finite is not drawn. Raises `ShadowPuppetError` for a picture that is not of
+    the camera's size.
     """
     image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
     size = picture.camera.size
@@ -103,7 +103,7 @@ def in_colour(image: Image) -> Image:
 
 
 def _darkened(image: Image) -> Image:
-    """The picture in dark grey, before which the model's colours stand out."""
+    """The picture in dark grey, so that the model's colours stand out."""
     import cv2
 
     grey = cv2.convertScaleAbs(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), alpha=0.4)
@@ -131,7 +131,7 @@ def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
     quarters = _quarters(picture.transforms(pose[None])[0], body.shapes.arrays[0], body.shapes.joints[:, 0])
     pixels, depths = _pixels(picture, quarters), quarters[..., 2].mean(2)
     shades = _shades(quarters)
-    # Of a quarter's corners the first three lie on the card's edge, which is all that is outlined.
+    # The first three corners of a quarter lie on the card's edge; only this edge is outlined.
     return [_Piece(depths[q, k], [(pixels[q, k], _shaded(part, shades[q, k]))], pixels[q, k, :3])
             for q, part in enumerate(body.parts) for k in range(4) if np.isfinite(pixels[q, k]).all()]
 
@@ -203,7 +203,7 @@ def write_text(out: Image, text: str, top: int, colour: tuple[int, int, int], le
     thickness, rim = max(1, round(1.5 * scale)), max(1, round(scale))
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
     x, y = left + round(12 * scale), top + height + round(12 * scale)
-    # The rim is the same text moved, for OpenCV 5 draws thicker text wider.
+    # The rim is the same text moved, because OpenCV 5 draws thicker text wider.
     for dx, dy, ink in ((-1, -1, BLACK), (1, -1, BLACK), (-1, 1, BLACK), (1, 1, BLACK), (0, 0, colour)):
         place = (x + rim * dx, y + rim * dy)
         cv2.putText(out, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, thickness, cv2.LINE_AA)

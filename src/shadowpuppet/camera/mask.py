@@ -10,11 +10,11 @@ from shadowpuppet.errors import TrackingError
 Mask = NDArray[np.bool_]
 """A silhouette, of shape (H, W)."""
 NEARLY_ALL = 0.8
-"""Share of the picture from which on a silhouette is implausible."""
+"""Share of the picture above which a silhouette is implausible."""
 
 
 def check_mask(mask: ArrayLike, size: tuple[int, int], what: str = "mask") -> Mask:
-    """A mask (H, W) as booleans. Raises `TrackingError` if it has not the camera's size (width, height)."""
+    """A mask (H, W) as booleans. Raises `TrackingError` if it is not of the camera's size (width, height)."""
     found = np.shape(mask)
     if found != size[::-1]:
         raise TrackingError(f"{what}: found shape {found}, expected {size[::-1]}, the camera's rows and columns")

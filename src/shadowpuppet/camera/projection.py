@@ -18,8 +18,8 @@ is valid."""
 
 
 def make_lens(camera: Camera) -> Lens:
-    """A camera as kernels use it. Distortion polynomials are fitted inside the picture; somewhere outside they turn back, or mirror, and
-    would draw into the picture what lies far out. Beyond that radius points are extrapolated in proportion."""
+    """A camera's parameters for kernels. Distortion polynomials are fitted inside the picture; beyond some radius they turn back, or
+    mirror, and would map points far outside into the picture. There points are extrapolated in proportion."""
     bends = bool(camera.fisheye or camera.distortion.any())
     return camera.matrix, camera.distortion, camera.fisheye, bends, camera.reach
 
@@ -85,7 +85,7 @@ def project_hulls(T, begin, centres, radii, numbers, joints, which, lens, X, Y, 
 
 @device
 def _look_like(T, begin, centres, radii, ellipse, room, counts):  # pragma: no cover
-    """The ellipse (5, B), centre and matrix (xx, xy, yy), that ellipsoids with centres and radii (1 or N, 3) project to. `room`: (4, B)."""
+    """Fill `ellipse` (5, B), centre and matrix (xx, xy, yy): projections of ellipsoids, centres and radii (1 or N, 3). `room`: (4, B)."""
     x, y, z = room[0], room[1], room[2]
     _move(T, centres, begin, room[0:3])
     cx, cy, xx, xy, yy, near = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4], room[3]
@@ -160,7 +160,7 @@ def _to_pixels(X, Y, lens):  # pragma: no cover
 
 @device
 def bend_within(x, y, k, fisheye, reach):  # pragma: no cover
-    """Distort a point on the plane z = 1. Edges between distorted corners stay straight: a card is small beside the lens' curvature."""
+    """Distort a point on the plane z = 1. Edges between distorted corners stay straight: over a card the lens curves them little."""
     beyond = max(np.sqrt(x * x + y * y) / reach, 1.0)
     x, y = _bend(x / beyond, y / beyond, k, fisheye)
     return x * beyond, y * beyond

@@ -193,7 +193,7 @@ def place(camera: Camera, distance: float, elevation: float) -> Array:
     the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation` metres above it. Z is the
     world's up if the camera is oriented, else the camera's own, as in the paper."""
     up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -1.0, 0.0])
-    if abs(up[2]) > 0.9:  # it looks straight down or up: its own frame
+    if abs(up[2]) > 0.9:  # the camera looks straight down or up: its own frame
         up = np.array([0.0, -1.0, 0.0])
     x = np.array([0.0, 0.0, -1.0]) + up * up[2]
     x /= np.linalg.norm(x)

@@ -108,8 +108,8 @@ def _cut(lefts, rights, width, begin, stop, rows, again, first, end):  # pragma:
 
 @device
 def _sort_lines(lines, n, width, lefts, rights):  # pragma: no cover
-    """Lines (K, 3, B) of polygon `n` sorted into left and right, (K + 3, 2) each; returns the larger number. Both sides are padded with
-    lines that bound nothing, to three more than that."""
+    """Lines (K, 3, B) of polygon `n` sorted into left and right, (K + 3, 2) each; returns the larger number. Both sides are padded to
+    three more than that number, with lines that bound nothing."""
     nl, nr = 0, 0
     for v in range(lines.shape[0]):
         x, slope, side = lines[v, 0, n], lines[v, 1, n], lines[v, 2, n]

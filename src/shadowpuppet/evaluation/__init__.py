@@ -1,1 +1,1 @@
-"""How good a run is, against a truth and by itself; how fast the trackers are (`bench`)."""
+"""Quality of a run, against a truth and by itself; speed of the trackers (`bench`)."""

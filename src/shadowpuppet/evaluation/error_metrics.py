@@ -1,4 +1,4 @@
-"""Error metrics beside joint distance: by axis, after alignment, of hinges, accelerations and bones; and frames without a pose."""
+"""Error metrics other than joint distance: by axis, after alignment, of hinges, accelerations and bones; and frames without a pose."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from shadowpuppet.motion.metrics import GROUPS, LOST_ERROR, JointErrors, acceler
 from shadowpuppet.motion.motion import BLANK, JointTable, Motion
 
 ROOT_JOINTS = (("pelvis",), ("left_hip", "right_hip"), ("neck",), ("left_shoulder", "right_shoulder"))
-"""Roots for root-relative errors, a joint or the middle of two; the first that run and truth have counts. Runs without legs have no pelvis
-that was observed."""
+"""Roots for root-relative errors, a joint or the middle of two; the first in both run and truth is used. Runs without legs have no observed
+pelvis."""
 HINGES = {f"{side}_{joint}": tuple(f"{side}_{name}" for name in chain) for side in ("left", "right")
          for joint, chain in {"elbow": ("shoulder", "elbow", "wrist"), "knee": ("hip", "knee", "ankle")}.items()}
 """The three joints that define the angle of each hinge."""
@@ -35,7 +35,7 @@ def axis_errors(errors: JointErrors) -> dict[str, Any]:
 
 
 def aligned_distances(errors: JointErrors, run: JointTable, truth: JointTable) -> dict[str, Array]:
-    """Joint errors (T, J), metres, after several alignments of the run to the truth; `metrics.LOST` for lost joints.
+    """Joint errors (T, J), metres, after several alignments of the run to the truth; `metrics.LOST_ERROR` for lost joints.
 
     `none`: as they are. `whole`: after one rigid motion of the whole run. `frame_offset`: without each frame's mean offset. `root`:
     relative to the root (`root_joints`), if there is one. `rigid`, `similar`: after the best rigid motion of each frame, and with a scale
@@ -94,7 +94,7 @@ def world_difference(errors: JointErrors, run: JointTable, truth: JointTable) ->
 
 def humaneva_error(run: JointTable, truth: JointTable) -> dict[str, Any]:
     """HumanEva's error: mean distance over its 15 joints in each frame, then mean and standard deviation over the frames, mm (Sigal, Balan
-    and Black 2010); frames whose truth is incomplete are left out. Or the joints that are `missing`."""
+    and Black 2010); frames whose truth is incomplete are left out. If joints are missing, only their names, `missing`."""
     names = GROUPS["humaneva"]
     missing = {what: [name for name in names if name not in table.names] for what, table in (("run", run), ("truth", truth))}
     if any(missing.values()):
@@ -108,7 +108,7 @@ def humaneva_error(run: JointTable, truth: JointTable) -> dict[str, Any]:
 
 
 def hinge_errors(run: JointTable, truth: JointTable) -> dict[str, dict[str, float]]:
-    """Errors of the angles of elbows and knees, degrees: mean, mean size and root mean square."""
+    """Errors of the angles of elbows and knees, degrees: mean, mean absolute value and root mean square."""
     found = {}
     for name, chain in HINGES.items():
         if {*chain} <= {*run.names} & {*truth.names}:
@@ -120,7 +120,7 @@ def hinge_errors(run: JointTable, truth: JointTable) -> dict[str, dict[str, floa
 
 
 def acceleration_errors(run: JointTable, truth: JointTable) -> dict[str, float]:
-    """Root mean square accelerations of run and truth, and the mean size of their difference, m/s^2, where both are known."""
+    """Root mean square accelerations of run and truth, and the mean length of their difference, m/s^2, where both are known."""
     ours, theirs = accelerations(run), accelerations(truth.select(run.names))
     both = np.isfinite(ours).all(2) & np.isfinite(theirs).all(2)
     if not both.any():

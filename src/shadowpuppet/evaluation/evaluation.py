@@ -38,7 +38,7 @@ from shadowpuppet.motion.synchronization import at_common_times, at_times, find_
 
 @dataclass(frozen=True)
 class Comparison:
-    """How a run is compared with its truth."""
+    """Options of a comparison of a run with its truth."""
 
     joints: Sequence[str] | None = None
     """Joints to compare, or names of `metrics.GROUPS`; None: `metrics.default_joints`."""
@@ -49,20 +49,20 @@ class Comparison:
     offset: float = 0.0
     """Seconds added to the truth's times."""
     sync: bool = False
-    """Find that offset by the joints' speeds."""
+    """Whether to find that offset by the joints' speeds."""
     align: bool = False
-    """Compare after one rigid motion of the whole truth into the run's world."""
+    """Whether to move the whole truth into the run's world by one rigid motion first."""
     angles: bool = False
-    """Also compare joint angles of a whole body."""
+    """Whether to compare joint angles of a whole body too."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """A run and its truth at the same times and in one world, and all figures."""
+    """A run and its truth at the same times and in one world, and the figures of their comparison."""
 
     run: Run
     measured: dict[str, Any]
-    """Plain values, as `write_evaluation` writes them."""
+    """All figures, as `write_evaluation` writes them."""
     cameras: Sequence[Camera]
     """Cameras of the run; empty if unknown."""
     table: JointTable | None = None
@@ -108,14 +108,14 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
 
 
 def write_evaluation(path: str | Path, measured: Mapping[str, Any], folder: str | Path) -> None:
-    """Write figures as JSON. Raises `ShadowPuppetError` where that fails, or the path is one of the run's own files."""
+    """Write figures as JSON. Raises `ShadowPuppetError` if that fails, or the path is one of the run's own files."""
     check_output(path, folder, ".json")
     text = json.dumps(for_json(plain(measured, "evaluation")), indent=1, ensure_ascii=False, allow_nan=False)
     write_whole(Path(path), text + "\n")
 
 
 def check_output(path: str | Path, folder: str | Path, ending: str) -> None:
-    """Raise `ShadowPuppetError` where a file that is to be written has another ending, no folder, or is the run's own."""
+    """Raise `ShadowPuppetError` if an output file has another ending, is in a folder that does not exist, or is one of the run's own."""
     path = Path(path)
     if not path.parent.is_dir():
         raise ShadowPuppetError(f"{path}: cannot be written (there is no folder {path.parent})")
@@ -193,7 +193,7 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTa
 
 
 def _joint_names(joints: Sequence[str] | None) -> list[str] | None:
-    """Names of joints, with groups replaced by theirs, each once."""
+    """Names of joints, with groups replaced by the names of their joints, each once."""
     return None if joints is None else list(dict.fromkeys(name for joint in joints for name in GROUPS.get(joint, (joint,))))
 
 

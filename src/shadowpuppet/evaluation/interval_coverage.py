@@ -10,15 +10,15 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 LEVELS = {"50": 0.6744897501960817, "90": 1.6448536269514722, "95": 1.959963984540054}
-"""Half widths of a normal distribution's central intervals of that many percent, in standard deviations."""
+"""Half widths, in standard deviations, of a normal distribution's central intervals, by their percentage."""
 
 
 def coverage(delta: Array, sd: Array, names: Sequence[str]) -> dict[str, Any] | None:
     """Shares of errors `delta` (T, J, 3) within the intervals of their standard deviations `sd` (T, J, 3), metres, of all joints and each.
 
     Each axis of a joint in a frame counts, if both are known. `rms_z`: root mean square of error over standard deviation; 1 if these are
-    right, greater if they are too small. Errors of neighbouring frames correlate, so short runs tell little. None if no standard deviation
-    is stated.
+    right, greater if they are too small. Errors of neighbouring frames correlate, so short runs are inconclusive. None if no standard
+    deviation is stated.
     """
     stated = np.isfinite(delta) & np.isfinite(sd) & (sd > 0)
     if not stated.any():

@@ -12,13 +12,14 @@ from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.motion.synchronization import match
 
 UNOBSERVABLE = ("head", "_ankle")
-"""Joints whose rotation the joints' positions do not show."""
+"""Endings of the names of joints whose rotation is not determined by the joints' positions."""
 
 
 def compared_poses(motion: Motion, truth: JointTable, start: int = 0) -> tuple[Skeleton, Array, Array]:
     """The skeleton, and the run's and the truth's poses (N, D) of the frames in which both are known.
 
-    Frames are matched by time, within half a step of the truth. Raises `ShadowPuppetError` for another body, or joints of no whole person.
+    Frames are matched by time, within half a step of the truth. Raises `ShadowPuppetError` for another body, or joints that are not those
+    of a whole person.
     """
     fitted = fit_poses(truth, motion.body_name, source="truth")
     index, matched = match(motion.times, truth.times[start:])
@@ -44,7 +45,7 @@ def turn_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, flo
 
 
 def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict[str, float]]:
-    """Errors of each angle of poses (N, D), degrees, wrapped, as in Fig. 7 of Ni 2008: mean, mean size, root mean square.
+    """Errors of each angle of poses (N, D), degrees, wrapped, as in Fig. 7 of Ni 2008: mean, mean absolute value, RMS.
 
     Translations, components of rotation vectors, heads and ankles are left out.
     """

@@ -15,7 +15,7 @@ WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once",
 
 
 def root_text(aligned: Mapping[str, Any]) -> str:
-    """The root in words."""
+    """The root joint in words."""
     return "middle of both " + aligned["root_joint"].split("_")[-1] + "s" if " and " in aligned["root_joint"] else aligned["root_joint"]
 
 

@@ -1,4 +1,4 @@
-"""A moving skeleton as animation files have it: constant offsets, and each joint's rotation against its parent."""
+"""A moving skeleton as in animation files: constant offsets, and each joint's rotation relative to its parent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shadowpuppet.motion.motion import JointTable
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 """From our world (Z up) to that of files with Y up: (x, z, -y), which Blender and OpenSim undo. X stays."""
 SAME_PLACE = 1e-9
-"""Metres within which a joint does not move."""
+"""Largest change of position (m) of a joint that does not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Animation:
     times: Array
     """Seconds, of shape (T,)."""
     rotations: Array
-    """Against the parent, the root's against the world, of shape (T, J, 3, 3); not a number in unknown frames."""
+    """Relative to the parent, the root's to the world, of shape (T, J, 3, 3); not a number in unknown frames."""
     shifts: Array
     """Position in the parent's axes, the root's in the world, of shape (T, J, 3), metres; mostly equal to the offset."""
 
@@ -58,7 +58,7 @@ class Animation:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Joints but the root whose position against the parent changes."""
+        """Indices of the joints, except the root, whose position relative to the parent changes."""
         strays = np.abs(self.shifts[self.known] - self.offsets).max((0, 2), initial=0.0)
         return tuple(j for j in range(1, len(self.names)) if strays[j] > SAME_PLACE)
 
@@ -98,7 +98,7 @@ class Animation:
 
 
 def rest_positions(offsets: Array, parents: Sequence[int]) -> Array:
-    """Positions (J, 3) of joints whose offsets (J, 3) from their parents are summed up."""
+    """Positions (J, 3) of joints at rest: their offsets (J, 3) from the parents, summed along the tree."""
     places = offsets.copy()
     for j, parent in enumerate(parents):
         if parent >= 0:

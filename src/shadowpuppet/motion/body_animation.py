@@ -16,11 +16,11 @@ from shadowpuppet.motion.motion import Motion
 TO_REST = np.array([[0.0, 1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From a body's axes (forward, left, up) to those of skeletons at rest (left, up, forward)."""
 SAME_POINT = 1e-9
-"""Metres within which two positions are equal."""
+"""Largest distance (m) of two positions that count as equal."""
 JOINT_TOLERANCE = 1e-4
-"""Metres by which a run's joints may differ from its body's."""
+"""Largest distance (m) of a run's joints from its body's with one transform for all frames."""
 MIN_END = 0.01
-"""Shortest end of a bone, metres."""
+"""Smallest length of a bone's end, metres."""
 Three = tuple[float, float, float]
 
 
@@ -171,8 +171,8 @@ def motion_animation(body: Body, motion: Motion) -> tuple[Animation, float]:
 
 def base_in_world(body: Body, motion: Motion) -> tuple[Array, float]:
     """The body's frame in a run's world, aligned to the joints, and the largest distance (m) left. One transform (4, 4) for all frames,
-    as for fixed cameras; one for each frame (T, 4, 4) where that does not fit, as after a live run measured the person anew. Raises
-    `ShadowPuppetError` without any pose."""
+    as for fixed cameras; if that does not fit, for example after a live run has measured the person again, one for each frame (T, 4, 4).
+    Raises `ShadowPuppetError` without any pose."""
     known = motion.known
     if not known.any():
         raise ShadowPuppetError("found no frame with a pose, expected one at least")

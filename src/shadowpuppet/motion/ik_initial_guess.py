@@ -106,5 +106,5 @@ def _filled(values: Array) -> Array:
 
 
 def _known(values: Array) -> NDArray[np.bool_]:
-    """Frames (T,) whose values (T, ...) are all known."""
+    """Whether all of a frame's values (T, ...) are known, of shape (T,)."""
     return np.asarray(np.isfinite(values).reshape(len(values), -1).all(1))

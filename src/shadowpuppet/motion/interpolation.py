@@ -20,7 +20,7 @@ SINGLE_FRAME_RATE = 30.0
 
 
 class UniformSampling(NamedTuple):
-    """Uniform times, and the frames at them."""
+    """Uniformly spaced times, and the frames at them."""
 
     rate: float
     """Frames/s."""
@@ -31,8 +31,8 @@ class UniformSampling(NamedTuple):
 
 
 def uniform_sampling(times: ArrayLike) -> UniformSampling:
-    """Uniform times through frames at times (T,), seconds: those of a film with frames missing, else in steps of their median. Raises
-    `ShadowPuppetError` without any frame, or if far too many would be missing."""
+    """Uniform times for frames at times (T,), seconds: if the frames lie on uniform times, some possibly without a frame, these; else
+    times in steps of their median. Raises `ShadowPuppetError` without any frame, or if far too many would be missing."""
     times = np.asarray(times, float)
     if len(times) < 2:
         if not len(times):
@@ -58,13 +58,13 @@ def _rounded(rate: float) -> float:
 
 
 END_TOLERANCE = 1e-6
-"""Share of a step by which the last new time may exceed the end, for rounding."""
+"""Share of a step by which the last new time may exceed the end, to allow for rounding."""
 
 
 def resample(times: ArrayLike, values: ArrayLike, rate: float) -> tuple[Array, Array]:
-    """Times (K,) at `rate` from the first on, and values (K, ...) there, of values (T, ...) at times (T,), seconds. Cubic splines
+    """Values (T, ...) at times (T,), seconds, resampled at `rate`: new times (K,), from the first on, and values (K, ...). Cubic splines
     through runs of known values; not a number between unknown ones. Angles must be unwrapped. Frequencies above half the new rate are
-    not filtered out. Raises `ShadowPuppetError`."""
+    not filtered out. Raises `ShadowPuppetError` for invalid times or an invalid rate."""
     times, values = np.asarray(times, float), np.asarray(values, float)
     if times.ndim != 1 or not len(times) or len(times) != len(values) or not (np.diff(times) > 0).all() or not np.isfinite(times).all():
         raise ShadowPuppetError(f"times: found {times.shape} for values {values.shape}, expected a finite, increasing one for each value")

@@ -1,9 +1,9 @@
 """Inverse kinematics: poses of a body, and the person's sizes, from joints over time, all frames at once.
 
-Damped Gauss-Newton. Frames are coupled by the sizes, which all share, and by a weak pull of each angle to its neighbours in time, so the
-equations are block tridiagonal with a margin, and time grows linearly with the number of frames. What joints do not show (a straight
-limb's twist, where the feet point) follows the neighbours and the usual posture: angles are smooth, and a motion prior that learns from
-them learns motion.
+Damped Gauss-Newton. Frames are coupled by their common sizes and by a weak pull of each angle to its neighbours in time. So the equations
+are block tridiagonal with a margin, and the time to solve them grows linearly with the number of frames. Angles that the joints do not
+determine (a straight limb's twist, the direction of the feet) follow the neighbouring frames and the usual posture: they are smooth, and a
+motion prior can be learnt from them.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.plausibility import check_person, positions_of
 
 OUTLIER = 0.1
-"""Distance (m) of a joint from the body beyond which its pull falls: it was measured wrongly."""
+"""Distance (m) of a joint from the body beyond which its pull falls, because it was measured wrongly."""
 SMOOTH_PULL, TRUNK_SMOOTH_PULL, REST_PULL, TWIST_PULL, CHEST_PULL, HEAD_TURN_PULL = 3e-4, 1e-2, 1e-6, 1e-5, 1e-4, 1e-2
-"""Pulls (m^2 / rad^2, added to squared distances of joints, m^2): of an angle to the next frame's, of the trunk's, which carries too
-much to turn suddenly; to rest; of a limb's twist, of the chest, of the head's turn."""
+"""Weights of pulls (m^2 / rad^2, added to squared distances of joints, m^2). To the next frame's angle: of any DOF; of the trunk's, which
+is too heavy to turn suddenly. To the angle at rest: of any DOF; of a limb's twist; of the chest; of the head's turn."""
 PROPORTION_TOLERANCE = 0.0015
 """Distance (m) that joints may stray before average proportions are doubted."""
 HAND_WEIGHT = 0.02
 """Weight of the base of the fingers relative to other joints."""
 SMOOTHING_RATE = 60.0
-"""Frame rate (frames/s) for which the smoothing pulls hold; they are scaled so that quick motion is slowed alike at any rate."""
+"""Frame rate (frames/s) for which the smoothing pulls hold; they are scaled so that quick motion is smoothed equally at any rate."""
 DIFFERENCE_STEP, CHUNK_FRAMES = 1e-6, 500
-"""Step of finite differences; frames that are differentiated at once."""
+"""Step of finite differences, and number of frames that are differentiated at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ class _Problem:
         self.hold = len(table.times) * (PROPORTION_TOLERANCE / (deviation * stature)) ** 2 if len(free) else np.zeros(0)
 
     def body(self, values: Array) -> Body:
-        """The body of an array of all sizes."""
+        """The body of the given sizes, an array in the order of `names`."""
         return make_body(self.name, self.kind.from_array(values))
 
     def cost(self, poses: Array, values: Array) -> float:
@@ -209,7 +209,7 @@ class _Problem:
 
 
 def _pull(name: str, kind: str) -> float:
-    """The pull of a DOF to its rest."""
+    """Weight of a DOF's pull to its value at rest."""
     if kind == "translation" or name == "root_heading":
         return 0.0
     if name.startswith("head") and name.endswith(("_z", "_twist")):

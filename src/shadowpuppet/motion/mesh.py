@@ -14,19 +14,19 @@ from shadowpuppet.motion.animation import Animation, rest_positions
 from shadowpuppet.motion.body_animation import TO_REST, BodyTree
 
 POINTS_AROUND, RINGS_ALONG, DOME_RINGS = 24, 6, 5
-"""Points around a limb; rings along it; rings of a dome."""
+"""Number of points around a limb, of rings along it, and of rings of a dome."""
 BALL_RINGS = 10
-"""Rings of an ellipsoid."""
+"""Number of rings of an ellipsoid."""
 LEFT_COLOUR, RIGHT_COLOUR, MIDDLE_COLOUR = (0.86, 0.48, 0.30), (0.30, 0.56, 0.80), (0.72, 0.72, 0.70)
 """Colours that make a mirror image obvious, linear RGB."""
 BONE_THICKNESS = 0.12
 """Radius of a bone of unknown shape, as a share of its length."""
 MAX_BONE_RADIUS = 0.05
-"""Its upper bound, metres."""
+"""Upper bound of that radius, metres."""
 
 
 class Mesh(NamedTuple):
-    """Triangles whose corners are each carried by one joint."""
+    """A triangle mesh; each point moves with one joint."""
 
     points: Array
     """In the axes of skeletons at rest, the root at the origin, of shape (V, 3), metres."""
@@ -165,7 +165,7 @@ def _ball() -> Array:
 
 
 def _toward(along: Array) -> Array:
-    """A rotation (3, 3) whose z is a unit vector (3,)."""
+    """A rotation (3, 3) with its z axis along a unit vector (3,)."""
     x = np.cross(np.eye(3)[int(np.abs(along).argmin())], along)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(along, x), along], 1)

@@ -1,4 +1,4 @@
-"""Quality of a motion: errors against a truth, and figures that need none. Metres; summaries are in millimetres."""
+"""Quality of a motion: errors against a truth, and figures that need no truth. Metres; summaries are in millimetres."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.motion.synchronization import at_common_times, match
 
 UPPER_JOINTS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
-"""Joints compared where one camera saw the upper body."""
+"""Joints compared for a run without legs."""
 LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
-"""Joints compared where the whole body was seen."""
+"""Joints compared for a run with legs."""
 GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS, "humaneva": ("pelvis", "neck", "head", *LIMB_JOINTS)}
 """Named groups of joints; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
 LOST_ERROR, FAR_ERROR = 0.5, 0.3
-"""Metres: the error of a joint that is missing, so that leaving out bad frames never helps; and the error from which a joint counts as
-far off."""
+"""Error (m) counted for a missing joint, so that leaving out bad frames never helps; and error (m) from which a joint counts as far
+off."""
 LEVEL_CAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """World to camera of a level camera looking along the world's y."""
 
@@ -36,9 +36,9 @@ class JointErrors:
     names: tuple[str, ...]
     """Joints compared, J of them."""
     known: NDArray[np.bool_]
-    """Where there is a truth, of shape (T, J)."""
+    """Whether there is a truth, of shape (T, J)."""
     lost: NDArray[np.bool_]
-    """Where there is a truth but no estimate, of shape (T, J)."""
+    """Whether there is a truth but no estimate, of shape (T, J)."""
     distance: Array
     """In space, of shape (T, J), metres."""
     plane: Array
@@ -58,7 +58,7 @@ class JointErrors:
         return {"frames": len(self.known), "lost": int(self.lost.any(1).sum()), **_summary(self._values(kinds)), "joints": joints}
 
     def _values(self, kinds: Sequence[str], joint: int | None = None) -> dict[str, Array]:
-        """Distances of each kind, of one joint or all, where there is a truth."""
+        """Distances of each kind, of one joint or all, in frames with a truth."""
         these = np.arange(len(self.names)) if joint is None else np.array([joint])
         return {kind: getattr(self, kind)[:, these][self.known[:, these]] for kind in kinds}
 
@@ -68,8 +68,8 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
     """Compare joints with a truth, frame by frame of the truth from `start` on.
 
     Args:
-            joints: those compared, by default `default_joints`.
-            camera: defines plane and depth; left out, a level one that looks along the world's y.
+        joints: names of the joints compared; default: `default_joints`.
+        camera: defines plane and depth; default: a level one that looks along the world's y.
 
     Frames are matched by the nearest time, within half a step of the truth. Raises `ShadowPuppetError` if joints are missing or nothing
     can be compared.
@@ -125,7 +125,7 @@ def accelerations(table: JointTable) -> Array:
 
 def jitter(table: JointTable) -> float:
     """Root mean square acceleration of joints, m/s^2; not a number without three consecutive known frames. It includes the motion's own
-    and grows with the frame rate: compare it with that of the truth, or of another run of the film."""
+    acceleration and grows with the frame rate: compare it with the truth's, or with that of another run of the film."""
     squares = (accelerations(table) ** 2).sum(2)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(squares.mean())) if squares.size else np.nan

@@ -61,15 +61,15 @@ class MotionFrame(NamedTuple):
     joint_sd: ArrayLike | None = None
     """Standard deviations of the joints, of shape (J, 3), metres."""
     cost: float = np.nan
-    """Pixels."""
+    """Pixels with one camera, m^2 with several."""
     overlap: float = np.nan
     """Intersection over union of model and silhouette, 0..1."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """A tracked motion; `motion[10:20]` is a part of it. Unknown values are not a number: poses and joints of lost and absent frames
-    always. Raises `ShadowPuppetError` for wrong shapes, times that do not increase, or an unknown status."""
+    """A tracked motion; `motion[10:20]` is a part of it. Unknown values are not a number, and so are all poses and joints of lost
+    and absent frames. Raises `ShadowPuppetError` for wrong shapes, times that do not increase, or an unknown status."""
 
     body_name: str
     dof_names: tuple[str, ...]
@@ -87,7 +87,7 @@ class Motion:
     joint_sd: Array
     """Standard deviations, of shape (T, J, 3), metres."""
     cost: Array
-    """Pixels in which model and silhouette differ, of shape (T,)."""
+    """With one camera pixels in which model and silhouette differ, with several m^2, of shape (T,)."""
     overlap: Array
     """Intersection over union of model and silhouette, of shape (T,)."""
     status: NDArray[np.str_]
@@ -129,12 +129,12 @@ class Motion:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Frames (T,) whose pose and joints are known."""
+        """Whether pose and joints are known in a frame, of shape (T,)."""
         return np.asarray(np.isfinite(self.poses).all(1) & np.isfinite(self.joints).all((1, 2)))
 
     @property
     def table(self) -> JointTable:
-        """The joints alone."""
+        """The joints as a table."""
         return JointTable(self.times, self.joint_names, self.joints)
 
 

@@ -12,12 +12,12 @@ from shadowpuppet.geometry import Array, unit
 from shadowpuppet.motion.motion import JointTable
 
 NEEDED_JOINTS = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "knee") for side in SIDES)
-"""Joints that a fit of the whole body needs, beside the pelvis or both hips."""
+"""Joints that a fit of the whole body needs, in addition to the pelvis or both hips."""
 TRUNK_LENGTH = (0.2, 0.8)
 """Possible distance from the hips to the shoulders, metres."""
 LENGTH_UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
 BENT = np.radians(25)
-"""Bend (rad) from which a knee or elbow shows its direction."""
+"""Bend (rad) of a knee or elbow from which its direction is known."""
 
 
 def check_person(table: JointTable, source: str = "joints") -> None:
@@ -69,7 +69,7 @@ def _check_upright(trunk: Array, source: str) -> None:
 
 
 def _check_sides(table: JointTable, trunk: Array, source: str) -> None:
-    """Knees bend backward and elbows forward; the reverse of both happens only in a mirror."""
+    """Raise a `ShadowPuppetError` if the trunk is twisted too far, or knees bend forward or elbows backward, as in a mirror image."""
     shoulders = positions_of(table, "left_shoulder") - positions_of(table, "right_shoulder")
     if {"left_hip", "right_hip"} <= set(table.names) and _median((leftward(table) * unit(shoulders)).sum(1)) < -0.3:
         raise ShadowPuppetError(f"{source}: found the left shoulder over the right hip most of the time: have left and right changed "
@@ -86,8 +86,7 @@ def _check_sides(table: JointTable, trunk: Array, source: str) -> None:
 
 
 def _bends(table: JointTable, ahead: Array, chain: tuple[str, str, str], sign: int, hanging: Array | None = None) -> tuple[int, int]:
-    """Counts over frames and sides: how often a chain's middle joint bends against `sign` along `ahead` (T, 3), and how often it is
-    bent."""
+    """Number of frames and sides in which a chain's middle joint bends against `sign` along `ahead` (T, 3), and in which it is bent."""
     wrong = total = 0
     for side in SIDES:
         a, b, c = (positions_of(table, f"{side}_{name}") for name in chain)

@@ -14,15 +14,15 @@ from shadowpuppet.motion.motion import JointTable
 MAX_GAP = 1.5
 """Largest gap, in steps, that is interpolated."""
 NEAREST_WITHIN = 0.1
-"""A frame this near (in steps) is used as it is where nothing can be interpolated, so that rounded times lose no frames at the ends."""
+"""A frame this near (in steps) is used as it is if nothing can be interpolated, so that rounded times lose no frames at the ends."""
 DENSER_TRUTH = 0.75
 """If the truth's step is less than this times the run's, the truth is interpolated, not the run."""
 MIN_SHARED, MIN_SPEEDS = 0.5, 12
 """Share of the shorter motion's speeds that must overlap at an offset, and their minimum number."""
 SPEED_SPAN = 0.25
-"""Time (s) over which a speed is taken: over one frame it would be mostly jitter."""
+"""Time (s) over which a speed is measured: over one frame it would be mostly jitter."""
 STANDS_OUT = 0.7
-"""An offset is accepted if its speed error is less than this times the usual one."""
+"""An offset is accepted if its speed error is less than this times the median of the other offsets' errors."""
 OTHER_OFFSET, RIVAL_FACTOR, RIVAL_MARGIN = 0.3, 1.15, 0.01
 """Offsets this far apart (s) are different; one is a rival if its error is below `RIVAL_FACTOR` times the best plus `RIVAL_MARGIN`
 (m/s)."""
@@ -44,8 +44,8 @@ def step_of(times: ArrayLike) -> float:
 
 
 def at_times(table: JointTable, times: ArrayLike) -> JointTable:
-    """A table's joints at other times (T,), seconds, increasing, by linear interpolation. Not a number where a neighbouring frame lacks
-    the joint, the two are more than 1.5 steps apart, or beyond the ends; there a frame within a tenth of a step is used as it is."""
+    """A table's joints at other times (T,), seconds, increasing, by linear interpolation. Not a number if a neighbouring frame lacks
+    the joint, if the two are more than 1.5 steps apart, and beyond the ends, where a frame within a tenth of a step is used."""
     times, own, places = np.asarray(times, float), table.times, table.positions
     if len(own) == 0:
         return JointTable(times, table.names, np.full((len(times), *places.shape[1:]), np.nan))
@@ -89,9 +89,9 @@ class Offset(NamedTuple):
 
 
 def find_offset(run: JointTable, truth: JointTable) -> Offset:
-    """The offset to add to the truth's times so that joints have equal speeds at equal times, in whatever worlds they are. Minimises the
-    mean square difference of the shared joints' speeds, over offsets at which half of the shorter motion overlaps; refined between
-    steps; of equally good ones the smallest. Raises `ShadowPuppetError` if no offset stands out."""
+    """The offset to add to the truth's times so that joints have equal speeds at equal times; the worlds may differ. It minimises the
+    mean square difference of the shared joints' speeds, over offsets at which half of the shorter motion overlaps, refined between
+    steps; among equally good ones it is the smallest. Raises `ShadowPuppetError` if no offset stands out."""
     names = [name for name in run.names if name in truth.names]
     ours, theirs = run.select(names), truth.select(names)
     step = max(step_of(run.times), step_of(truth.times))
@@ -138,8 +138,8 @@ def _speeds(table: JointTable, times: Array) -> Array:
 
 
 def _by_lag(ours: Array, theirs: Array) -> tuple[NDArray[np.int64], Array]:
-    """Lags (L,), in steps by which `theirs` begins later, and the root mean square difference at each: correlations by Fourier
-    transforms."""
+    """Lags (L,), the steps by which `theirs` begins later, and the root mean square difference at each, by correlations in Fourier
+    space."""
     from scipy.signal import correlate
 
     a, b, known_a, known_b = np.nan_to_num(ours), np.nan_to_num(theirs), np.isfinite(ours).astype(float), np.isfinite(theirs).astype(float)

@@ -1,1 +1,1 @@
-"""What both papers share: particle filter, resampling, silhouette cost, status."""
+"""The trackers, and what both papers share: particle filter, resampling, silhouette cost, status, recovery."""

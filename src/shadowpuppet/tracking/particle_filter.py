@@ -1,7 +1,7 @@
 """The particle filter: weighted poses, and one estimation cycle (resample, propose, weigh).
 
-Knows no bodies and no pictures, only arrays and the functions that make a method. `MultiviewTracker.cycle` has the cycle of Ni 2008,
-which also refines.
+It works on arrays, without bodies and pictures; a method passes its own functions. `MultiviewTracker.cycle` has the cycle of Ni 2008, which
+also refines.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ class Particles(NamedTuple):
 
 
 Propose = Callable[[np.random.Generator, Array], Array]
-"""Poses (N, D) to new poses (N, D). The first is the best so far."""
+"""Function from poses (N, D), the best first, to new poses (N, D)."""
 Weigh = Callable[[Array], tuple[Array, Array]]
-"""Poses (N, D) to costs (N,) and log weights (N,)."""
+"""Function from poses (N, D) to costs (N,) and log weights (N,)."""
 
 
 def evaluate(poses: Array, weigh: Weigh) -> Particles:
-    """Particles from poses (N, D)."""
+    """Particles of poses (N, D), with their costs and weights."""
     return Particles(poses, *weigh(poses))
 
 
 def step(rng: np.random.Generator, particles: Particles, *, resample: Scheme, propose: Propose, weigh: Weigh,
          number: int | None = None) -> Particles:
-    """One estimation cycle: the last cycle's particles to `number` new ones (default: as many)."""
+    """One estimation cycle: the last cycle's particles to `number` new ones (default: the same number)."""
     ancestors = resample(rng, particles.log_weights, number or len(particles.poses))
     return evaluate(propose(rng, particles.poses[ancestors]), weigh)
 

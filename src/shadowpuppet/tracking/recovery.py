@@ -1,4 +1,4 @@
-"""When a tracker searches for the person again: one policy for one camera and for several."""
+"""Policy for searching for the person again, the same for one camera and for several."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 SETTLE_CYCLES = 10
-"""Estimation cycles on the frame of a search, after it."""
+"""Number of estimation cycles on the same frame after a search."""
 OVERLAP_DROP = 0.2
-"""With several cameras, an overlap that falls by more than this in a frame starts a search: limbs may still overlap a person elsewhere."""
+"""With several cameras, a fall of the overlap by more than this in a frame starts a search: wrong poses may overlap too much for `lost`."""
 
 
 class TrackerState(Protocol):
-    """The part of a tracker's state that the policy reads."""
+    """The fields of a tracker's state that the policy uses."""
 
     @property
     def overlap(self) -> float:
@@ -49,7 +49,7 @@ def track_or_recover(state: State, *, is_absent: bool, hold: Callable[[State], S
 
 
 def settle(state: State, cycle: Callable[[State], State]) -> State:
-    """The state of a search after `SETTLE_CYCLES` cycles on the same frame."""
+    """The state after `SETTLE_CYCLES` further cycles on the frame of a search."""
     for _ in range(SETTLE_CYCLES):
         state = cycle(state)
     return state

@@ -73,7 +73,7 @@ def deterministic(rng: np.random.Generator, log_weights: ArrayLike, number: int,
 
 
 def with_best(scheme: Scheme) -> Scheme:
-    """The scheme with the best particle first, as in Algorithm 3; the others are drawn."""
+    """The scheme with the best particle put first, as in Algorithm 3; it draws the others."""
 
     def kept(rng: np.random.Generator, log_weights: ArrayLike, number: int) -> Indices:
         best = np.argmax(np.asarray(log_weights, float))

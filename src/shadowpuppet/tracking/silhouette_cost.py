@@ -12,7 +12,7 @@ from shadowpuppet.camera.rasterize import Bits, Picture, count, pack
 from shadowpuppet.geometry import Array
 
 Cost = Callable[[Array], Array]
-"""Poses (N, D) to costs (N,)."""
+"""Function from poses (N, D) to costs (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +27,16 @@ class Observation:
 
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:
-        """From a mask (H, W) and a mask of the ignored pixels."""
+        """The observation of a mask (H, W), with a mask (H, W) of the ignored pixels."""
         silhouette = pack(mask)
         skipped = np.zeros_like(silhouette) if ignore is None else pack(ignore)
         return cls(silhouette | skipped, skipped, also)
 
     @classmethod
     def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array, also: Cost | None = None) -> Observation:
-        """From a mask (H, W), with its pixels where the legs of `pose` (D,) may be ignored: the model ends at the waist.
+        """The observation of a mask (H, W); its pixels in the region where the legs of `pose` (D,) may be are ignored.
 
-        Empty pixels there still count, so that the waist does not grow over them.
+        An upper body ends at the waist. Empty pixels there still count, so that the waist does not grow over them.
         """
         silhouette = pack(mask)
         return cls(silhouette, silhouette & picture.leg_bits(pose), also)
@@ -72,7 +72,7 @@ class PartialCost:
         self.moving, self.still = np.flatnonzero(moves & drawn), np.flatnonzero(~moves & drawn)
 
     def costs(self, observation: Observation, around: Array) -> Cost:
-        """Eq. 2, pixels (N,), as a function of whole poses (N, D) that equal `around` (D,) but for the DOF that vary."""
+        """Eq. 2, pixels (N,), as a function of whole poses (N, D) that equal `around` (D,) in all DOF that do not vary."""
         fixed = self.picture.draw(around, self.still) | observation.ignore
         base = count(fixed ^ observation.silhouette)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 ABSENT_AREA = 0.2
-"""A silhouette smaller than this share of the drawn body's area is no person."""
+"""If the silhouette is smaller than this share of the drawn body's area, the person is absent."""
 LOST_OVERLAP, UNCERTAIN_OVERLAP = 0.5, 0.7
 """An overlap (intersection over union) below these is `lost` or `uncertain`; a cardbox model that fits overlaps by 0.8 to 0.9."""
 

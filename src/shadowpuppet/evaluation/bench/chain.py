@@ -1,4 +1,4 @@
-"""From film to poses, each in a process of its own: speed and memory of a long film, and the time to a first pose.
+"""Measurements of the whole chain from film to poses, each in its own process: speed and memory on a long film, time to a first pose.
 
 `python -P -m shadowpuppet.evaluation.bench.chain track RECORDING RUN CORES` prints JSON; `... start` tracks one frame.
 """
@@ -26,22 +26,22 @@ from shadowpuppet.threads import child_environment
 from shadowpuppet.video import open_frames, write_frames
 
 WARM_UP = 0.2
-"""Share of the film after which memory should grow no more."""
+"""Share of the film after which memory should not grow any more."""
 ONE_THREAD_EACH: dict[str, str] = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 WAVING = Spec(name="bench", motion=tuple(Gesture(motion=name, seconds=2.0) for name in ("wave_hands", "reach")),
               scene=Scene(empty_seconds=1.0))  # fmt: skip
-"""One camera."""
+"""Recording by one camera: a person waves and reaches."""
 
 
 def walking(size: tuple[int, int] = (640, 480), cameras: int = 7, frames: int = 12) -> Spec:
-    """A ring of cameras around a person who walks: a few frames from the middle of a stride, and training motion."""
+    """Recording of a walking person by a ring of cameras: a few frames from the middle of a stride, and training motion."""
     ring = Ring(count=cameras, radius=4.5, jitter=0.5, size=size, distortion=(-0.09, 0.05, 0.0, 0.0))
     return Spec(name="bench", body=Mannequin(), motion=(Gesture(motion="walk", seconds=2.5),), begin=1.2, frames=frames, ring=ring,
                 scene=Scene(clothing=8, room=3, empty_seconds=0.2), rate=60)  # fmt: skip
 
 
 def long_recording(spec: Spec, folder: Path, frames: int) -> Path:
-    """A made recording whose films (H.264) go to and fro until they have `frames` frames; without exact masks and truth."""
+    """A synthetic recording; its films (H.264) run forward and backward until they have `frames` frames. It has no exact masks or truth."""
     recording = synthesize(spec, folder, np.random.default_rng(1))
     for name in ("masks", "truth.csv", "truth.trc"):  # of the short film
         shutil.rmtree(path) if (path := recording / name).is_dir() else path.unlink()
@@ -54,7 +54,7 @@ def long_recording(spec: Spec, folder: Path, frames: int) -> Path:
 
 
 def measure_chain(spec: Spec, frames: int, cores: int = 1) -> dict[str, Any]:
-    """What `track_long` finds on a long recording, in a new process. Raises `ShadowPuppetError` where it fails."""
+    """The figures of `track_long` on a long recording, in a new process. Raises `ShadowPuppetError` if it fails."""
     with tempfile.TemporaryDirectory() as folder:
         recording = long_recording(spec, Path(folder) / "recording", frames)
         out = _child("tracking the made film failed", ONE_THREAD_EACH, "track", str(recording), str(Path(folder) / "run"), str(cores))
@@ -62,7 +62,7 @@ def measure_chain(spec: Spec, frames: int, cores: int = 1) -> dict[str, Any]:
 
 
 def chain_figures(prefix: str, found: Mapping[str, Any], cores: str) -> dict[str, Any]:
-    """Flat keys of what `measure_chain` returned; `cores`: the key that says how many cores it had."""
+    """The figures of `measure_chain` by flat keys; `cores`: the key for the number of cores."""
     named = {f"{stage}_ms": spent for stage, spent in found["ms"].items()}
     named |= {"chain_fps": found["fps"], "chain_frames": found["frames"], "peak_mb": found["peak_mb"], "growth_mb": found["growth_mb"],
               cores: found["cores"]}
@@ -94,7 +94,7 @@ def track_long(recording: str, run: str, cores: str) -> dict[str, Any]:
 
 
 def start_times() -> tuple[float, float]:
-    """Seconds from the start of a process to its first pose: with all kernels compiled anew, and with compiled kernels at hand."""
+    """Seconds from the start of a process to its first pose: when it has to compile all kernels, and with compiled kernels in the cache."""
     with tempfile.TemporaryDirectory() as cache:
         return _start(cache), _start(cache)
 

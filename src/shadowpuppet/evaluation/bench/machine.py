@@ -1,4 +1,4 @@
-"""This machine, as far as it matters for speed."""
+"""Properties of this machine that matter for speed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def environment() -> dict[str, Any]:
 
 
 def resident_mb() -> float | None:
-    """Resident memory of this process, 10^6 bytes; None where the system does not say."""
+    """Resident memory of this process, 10^6 bytes; None if the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text("ascii").split()[1])
     except (OSError, ValueError, IndexError):
@@ -32,7 +32,7 @@ def resident_mb() -> float | None:
 
 
 def peak_mb() -> float | None:
-    """Peak resident memory of this process, 10^6 bytes; None where the system does not say."""
+    """Peak resident memory of this process, 10^6 bytes; None if the system does not report it."""
     try:
         import resource
     except ImportError:  # Windows
@@ -42,7 +42,7 @@ def peak_mb() -> float | None:
 
 
 def use_cores(count: int = 1) -> str:
-    """Hold this process to `count` cores where the system can, and say what was done. Call it before anything counts the cores."""
+    """Restrict this process to `count` cores if the system can; returns what was done, in words. Call it before anything counts cores."""
     import cv2
 
     cv2.setNumThreads(1)

@@ -18,7 +18,7 @@ ROUNDS, QUICK_ROUNDS = 41, 7
 FRAMES, QUICK_FRAMES = 3000, 120
 """Frames of the film that is tracked."""
 NAIVE_PARTICLES = 2
-"""Particles a stage of the naive filter; its time is in proportion, and scaled up to all of Table I."""
+"""Particles a stage of the naive filter; its time is proportional to them, and scaled up to all of Table I."""
 FIGURES = Figures(
     times={"mono.particle_us": (1e6, "particle"), "mono.arm_us": (1e6, "arm"), "mono.opencv_particle_us": (1e6, "opencv"),
            "mono.opencv_arm_us": (1e6, "opencv_arm"), "mono.boxes_particle_us": (1e6, "boxes"),
@@ -30,7 +30,7 @@ FIGURES = Figures(
 
 
 def run_mono(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str, Times]]:
-    """All `mono.*` figures by flat keys, and the times behind them. Raises `ShadowPuppetError` where a part of it fails."""
+    """All `mono.*` figures by flat keys, and the times they come from. Raises `ShadowPuppetError` if a part of it fails."""
     listener.begin("particles and frames, in turns")
     with one_thread():
         raw = in_turns(contenders(), QUICK_ROUNDS if quick else ROUNDS)
@@ -44,7 +44,7 @@ def run_mono(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str,
 
 
 def contenders() -> dict[str, Contender]:
-    """What is timed in turns; a unit is a particle or a frame."""
+    """The functions that are timed in turns; a unit is a particle or a frame."""
     full, arm, boxes = MonoCase(), MonoCase(stage="arm"), MonoCase("boxes")
     settings = make_settings("liu2011")
     rng, share = np.random.default_rng(0), NAIVE_PARTICLES / settings.arm.particles

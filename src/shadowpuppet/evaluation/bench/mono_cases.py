@@ -1,4 +1,4 @@
-"""What is timed with one camera: eq. 2 of poses around a person's, and a tracker on ready masks."""
+"""Cases that are timed with one camera: eq. 2 of poses around a person's, and a tracker on precomputed masks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SPREAD = 0.1
 
 
 def make_picture(body: str, size: tuple[int, int] = SIZE) -> Picture:
-    """A person of 1.75 m, 2.5 m before a camera with a field of view of 60 degrees."""
+    """A person of 1.75 m, 2.5 m in front of a camera with a field of view of 60 degrees."""
     camera = Camera.from_fov(size, np.radians(60))
     return Picture(make_body(body, sizes_from_height(1.75)), camera, place(camera, 2.5, -0.1))
 
@@ -90,7 +90,7 @@ class MonoCase:
 
 
 class MonoFollower:
-    """A tracker on ready masks of a motion to and fro, without end."""
+    """A tracker on precomputed masks of a motion that runs forward and backward without end."""
 
     def __init__(self, preset: str, frames: int = 20) -> None:
         """`preset`: the tracker's settings; `frames`: of the motion from one end to the other."""

@@ -19,7 +19,7 @@ FORCE_ITERATIONS, SOLVE_ITERATIONS = 20, 5
 FRAMES, QUICK_FRAMES = 300, 60
 """Frames of the films that are tracked."""
 CORES = 2
-"""For the whole chain: films are decoded beside the tracking."""
+"""Cores for the whole chain: films are decoded while the tracker works."""
 FIGURES = Figures(
     times={"multi.hull_ms": (1e3, "hull"), "multi.force_us": (1e6, "forces"), "multi.gauss_newton_us": (1e6, "gauss_newton"),
            "multi.naive_force_us": (1e6, "naive_forces"), "multi.naive_gauss_newton_us": (1e6, "naive_gauss_newton")},
@@ -29,7 +29,7 @@ FIGURES = Figures(
 
 
 def run_multi(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str, Times]]:
-    """All `multi.*` figures by flat keys, and the times behind them. Raises `ShadowPuppetError` where a part of it fails."""
+    """All `multi.*` figures by flat keys, and the times they come from. Raises `ShadowPuppetError` if a part of it fails."""
     listener.begin("several cameras, in turns")
     case = MultiCase()
     raw = in_turns(contenders(case), QUICK_ROUNDS if quick else ROUNDS)
@@ -39,7 +39,7 @@ def run_multi(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str
 
 
 def contenders(case: MultiCase) -> dict[str, Contender]:
-    """What is timed in turns; a unit is a frame, or a particle and iteration."""
+    """The functions that are timed in turns; a unit is a frame, or one iteration of one particle."""
     paper, default = (MultiFollower(case, make_multiview_settings(preset)) for preset in ("ni2008", "default"))
     return {
         "hull": Contender(case.run_hull),

@@ -1,4 +1,4 @@
-"""What is timed with several cameras: a person in a ring of cameras, the silhouettes, and surface points from these."""
+"""Cases that are timed with several cameras: a person in a ring of cameras, the silhouettes, and surface points from these."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class MultiCase:
 
     @cached_property
     def surface(self) -> SurfacePoints:
-        """`points` of the hull's points, evenly taken; where there are fewer, some are taken more than once."""
+        """`points` of the hull's points, evenly sampled; if there are fewer, some are taken more than once."""
         found = self.hull.points(self.silhouettes)
         chosen = np.linspace(0, len(found.points), self.points, endpoint=False).astype(int)
         return SurfacePoints(found.points[chosen], found.normals[chosen], found.weights[chosen], found.cameras[chosen])
@@ -125,14 +125,14 @@ class MultiCase:
         return train_prior(np.random.default_rng(0), {"the motion": joints}, body=body, rate=RATE).prior
 
     def frames(self, count: int = 20) -> Iterator[list[Mask]]:
-        """Silhouettes of the motion, to and fro without end; all are drawn before the first is returned."""
+        """Silhouettes of the motion, forward and backward without end; all are drawn before the first is returned."""
         there = [self.masks(pose) for pose in self.motion(count)]
         return cycle(there + there[::-1])
 
 
 class MultiFollower:
-    """A tracker with hull, proposals, refinement and weights, on ready masks of a motion to and fro, without end; its prior is learnt from
-    the same motion."""
+    """A tracker with hull, proposals, refinement and weights, on precomputed masks of a motion that runs forward and backward without end;
+    its prior is learnt from the same motion."""
 
     def __init__(self, case: MultiCase, settings: MultiviewSettings, count: int = 20) -> None:
         """Learn the prior, and search for the first pose."""

@@ -1,6 +1,6 @@
 """A naive version of Liu 2011's filter in NumPy and Python: pose by pose and card by card, without the kernels but with their costs.
 
-For bodies of quads that lie wholly before a pinhole camera.
+For bodies of quads that lie wholly in front of a pinhole camera.
 """
 
 from __future__ import annotations

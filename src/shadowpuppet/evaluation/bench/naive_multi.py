@@ -1,7 +1,7 @@
 """A naive version of Ni 2008's refinement (V-B) in NumPy: all points at once, part by part, one degree of freedom after another.
 
 The distance of a point to a part is of first order, as in the kernels: the level of the part's own function over the length of its
-gradient. From it come the paper's eqs. 29-41, and the normal equations of the distances to tangent planes.
+gradient. It is used in the paper's eqs. 29-41 and in the normal equations of the distances to tangent planes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FLAT = 1e-4
 
 
 class Surface(NamedTuple):
-    """Closest points of points to one part, or of each to its own part."""
+    """The points on one part, or on each point's own part, that are closest to some points."""
 
     distance: Array
     """Signed, negative inside, of shape (P,), metres."""
@@ -32,7 +32,7 @@ class Surface(NamedTuple):
 
 
 class Motions(NamedTuple):
-    """How each degree of freedom of a pose moves the joints below its own."""
+    """Motion of the joints by each degree of freedom of a pose."""
 
     axes: Array
     """Axis of the rotation, or direction of the shift, world (D, 3); its length is the radians or metres for a unit of the DOF."""
@@ -96,7 +96,7 @@ def _moved(skeleton: Skeleton) -> NDArray[np.bool_]:
 
 
 def closest(limbs: Limbs, s: int, T: Array, points: Array) -> Surface:
-    """Closest points of points (P, 3), world, to part `s`, whose joint has the transform T (4, 4)."""
+    """The points on part `s` closest to points (P, 3), world; T (4, 4): the transform of the part's joint."""
     R = T[:3, :3] @ limbs.rotations[s]
     origin = T[:3, :3] @ limbs.starts[s] + T[:3, 3]
     distance, feet, normals = _closest((points - origin) @ R, limbs.lengths[s], limbs.shears[s], limbs.radii[s], limbs.caps[s])
@@ -127,7 +127,7 @@ def _closest(p: Array, length: float, shear: Array, radii: Array, caps: Array) -
 
 
 def _to_disc(found: Surface, p: Array, sign: float, depth: Array, middle: Array, level: Array, z: float) -> Surface:
-    """`found`, with points on a flat end instead where these are nearer: beyond the end, or inside and close below it."""
+    """`found`, with points on a flat end instead if these are nearer: beyond the end, or inside and close below it."""
     rho = np.linalg.norm(level, axis=1)
     beyond, below = depth < 0, (depth >= 0) & (rho < 1) & (depth < -found.distance)
     feet = np.column_stack([middle + (p[:, :2] - middle) / np.maximum(rho, 1)[:, None], np.full(len(p), z)])
@@ -172,7 +172,7 @@ def move_by_forces(
     """The pose (D,) after one iteration of simulated force and moment (eqs. 32-41).
 
     Forces are divided by the number of points, moments by the points' inertia about the axis, so that the step does not depend on their
-    number, which the paper leaves to its weights lambda and rho.
+    number. The paper leaves this to its weights lambda and rho.
     """
     limbs, (T, motions) = _limbs(body), place(body.skeleton, pose)
     which, _, found = nearest(limbs, T, points, normals, surface.epsilon, surface.nearest)
@@ -201,7 +201,7 @@ def normal_equations(
 ) -> tuple[Array, Array]:
     """H (D, D) and g (D,) of the distances to the body along the points' normals: H step = g moves a pose (D,) toward the points.
 
-    A point's weight falls with its distance (Geman & McClure 1987), to zero where the normals are opposed; both are means over the points.
+    A point's weight falls with its distance (Geman & McClure 1987), to zero if the normals are opposed; both are means over the points.
     """
     limbs, (T, motions) = _limbs(body), place(body.skeleton, pose)
     which, apart, found = nearest(limbs, T, points, normals, surface.epsilon, surface.nearest)
@@ -219,7 +219,7 @@ def move_by_gauss_newton(
     body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings, pull: float = 1e-6,
     damping: float = 0.03,
 ) -> Array:
-    """The pose (D,) after one damped Gauss-Newton step, pulled by `pull` to where it is; a DOF at its limit that would go beyond is left
+    """The pose (D,) after one damped Gauss-Newton step, pulled by `pull` to its value; a DOF at its limit that would go beyond is left
     out of the system."""
     H, g = normal_equations(body, pose, points, normals, weights, surface)
     low, high = body.skeleton.limits

@@ -15,7 +15,7 @@ class OpenCV:
     """Costs by `fillConvexPoly`, `bitwise_xor` and `countNonZero`; polygons, masks and buffers are made beforehand and not timed."""
 
     def __init__(self, case: MonoCase) -> None:
-        """Make all but the drawing ready."""
+        """Prepare everything but the drawing."""
         corners, counts = case.picture.polygons(case.picture.transforms(case.poses), case.partial.moving)
         self.polygons = [[np.rint(c[:m]).astype(np.int32) for c, m in zip(*pair) if m] for pair in zip(corners, counts)]
         self.mask, self.fixed = case.mask.astype(np.uint8), case.fixed.astype(np.uint8)
@@ -41,7 +41,7 @@ class OpenCV:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Inside, OpenCV works in one thread."""
+    """Context in which OpenCV uses one thread."""
     import cv2
 
     threads = cv2.getNumThreads()

@@ -1,4 +1,4 @@
-"""All that `shadowpuppet bench` measures, one tracker after the other, and its file of figures."""
+"""All measurements of `shadowpuppet bench`, one tracker after the other, and the file of its figures."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from shadowpuppet.threads import one_blas_thread
 
 
 def run_bench(quick: bool = False, listener: Listener | None = None) -> dict[str, Any]:
-    """All figures by flat keys, with `environment` and `raw` (median, least and rounds of all that was timed, seconds a unit).
+    """All figures by flat keys, with `environment` and `raw` (median and least seconds per unit, and rounds, of each timed function).
 
-    `quick`: fewer rounds, shorter films, nothing compiled anew. Raises `ShadowPuppetError` where a part of it fails.
+    `quick`: fewer rounds, shorter films, no times with compilation. Raises `ShadowPuppetError` if a part of it fails.
     """
     listener = listener or Listener()
     with one_blas_thread():
@@ -29,7 +29,7 @@ def run_bench(quick: bool = False, listener: Listener | None = None) -> dict[str
 
 
 def check_writable(path: Path) -> None:
-    """Raises `ShadowPuppetError` where a file cannot be written: before the minutes of work."""
+    """Raise `ShadowPuppetError` if a file cannot be written; called before minutes of work."""
     missing = not path.exists()
     try:
         with path.open("ab"):
@@ -41,5 +41,5 @@ def check_writable(path: Path) -> None:
 
 
 def write_figures(path: Path, figures: Mapping[str, Any]) -> None:
-    """Write all figures as JSON, null for those not known. Raises `ShadowPuppetError` where it cannot be written."""
+    """Write all figures as JSON, null for those not known. Raises `ShadowPuppetError` if the file cannot be written."""
     write_whole(path, json.dumps(figures, indent=1, allow_nan=False) + "\n")

@@ -1,4 +1,4 @@
-"""Times of contenders, measured in turns, so that a busy machine slows all alike."""
+"""Times of several functions, measured in turns, so that a busy machine slows all equally."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Contender(NamedTuple):
 
 
 def in_turns(contenders: Mapping[str, Contender], rounds: int) -> dict[str, Times]:
-    """Times by name. Every round calls all contenders, one after another; each timed call follows an untimed one, so that none pays for
-    the caches that the one before it left."""
+    """Times by name. Every round calls all contenders, one after another; each timed call follows an untimed one, so that none
+    depends on the caches' content after the one before it."""
     spent: dict[str, list[float]] = {name: [] for name in contenders}
     for _ in range(rounds):
         for name, (run, units) in contenders.items():
@@ -39,7 +39,7 @@ def in_turns(contenders: Mapping[str, Contender], rounds: int) -> dict[str, Time
 
 
 class Figures(NamedTuple):
-    """Which figures follow from the times of contenders, by key."""
+    """Figures to compute from the times of contenders, by key."""
 
     times: Mapping[str, tuple[float, str]]
     """Units in a second (1e3 for ms) and contender: median time."""

@@ -1,4 +1,4 @@
-"""The report page: one file that needs nothing else and makes no request."""
+"""The report page: one self-contained HTML file that makes no requests."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from shadowpuppet.evaluation.summary_text import coverage_text
 from shadowpuppet.io.files.text import write_whole
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
-"""Forbids the browser to fetch anything."""
+"""Content security policy: the browser fetches nothing."""
 
 
 def check_report(path: str | Path, folder: str | Path) -> None:
@@ -46,7 +46,7 @@ def write_report(path: str | Path, of: Evaluation) -> None:
 
 
 def page(of: Evaluation) -> str:
-    """The page, HTML."""
+    """The page as HTML."""
     name = of.run.folder.resolve().name
     css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
     return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'

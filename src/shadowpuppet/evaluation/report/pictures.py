@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from shadowpuppet.video import Image
 
 WORST, TYPICAL, MAX_LOST = 6, 2, 2
-"""Number of frames shown, and how many of the worst may be without a pose."""
+"""Numbers of bad and of typical frames shown, and of bad frames that may be without a pose."""
 SPACING = 0.5
 """Seconds between the worst frames; less in short runs, more in long ones."""
 MAX_VIEWS = 5
 """Cameras shown side by side: those that see the person largest."""
 MAX_WIDTH = 1280
-"""Of a picture in the page, pixels."""
+"""Largest width of a picture in the page, pixels."""
 MIN_HEIGHT = 440
 """Height of a picture at which thin lines look good, pixels."""
 QUALITY = 82

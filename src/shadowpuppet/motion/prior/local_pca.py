@@ -1,7 +1,7 @@
 """Local principal subspaces: regions of the space of poses, each with a centre and the few directions in which poses vary there.
 
 The local model of VQPCA (Kambhatla & Leen 1997; Ni 2008, IV). Its density has one variance in all but the leading directions (Tipping &
-Bishop 1999), because the covariance of a region with fewer poses than numbers in a pose is singular.
+Bishop 1999), because the covariance of a region with fewer poses than values in a pose is singular.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from shadowpuppet.geometry import Array
 
 Regions = NDArray[np.int64]
 ORTHONORMAL_TOLERANCE = 1e-6
-"""Largest difference of the basis vectors' products from one and zero."""
+"""Largest difference of the basis vectors' inner products from one or zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Subspaces:
 
     @property
     def width(self) -> int:
-        """Numbers of a pose, D."""
+        """Number of values in a pose, D."""
         return self.bases.shape[1]
 
     @property
@@ -70,7 +70,7 @@ class Subspaces:
     @cached_property
     def _flat(self) -> tuple[Array, Array, Array, Array]:
         """For all regions at once: mean of the centres (D,), centres from there (M, D), bases (D, M m), the centres' coordinates (M m,)."""
-        middle = self.centres.mean(0)  # offsets keep the distances' digits for poses far from zero
+        middle = self.centres.mean(0)  # offsets keep the distances precise for poses far from zero
         centres, flat = self.centres - middle, np.ascontiguousarray(self.bases.transpose(1, 0, 2)).reshape(self.width, -1)
         return middle, centres, flat, np.einsum("id,idk->ik", centres, self.bases).ravel()
 
@@ -106,7 +106,7 @@ class Subspaces:
         return -0.5 * (along + self._distances(poses, coordinates) / self.noise * (beside > 0) + spread)
 
     def _distances(self, poses: Array, coordinates: Array) -> Array:
-        """By Pythagoras, from the distances to the centres."""
+        """Squared distances (N, M) from every subspace: by Pythagoras, from the distances to the centres."""
         middle, centres, _, _ = self._flat
         offsets = poses - middle
         to_centres = (offsets**2).sum(1)[:, None] - 2 * offsets @ centres.T + (centres**2).sum(1)

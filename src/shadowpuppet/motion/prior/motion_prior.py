@@ -41,7 +41,7 @@ class Proposal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MotionPrior:
-    """A learnt motion. Raises `ShadowPuppetError` for arrays that do not fit together and for numbers that are no probabilities."""
+    """A learnt model of motion. Raises `ShadowPuppetError` for arrays that do not fit together and for invalid probabilities."""
 
     subspaces: Subspaces
     """M regions of poses of D numbers."""
@@ -104,7 +104,7 @@ class MotionPrior:
         return cumulative / cumulative[:, -1:]
 
     def _follow(self, regions: Regions, points: Array) -> Regions:
-        """The next region of each, by inversion of uniform numbers `points` (N,) in (0, 1]."""
+        """The next region after each of `regions` (N,), by inversion of uniform numbers `points` (N,) in (0, 1]."""
         return (self._cumulative[regions] < points[:, None]).sum(1)
 
     def _checked(self, poses: ArrayLike) -> Array:

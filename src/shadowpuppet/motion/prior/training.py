@@ -26,7 +26,7 @@ from shadowpuppet.motion.prior.vqpca import PriorFit, RegionChoice, choose_regio
 RATE = 60.0
 """Default frame rate of a prior, frames/s: that of HumanEva."""
 DOUBTFUL_RESIDUAL, WRONG_RESIDUAL = 0.03, 0.1
-"""Residuals of the joints, metres, from which a motion gives a warning, and an error: no person, or joints that are defined otherwise."""
+"""Residuals of the joints, metres, from which a motion gives a warning, and an error: no person, or joints with other definitions."""
 MIN_MOTION = np.radians(0.5)
 """Root mean square deviation of the angles, rad, below which there is no motion."""
 
@@ -155,7 +155,7 @@ def _check_fit(name: str, fitted: FittedPoses) -> None:
 
 
 def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
-    """Poses of the parts, with headings that differ by no whole turns."""
+    """Poses of the parts, without whole turns between their headings."""
     column = skeleton.dof_names.index("root_heading")
     base, out = float(np.median(parts[0][:, column])), []
     for part in parts:

@@ -22,7 +22,7 @@ from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 
 MAX_VALUE = 1e9
-"""Bound of a pose's numbers: squares of larger ones lose their digits."""
+"""Bound of the values in a pose: squares of larger ones lose precision."""
 MIN_VARIANCE = 1e-150
 """Smallest variance, for poses that hardly vary: densities stay finite."""
 

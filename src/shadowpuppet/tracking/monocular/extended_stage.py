@@ -1,6 +1,6 @@
-"""What our default adds to a stage of Liu 2011: costs beside eq. 2, candidates beside the particles, the mean as estimate.
+"""Extensions of a stage of Liu 2011 in the default preset: further costs, further candidates, and the mean as estimate.
 
-All of it is off in the preset `liu2011`, whose stages are plain `FilterStage`s.
+All are off in the preset `liu2011`, which has plain `FilterStage`s.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from shadowpuppet.tracking.silhouette_cost import Cost, Observation
 TORSO_SPREAD, LIMB_SPREAD = 0.3, 0.2
 """Standard deviations (rad) of explored candidates: the torso's angles about upright, a limb's about a coarse posture."""
 MEAN_TEMPERATURE = 50.0
-"""For the mean estimate: a particle whose cost is this much higher (pixels at 320 x 240) weighs 1/e."""
+"""For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
 
 
 def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None) -> FilterStage:
-    """The paper's stage, or the extended one where the settings ask for any extension. Arguments and errors: as `FilterStage`."""
+    """The paper's stage, or the extended one if the settings use any extension. Arguments and errors: as for `FilterStage`."""
     extended = settings.explore or settings.motion_weight or settings.posture_weight or settings.estimate != "best"
     return (ExtendedStage if extended else FilterStage)(picture, settings, name, scheme)
 
 
 class ExtendedStage(FilterStage):
-    """A stage with exploration, a pull to usual postures, a pull to the last frame, and a mean estimate, as the settings ask."""
+    """A stage with exploration, a pull to usual postures, a pull to the last frame, and a mean estimate, as set in the settings."""
 
     def propose(self, cycle: int) -> Propose:
         """The paper's noise; in the first cycle of a stage of one part also `explore` candidates."""
@@ -54,7 +54,7 @@ class ExtendedStage(FilterStage):
         return costs + super().extra_costs(observation, last)
 
     def _motion_cost(self, weight: float, last: Array) -> Cost:
-        """A pull of the stage's shoulders, elbows, hands, knees and ankles to where they were in `last` (D,); bounded far away."""
+        """A pull of the stage's shoulders, elbows, hands, knees and ankles to their positions in `last` (D,); bounded far away."""
         names = [name for part in self.parts for name in PULLED_POINTS[part]]
         before, reach = self.picture.points(last[None], names), self.settings.motion_reach
 

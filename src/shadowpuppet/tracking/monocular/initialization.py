@@ -1,4 +1,4 @@
-"""A person's sizes and place from silhouettes: in known postures (Liu 2011, Algorithm 1), or in any with the help of body proportions."""
+"""A person's sizes and place from silhouettes: in known postures (Liu 2011, Algorithm 1), or in any posture by body proportions."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ POSTURES: Mapping[str, Mapping[str, float]] = {
 POSTURE_OF = dict(zip(SUBSETS, POSTURES, strict=True))
 """The posture in which each subset of sizes is fitted."""
 THINNEST_ROW = 1 / 60
-"""Least pixels of a row or column of a person, as a share of the picture's height: specks and lines have less."""
+"""Smallest number of pixels in a person's row or column, as a share of the picture's height; specks and lines have fewer."""
 MIN_DISTANCE_RATIO, MAX_DISTANCE_RATIO = 0.3, 2.0
-"""Range of a plausible given distance, relative to that at which the upper body (nearest), or the whole person or level arms (farthest),
-have the size in the reference. Wide: arms may hang, and a part of the person may be outside the picture."""
+"""Range of plausible given distances, relative to the distance at which the upper body (minimum), or the whole person or level arms
+(maximum), would have the size seen in the reference. It is wide, as arms may hang and parts of the person be outside the picture."""
 
 
 @dataclass(frozen=True, eq=False)
 class SizeFit:
-    """A person fitted to pictures."""
+    """Result of fitting a person to pictures."""
 
     guess: PersonEstimate
     curves: Mapping[str, tuple[tuple[float, ...], ...]]
@@ -54,8 +54,8 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
     """Algorithm 1: sizes from masks (H, W) of a person in the known postures `POSTURES`.
 
     Height (m, shoes on) or distance (m) fixes the scale; without either the average height is assumed. The person may stand anywhere
-    sideways: the torso's place is found with the sizes. Raises `TrackingError` for an unknown posture, a mask that has not the camera's
-    size, is empty or nearly all of the picture, or an impossible height or distance.
+    sideways: the torso's place is found with the sizes. Raises `TrackingError` for an unknown posture, a mask that is not of the
+    camera's size, is empty or nearly all of the picture, or an impossible height or distance.
     """
     settings = settings or InitializationSettings()
     _check_scale(height, distance)
@@ -92,7 +92,7 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
 
     Initial sizes are the average person's for the height (m, shoes on), or those given; places are tried with coarse poses in the first
     masks; then place, poses and, unless given, sizes are fitted together. `body`: a name, or a function of `CardboxSizes`. Raises
-    `TrackingError` if no mask shows a person or one has not the camera's size, or for an impossible height or distance.
+    `TrackingError` if no mask shows a person or one is not of the camera's size, or for an impossible height or distance.
     """
     settings = settings or InitializationSettings()
     if isinstance(body, str) and body in WHOLE:
@@ -115,7 +115,7 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
 
 def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None,
                 sizes: Sizes | None, body: str, settings: InitializationSettings) -> SizeFit:
-    """A whole body: the upper one is fitted first, since the legs may be outside the picture."""
+    """`find_person` for a whole body: the upper body is fitted first, since the legs may be outside the picture."""
     assert sizes is None or isinstance(sizes, BoneSizes)
     if height is None and sizes is not None:
         height = stature_of(dict(zip(sizes.names(), sizes.to_array().tolist()))) + SOLE
@@ -125,7 +125,7 @@ def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
 
 def as_whole(camera: Camera, masks: Sequence[Mask], fit: SizeFit, body: str, sizes: BoneSizes | None = None,
              distance: float | None = None) -> SizeFit:
-    """The fit of an upper body turned into that of a whole one, with new poses, and new sizes and distance (m) unless given. Overlaps
+    """The fit of an upper body converted to that of a whole one, with new poses, and new sizes and distance (m) unless given. Overlaps
     stay the upper body's: they show how well the person was measured."""
     guess = whole_from_estimate(camera, masks, fit.guess, body, sizes, distance)
     picture = guess.picture(camera, body)
@@ -150,7 +150,7 @@ def refine(rng: np.random.Generator, camera: Camera, initial: PersonEstimate, ma
 
 
 def _fit(search: SizeSearch, names: Sequence[str], curves: Mapping[str, list[tuple[float, ...]]]) -> SizeFit:
-    """The current state of a search."""
+    """The result of a search so far."""
     overlaps = dict(zip(names, search.overlaps(), strict=True))
     return SizeFit(search.estimate(), {subset: tuple(each) for subset, each in curves.items()}, overlaps, search.poses().copy())
 
@@ -178,7 +178,7 @@ def _checked(camera: Camera, references: Mapping[str, Mask]) -> dict[str, Mask]:
 
 def _candidates(camera: Camera, mask: Mask, height: float | None, distance: float | None,
                 sizes: CardboxSizes | None) -> list[PersonEstimate]:
-    """People of plausible sizes at plausible places, the crown at the mask's upper edge or, for raised arms, below it."""
+    """Candidates of plausible sizes at plausible places, with the crown at the mask's upper edge or, for raised arms, below it."""
     top = np.flatnonzero(mask.any(1))[0]
     centre = np.flatnonzero(mask.any(0)).mean()
     known = height is not None or sizes is not None or distance is None
@@ -195,12 +195,12 @@ def _candidates(camera: Camera, mask: Mask, height: float | None, distance: floa
 
 
 def _span(sizes: CardboxSizes) -> float:
-    """From one hand's end to the other's with level arms, metres."""
+    """Distance between the hands' ends with level arms, metres."""
     return 2 * (sizes.shoulder_width / 2 - sizes.shoulder_inset + sizes.upper_arm_length + sizes.forearm_length)
 
 
 def _upper(sizes: CardboxSizes) -> float:
-    """From the waist's lower edge to the crown, metres."""
+    """Height of the crown above the waist's lower edge, metres."""
     return sizes.torso_height + sizes.head_height + sizes.neck_gap + sizes.waist_height
 
 

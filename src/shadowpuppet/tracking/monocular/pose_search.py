@@ -1,4 +1,4 @@
-"""A pose from one silhouette without an earlier one: coarse postures are tried, one body part after the other."""
+"""A pose from one silhouette, without an earlier pose: coarse postures are tried, one body part after the other."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PLACES = 161
 
 
 class CoarsePose(NamedTuple):
-    """Result of the search."""
+    """Result of `search_pose`."""
 
     pose: Array
     """The best pose, of shape (D,)."""
@@ -32,8 +32,8 @@ class CoarsePose(NamedTuple):
 
 
 def search_pose(picture: Picture, mask: NDArray[np.bool_]) -> CoarsePose:
-    """The upright pose, facing the camera, and the coarse limbs of least cost (eq. 2) in a mask (H, W); legs do not count for an upper
-    body. The torso is moved sideways without arms, then each arm is tried without the other, and the first once more with both; then the
+    """The upright pose, facing the camera, with the coarse limbs of least cost (eq. 2) in a mask (H, W); legs do not count for an upper
+    body. The torso is moved sideways without arms; then one arm is tried alone, the other with the first, and the first once more; then the
     legs of a whole body, which are straight until then."""
     skeleton = picture.body.skeleton
     arms, legs = ([limb for limb in limbs_of(skeleton) if limb.endswith(kind)] for kind in ("arm", "leg"))
@@ -56,8 +56,7 @@ def search_pose(picture: Picture, mask: NDArray[np.bool_]) -> CoarsePose:
 
 
 def align_sideways(picture: Picture, mask: NDArray[np.bool_], pose: Array) -> Array:
-    """A pose (D,) moved sideways to the least cost in a mask (H, W), whatever else the mask shows. The legs' pixels count at every
-    place: they cost the same everywhere."""
+    """A pose (D,) moved sideways to the least cost in a mask (H, W). The legs' pixels count: they cost the same at every position."""
     poses = _sideways(picture, pose)[1]
     return poses[np.argmin(silhouette_costs(picture, Observation.of(mask, np.zeros_like(mask)), poses))]
 

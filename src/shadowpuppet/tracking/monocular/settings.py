@@ -12,7 +12,7 @@ from shadowpuppet.settings import NonNegative, Positive, Share, checked, from_pr
 
 
 def pixel_scale(size: tuple[int, int]) -> float:
-    """Factor for settings in pixels, which hold for 320 x 240, at another width and height."""
+    """Factor that converts settings in pixels, given for 320 x 240, to another width and height."""
     return size[0] * size[1] / (320 * 240)
 
 
@@ -21,7 +21,7 @@ class PartSettings:
     """Sampling and weighting of one stage (a column of Liu 2011, Table I)."""
 
     particles: Annotated[int, Field(ge=2, le=1_000_000)] = 200
-    """Particles, N."""
+    """Number of particles, N."""
     survival: Share = 0.2
     """Share e of particles that survive deterministic resampling."""
     sigma_rotation: Positive = 0.1
@@ -34,7 +34,7 @@ class PartSettings:
 
 @checked
 class MonocularSettings:
-    """The one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
+    """Settings of the one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
     body: BodyName = "rounded"
     """The body's model: of the upper body (cardbox, boxes, rounded) or of the whole person."""
@@ -46,23 +46,23 @@ class MonocularSettings:
     """Each arm's stage."""
     stages: Annotated[tuple[str, ...], Field(min_length=1)] = ("torso", "left_arm", "right_arm")
     """The filter's stages, in order; parts joined by + are estimated together ("torso+left_arm+right_arm" is a flat filter). Legs of a
-    whole body that no stage names follow."""
+    whole body that are not listed are added at the end."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
-    """Estimation cycles a frame. More fit the silhouette closer, but not the person: many particles in one cycle do better."""
+    """Estimation cycles per frame. More cycles fit the silhouette better, but not the person; more particles in one cycle are better."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
-    """The noise is multiplied by this from cycle to cycle."""
+    """Factor of the noise from one cycle to the next."""
     explore: Annotated[int, Field(ge=0, le=100_000)] = 500
     """Candidates from a part's whole range, added to the particles in each frame's first cycle."""
     rank_by: Literal["last", "new"] = "last"
-    """Costs that rank and weigh before resampling: those of the last picture, or measured again in the new one (eq. 8 as printed), which
-    doubles the evaluations."""
+    """Costs that rank and weigh the particles before resampling: those in the last picture, or computed again in the new one (eq. 8 as
+    printed), which doubles the evaluations."""
     torso_arms: Literal["last", "hidden"] = "hidden"
     """How the torso's stage draws the arms: as last estimated, moving with the torso, or not at all."""
     estimate: Literal["best", "mean"] = "mean"
     """A cycle's estimate: the particle of least cost, or the weighted mean of all."""
     motion_weight: NonNegative = 200.0
-    """Pull of shoulders, elbows and hands to their last positions (pixels per m^2, at 320 x 240). Holds what the picture does not show,
-    above all an arm's depth."""
+    """Pull of shoulders, elbows and hands to their last positions (pixels per m^2, at 320 x 240). It determines what the picture does
+    not show, above all an arm's depth."""
     motion_reach: Positive = 0.3
     """Distance (m) from which the pull no longer grows, so that a clear movement is followed."""
     posture_weight: NonNegative = 20.0
@@ -70,9 +70,9 @@ class MonocularSettings:
     limits: bool = True
     """Keep joint limits."""
     recover: bool = True
-    """Search again for a person who was lost, or comes back. The papers' filters go on from where they are."""
+    """Search for the person again after a loss or an absence. The papers' filters continue from their last particles."""
     ignore_legs: bool = True
-    """Leave out of the cost the silhouette below the waist, where the model has no legs; without effect for a whole body."""
+    """Leave the silhouette below the waist, where the model has no legs, out of the cost; no effect for a whole body."""
 
 
 PRESETS: dict[str, dict] = {
@@ -104,13 +104,13 @@ class InitializationSettings:
     """Search of a person's sizes (Liu 2011, Algorithm 1). The paper draws with sigma = 0.05 throughout and has no prior."""
 
     hypotheses: Annotated[int, Field(ge=2, le=100_000)] = 200
-    """Hypotheses a round, M."""
+    """Number of hypotheses per round, M."""
     sigma: Positive = 0.05
     """Noise of the sizes, sigma_alpha (m)."""
     share: Annotated[float, Field(gt=0, le=1)] = 0.4
-    """Probability of each size to be drawn anew in a hypothesis; 1 in the paper."""
+    """Probability that a hypothesis changes a size; 1 in the paper."""
     shrink: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """The noise is multiplied by this from round to round."""
+    """Factor of the noise from one round to the next."""
     prior_weight: NonNegative = 15.0
     """Pull of the sizes to published proportions (pixels per squared deviation, at 320 x 240)."""
     posture_weight: NonNegative = 10.0
@@ -118,8 +118,8 @@ class InitializationSettings:
     tolerance: Share = 0.005
     """A subset is done when its cost has not improved by this share within `patience` rounds."""
     patience: Annotated[int, Field(ge=1)] = 15
-    """See `tolerance`."""
+    """Number of rounds without improvement after which a subset is done (see `tolerance`)."""
     rounds: Annotated[int, Field(ge=1)] = 40
-    """Most rounds for each subset."""
+    """Largest number of rounds for each subset."""
     sweeps: Annotated[int, Field(ge=1)] = 3
     """Number of passes through the three subsets."""

@@ -22,7 +22,7 @@ from shadowpuppet.tracking.silhouette_cost import Observation
 
 SIZE_NAMES = CardboxSizes.names()
 CROTCH_GAP = 1 / 80
-"""Height, as a share of the picture's, of a visible gap between the legs: less may be noise."""
+"""Smallest height of a gap between the legs, as a share of the picture's; smaller ones may be noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class SizeSearch:
                        elevation=self.initial.elevation + up)
 
     def observe(self) -> list[Observation]:
-        """The pictures without the legs under the current estimate; a visible crotch counts."""
+        """One observation per picture without the legs' region under the current estimate, except what `_above_crotch` returns."""
         picture, out = self.estimate().picture(self.camera, self.body), []
         for mask, pose in zip(self.masks, self.poses(), strict=True):
             legs = picture.legs(pose)
@@ -191,9 +191,9 @@ class SizeSearch:
 
 
 def _above_crotch(mask: Mask, legs: Mask, under: Mask) -> Mask:
-    """The part of a mask (H, W) that counts although legs may be there: below the hem, in the middle, down to the crotch; empty if none
-    shows. A crotch shows where rows have a leg to the left, a leg to the right and nothing between. `legs` and `under`: regions where
-    legs may be, and straight below the hem."""
+    """Pixels (H, W) that count although legs may be there: below the hem, in the middle, down to the crotch; none if no crotch is visible.
+    A crotch is visible if some rows have a leg to the left, a leg to the right and nothing between. `legs` and `under`: the regions (H, W)
+    where legs may be, and straight below the hem."""
     out = np.zeros_like(mask)
     rows = np.flatnonzero(legs.any(1))
     if not len(rows):

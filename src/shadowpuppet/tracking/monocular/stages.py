@@ -1,4 +1,4 @@
-"""A stage of the hierarchical particle filter of Liu 2011 (IV-B): the DOF that it estimates, how it draws and how it weighs them."""
+"""A stage of the hierarchical particle filter of Liu 2011 (IV-B): the DOF that it estimates, their proposals, costs and weights."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class FilterStage:
         self.sigma_cost = table[self.parts[0]].sigma_cost * self.scale
 
     def clamp(self, values: Array) -> Array:
-        """Values (N, d) clipped to the joint limits, if the settings keep these."""
+        """Values (N, d) clipped to the joint limits if `limits` is set."""
         low, high = self.picture.body.skeleton.limits
         return np.clip(values, low[self.dofs], high[self.dofs]) if self.settings.limits else values
 
@@ -56,12 +56,12 @@ class FilterStage:
         return poses if values.ndim == 2 else poses[0]
 
     def propose(self, cycle: int) -> Propose:
-        """Gaussian noise on every particle but the first (Algorithms 3 and 4), `cooling` times less in every further cycle."""
+        """Gaussian noise on every particle but the first (Algorithms 3 and 4), multiplied by `cooling` for every further cycle."""
         sigma = self.sigma * self.settings.cooling**cycle
         return lambda rng, values: self.clamp(diffuse(rng, values, sigma))
 
     def weigh(self, observation: Observation, others: Array, last: Array) -> Weigh:
-        """Costs (N,) and log weights (N,) as a function of values (N, d).
+        """The function from values (N, d) to costs (N,) and log weights (N,).
 
         Args:
             others: the pose (D,) that all other DOF are taken from.

@@ -29,7 +29,7 @@ class State(NamedTuple):
     pose: Array
     """The estimate, of shape (D,)."""
     particles: tuple[Particles, ...]
-    """One set a stage, in the order of `stages`; its poses hold the stage's DOF only."""
+    """One set per stage, in the order of `stages`; its poses hold the stage's DOF only."""
     cost: float
     """Eq. 2 of the estimate, pixels."""
     overlap: float
@@ -62,7 +62,7 @@ class MonocularTracker:
         last, particles = state.pose, list(state.particles)
         estimate, observation = last, self.observe(mask, last, also)
         for cycle in range(self.settings.cycles):
-            others = estimate  # the DOF outside a stage: the torso's new estimate counts at once, one limb's does not for the others
+            others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
                 weigh = stage.weigh(observation, others, last)
                 ranked = evaluate(particles[i].poses, weigh) if self.settings.rank_by == "new" else particles[i]  # eq. 8 as printed
@@ -72,8 +72,8 @@ class MonocularTracker:
         return self.judge(estimate, particles, observation)
 
     def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
-        """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` where nobody is
-        there. `also`, and what is raised: as `step`."""
+        """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` if no
+        person is visible. `also` and errors: as in `step`."""
         mask = check_mask(mask, self.picture.camera.size)
         found = pose_search.search_pose(self.picture, mask)
         observation, particles = self.observe(mask, found.pose, also), []
@@ -90,7 +90,7 @@ class MonocularTracker:
         return settle(state, lambda state: self.cycle(rng, state, mask, also))
 
     def observe(self, mask: Mask, pose: Array, also: Cost | None = None) -> Observation:
-        """The observation of a mask (H, W); with `ignore_legs` less the region where the legs of `pose` (D,) may be."""
+        """The observation of a mask (H, W); with `ignore_legs` without the region where the legs of `pose` (D,) may be."""
         return Observation.without_legs(mask, self.picture, pose, also) if self.settings.ignore_legs else Observation.of(mask, also=also)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
@@ -109,7 +109,7 @@ class MonocularTracker:
 
     @cached_property
     def stages(self) -> tuple[FilterStage, ...]:
-        """The filter's stages, in order; a whole body's legs that no stage names follow."""
+        """The filter's stages, in order; a whole body's legs that are not among them are added at the end."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
         return tuple(make_stage(self.picture, self.settings, name, self.scheme) for name in (*named, *legs))

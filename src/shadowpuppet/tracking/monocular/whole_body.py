@@ -1,4 +1,4 @@
-"""A whole person before one camera from the fit of an upper body: the distance from the soles, and widths that include clothes."""
+"""A whole body from the fit of an upper body to one camera: the distance from the soles, and widths that include clothes."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ WIDTH_GROUPS = (
 
 def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEstimate, body: str, sizes: BoneSizes | None = None,
                         distance: float | None = None) -> PersonEstimate:
-    """A whole body in place of an upper one, necks at the same place, from masks (H, W) of a person facing the camera. The distance (m),
-    if not given, comes from visible soles: trunk and arms alone determine it worse, as clothes can make them wide. Given sizes are kept."""
+    """The whole-body estimate for an upper-body one, with the neck at the same place, from masks (H, W) of a person facing the camera. The
+    distance (m), if not given, comes from visible soles: trunk and arms alone determine it worse, as clothes can make them wide. Given
+    sizes are kept."""
     found = upper.sizes
     assert isinstance(found, CardboxSizes)
     whole: BoneSizes = sizes or whole_from_upper(body, found, upper.height)
@@ -50,7 +51,7 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
 
 
 def _at_distance(estimate: PersonEstimate, factor: float, neck: float) -> PersonEstimate:
-    """The person at `factor` times the distance, the neck, `neck` metres above the pelvis, at the same place in the picture."""
+    """The estimate at `factor` times the distance, with the neck (`neck` metres above the pelvis) at the same place in the picture."""
     return replace(estimate, distance=factor * estimate.distance, elevation=factor * (estimate.elevation + neck) - neck)
 
 
@@ -62,7 +63,7 @@ def _soles_row(picture: Picture, sizes: BoneSizes) -> float:
 
 
 def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str) -> PersonEstimate:
-    """The estimate with the widths that cover the masks best, in poses that are searched once."""
+    """The estimate with the widths of least silhouette cost, in poses that are searched once."""
     first_last = [masks[0], masks[-1]]
     poses = [search_pose(estimate.picture(camera, body), mask).pose for mask in first_last]
     for names in WIDTH_GROUPS:

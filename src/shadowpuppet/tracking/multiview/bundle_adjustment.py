@@ -1,4 +1,4 @@
-"""Bundle adjustment: body sizes and the poses of several frames, solved together for the surface points of all.
+"""Bundle adjustment: body sizes and the poses of several frames, fitted jointly to the surface points of these frames.
 
 A body's joint offsets and limb shapes are linear in its sizes.
 """
@@ -34,7 +34,7 @@ Measured = TypeVar("Measured", bound=Sizes)
 SIZE_STEP = 1e-3
 """Step (m) of the finite differences with respect to the sizes."""
 POINT_NOISE, INDEPENDENT_POINTS = 0.01, 30.0
-"""Standard deviation (m) of a surface point from its body, and effective number of independent points per frame: neighbours err alike."""
+"""Standard deviation (m) of a surface point from its body; effective number of independent points per frame (neighbours correlate)."""
 ROUNDS = 10
 MAX_SIZE_STEP, MAX_POSE_STEP = 0.03, 0.3
 """Largest step of a size (m) and of a DOF (rad or m) in a round."""
@@ -42,7 +42,7 @@ MAX_SIZE_STEP, MAX_POSE_STEP = 0.03, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Bundle(Generic[Measured]):
-    """The solution."""
+    """Sizes and poses that fit the surface points best."""
 
     sizes: Measured
     poses: Array
@@ -54,7 +54,7 @@ class Bundle(Generic[Measured]):
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
                  first: Measured | None = None, worth: float = INDEPENDENT_POINTS) -> Bundle[Measured]:
-    """Sizes and poses for the surface points of F frames, by damped Gauss-Newton from poses (F, D) and the sizes `first` or `expected`.
+    """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
     `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `pull`, one or (F, D): weight of the squared distance
     from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
@@ -81,7 +81,7 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
 
 
 class _Model(NamedTuple):
-    """A body as the kernels' arrays."""
+    """Arrays of a body for the kernels."""
 
     chain: Chain
     joints: NDArray[np.int64]
@@ -109,7 +109,7 @@ class _Frame(NamedTuple):
     """A frame's normal equations, divided by the total weight of its points."""
 
     cost: float
-    """Bounded, as in eq. 30."""
+    """Mean of the bounded squared distances, as in eq. 30, m^2."""
     squared: float
     """Weighted mean square distance to the tangent planes, m^2."""
     rows: Array
@@ -129,7 +129,7 @@ class _Solution(NamedTuple):
 
 
 def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[_Model]:
-    """Bodies with one size each larger by `SIZE_STEP`."""
+    """Bodies, one per free size, in which that size is larger by `SIZE_STEP`."""
     return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k)))) for k in free]
 
 
@@ -171,7 +171,7 @@ def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, s
 
 
 def _measured(model: _Model, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array]:
-    """Screws (D, 6), and of each point (9, P): distance along its normal, weight, moment and normal (6), bounded cost."""
+    """Screws (D, 6), and for each point (9, P) the distance along its normal, weight, moment and normal (6), and bounded cost."""
     T, screws, out = np.zeros((len(model.chain.parents), 3, 4)), np.zeros((len(pose), 6)), np.zeros((9, len(cloud.rows) * LANES))
     place_one(pose, model.chain, T, screws, np.zeros((3, 3, 3)))
     _tangents(T, model.joints, model.rotations, model.starts, model.parts, cloud.rows, cloud.spheres, cloud.origin,

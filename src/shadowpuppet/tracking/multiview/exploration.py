@@ -1,4 +1,4 @@
-"""Proposals of the default preset that ask no motion prior (not in Ni 2008): noise on some joints, and arms in other postures."""
+"""Proposals of the default preset without a motion prior (not in Ni 2008): noise on some joints, and other postures of an arm."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms
 
 NOISE_SCALES = (0.3, 1.0, 2.0)
-"""Each proposal's noise is multiplied by one of these."""
+"""Factors of the noise; each proposal draws one."""
 JOINT_CHANCE = 0.3
-"""Probability of each joint to be moved: a limb that was lost is found again while the rest of the body stays."""
+"""Probability that a joint is moved: with few joints moved, a lost limb is found again while the rest of the body stays."""
 ARM_NOISE, ARM_CANDIDATES = 0.4, 16
 """Noise (rad) of arm candidates, and how many are drawn per pose; the one of least silhouette cost is kept."""
 
 
 class Exploration:
-    """Poses near and far from the last ones, for a refinement to improve."""
+    """Draws poses near the last ones and far from them, which are then refined."""
 
     def __init__(self, skeleton: Skeleton, sigma: Array, share: float) -> None:
-        """`sigma`: deviations (D,) of the noise; `share`: of the poses that get another arm."""
+        """`sigma`: standard deviations (D,) of the noise; `share`: share of the poses in which one arm is replaced."""
         self.skeleton, self.sigma, self.share = skeleton, sigma, share
         self.owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs])
         arms = (usual_arms(skeleton, side) for side in ("left", "right"))
         self.arms = [(skeleton.dof_indices(arm), np.stack(list(arm.values()), 1)) for arm in arms]
 
     def __call__(self, rng: np.random.Generator, poses: Array, mismatch: Callable[[Array], Array], scale: float) -> Array:
-        """Poses (N, D) with `scale` times the noise on some joints, the last of them with another arm.
+        """Poses (N, D) with noise, times `scale`, on some joints; in the last `share` of them one arm is replaced.
 
-        `mismatch`: silhouette cost (M,) of poses (M, D), which decides between candidates for an arm.
+        `mismatch`: silhouette cost (M,) of poses (M, D), which selects among the candidates for an arm.
         """
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
         scales = rng.choice(NOISE_SCALES, size=(len(poses), 1))
@@ -43,7 +43,7 @@ class Exploration:
         return out
 
     def _other_arms(self, rng: np.random.Generator, poses: Array, mismatch: Callable[[Array], Array]) -> Array:
-        """Poses (N, D) with another arm each: of candidates near their own and near usual ones, the one of least silhouette cost."""
+        """Poses (N, D) with one arm replaced: by the candidate of least silhouette cost, drawn around the pose's own arm or a usual one."""
         out = np.repeat(poses, ARM_CANDIDATES, axis=0)
         for n, pose in enumerate(poses):
             dofs, arms = self.arms[rng.integers(2)]

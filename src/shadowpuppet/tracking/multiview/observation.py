@@ -29,7 +29,7 @@ class BodyInViews:
 
 
 class MultiviewObservation:
-    """One frame: surface points, and the masks (H, W) that they were made from, one per camera, None where there is none."""
+    """One frame: surface points, and the masks (H, W) that they were made from, one per camera, None for a camera without one."""
 
     def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
         """Everything is computed on first use. `also`: a cost of your own (m^2), added to that of the surface."""
@@ -57,12 +57,12 @@ class MultiviewObservation:
 
     @cached_property
     def silhouettes(self) -> tuple[tuple[Picture, Observation], ...]:
-        """The same as observations of the silhouette cost."""
+        """The same pictures, with their masks as observations of the silhouette cost."""
         return tuple((picture, Observation.of(mask)) for picture, mask in self.people)
 
     @cached_property
     def space(self) -> FreeSpace:
-        """Distances to the silhouettes, which say where no body is."""
+        """Distances to the silhouettes' outlines, for the silhouette constraint."""
         return free_space([(picture.camera, mask) for picture, mask in self.people])
 
     @cached_property
@@ -82,6 +82,6 @@ class MultiviewObservation:
 
 
 def _half_size(camera: Camera) -> Camera:
-    """The camera whose pictures are every second pixel of every second row."""
+    """The camera of pictures that keep every second pixel of every second row."""
     width, height = camera.size
     return replace(camera, size=((width + 1) // 2, (height + 1) // 2), matrix=np.diag([0.5, 0.5, 1.0]) @ camera.matrix)

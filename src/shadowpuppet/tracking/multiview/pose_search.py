@@ -1,4 +1,4 @@
-"""A first pose from one frame: usual postures and those of a library, in all directions, refined; the best are kept.
+"""Initial poses from one frame: usual postures and those of a library are refined in all headings, and the best kept.
 
 Ni 2008 does not say how tracking begins.
 """
@@ -19,25 +19,25 @@ from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 from shadowpuppet.tracking.particle_filter import Particles, Weigh, evaluate
 
 HEADINGS = 16
-"""Directions in which each posture is tried."""
+"""Number of headings in which each posture is tried."""
 MAX_LIBRARY_POSES = 60
-"""Larger libraries are sampled."""
+"""Largest number of library poses that are tried; larger libraries are sampled."""
 COARSE_CANDIDATES, FINE_CANDIDATES = 96, 32
-"""Poses that are refined on a share of the points, and on all."""
+"""Numbers of poses that are refined on a share of the points, and on all."""
 COARSE_STAGES = ((8, 4, 0.25), (4, 6, 0.12))
 FINE_STAGES = ((4, 4, 0.08), (1, 6, 0.05))
 """Stages of refinement: stride of the points, iterations, robust scale (m)."""
 ARM_ROUNDS, ARM_SAMPLES, ARM_SPREAD = 2, 600, 0.6
-"""How often each arm of the best pose is searched, with how many candidates, and their noise about the usual arms (rad)."""
+"""Number of searches for each arm of the best pose, candidates per search, and their noise about the usual arms (rad)."""
 PULL = 1e-4
-"""Pull to the posture before refinement (see `Refiner.gauss_newton`)."""
+"""Weight of the pull to the posture before refinement (see `Refiner.gauss_newton`)."""
 
 
 def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: MultiviewObservation, library: ArrayLike | None,
            weigh: Weigh, number: int) -> Particles:
-    """The `number` best poses (number, D) for a frame's surface points, weighed by `weigh`.
+    """The `number` best poses (number, D) for a frame's surface points, with the costs and weights of `weigh`.
 
-    `library`: poses (L, D) to begin with, whose place and heading are ignored.
+    `library`: initial poses (L, D); their position and heading are ignored.
     """
     postures = usual_postures(body.skeleton)
     known = np.asarray([] if library is None else library, float)
@@ -72,7 +72,7 @@ def _best(found: Particles, number: int) -> Particles:
 
 
 def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) -> Array:
-    """A pose (D,) with other arms on one side, near the usual ones, of shape (ARMS_TRIED, D)."""
+    """Copies (ARM_SAMPLES, D) of a pose (D,) with the arm of one side drawn around the usual ones."""
     skeleton, usual = body.skeleton, usual_arms(body.skeleton, side)
     poses, dofs = np.repeat(pose[None], ARM_SAMPLES, axis=0), skeleton.dof_indices(usual)
     arms = np.stack(list(usual.values()), 1)
@@ -81,7 +81,7 @@ def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) ->
 
 
 def place_postures(body: Body, postures: Array, middle: Array) -> Array:
-    """Postures (L, D) in all directions, with the limbs' centre at `middle` (3,), world; of shape (L HEADINGS, D)."""
+    """Postures (L, D) in all headings, with the limbs' centre at `middle` (3,), world; of shape (L HEADINGS, D)."""
     poses = np.repeat(postures, HEADINGS, axis=0)
     place, heading = body.skeleton.dof_indices(GLOBAL_DOFS[:3]), body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
     poses[:, place] = 0.0

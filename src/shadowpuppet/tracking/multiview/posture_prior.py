@@ -1,4 +1,4 @@
-"""Usual postures: starts of a search, and a weak prior on what surface points hardly show (how pelvis and chest share a bend)."""
+"""Usual postures: initial poses of a search, and a weak prior on angles that surface points hardly determine (as of pelvis and chest)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ INFLATION, MIN_DEVIATION = 1.5, 0.15
 OBSERVED_JOINTS = ("left_", "right_")
 """Prefixes of joints whose angles the surface shows well enough; they have no prior."""
 MAX_PENALTY = 9.0
-"""Bound of each DOF's penalty: that of three standard deviations (see `Skeleton.strain`)."""
+"""Bound of each DOF's penalty: that of three standard deviations (see `Skeleton.posture_penalty`)."""
 
 ARMS = ((8, 5, 10), (0, 90, 0), (90, 10, 5), (170, 10, 10), (20, 20, 95), (-30, 20, 60))
 """Usual arms: shoulder flexion and abduction, elbow flexion, degrees."""
@@ -33,7 +33,7 @@ class PosturePrior:
 
     @classmethod
     def of(cls, skeleton: Skeleton, library: Array | None = None) -> PosturePrior:
-        """The skeleton's own prior; with a `library` of poses (L, D), such as training motion, that of its angles (not the heading)."""
+        """The skeleton's own prior; with a `library` of poses (L, D), such as training motion, rest and deviations are the library's."""
         rest, below, above = (np.array(each) for each in skeleton.rest_and_spread)
         if library is not None and len(library) > 1:
             known = np.isfinite(below)
@@ -43,7 +43,7 @@ class PosturePrior:
         return cls(rest, np.where(constrained, below, np.inf), np.where(constrained, above, np.inf))
 
     def penalty(self, poses: Array) -> Array:
-        """Sum over the DOF of squared, bounded deviations from rest, of shape (N,), of poses (N, D)."""
+        """Penalty (N,) of poses (N, D): squared deviations from rest in units of the prior's, each bounded, summed over the DOF."""
         squared = self._squared(poses)
         return (squared / (1 + squared / MAX_PENALTY)).sum(1)
 
@@ -53,7 +53,7 @@ class PosturePrior:
         return 1 / (np.where(pose < self.rest, self.below, self.above) * fade) ** 2
 
     def quadratic(self, pose: Array, pull: float, weight: float) -> tuple[Array, Array]:
-        """Centre and weights, each (D,), of the quadratic that pulls to a pose (D,) by `pull` and to rest by `weight` times the penalty."""
+        """Centre (D,) and weights (D,) of a quadratic cost: `pull` toward a pose (D,), plus `weight` times the penalty, toward rest."""
         rest = weight * self.pull(pose)
         return (pull * pose + rest * self.rest) / (pull + rest + 1e-30), pull + rest
 
@@ -63,7 +63,7 @@ class PosturePrior:
 
 
 def usual_postures(skeleton: Skeleton) -> Array:
-    """Poses (L, D) to begin a search with: all combinations of `ARMS`, left and right, and `LEGS`."""
+    """Initial poses (L, D) of a search: all combinations of `ARMS`, left and right, and `LEGS`."""
     return np.array([_posture(skeleton, both, legs) for both, legs in product(product(ARMS, ARMS), LEGS)])
 
 

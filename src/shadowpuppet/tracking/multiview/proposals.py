@@ -1,4 +1,4 @@
-"""Poses proposed for the next frame: by the motion prior (Ni 2008, V-A, step 3), and by noise where there is none or the settings ask."""
+"""Poses proposed for the next frame: by the motion prior (Ni 2008, V-A, step 3), and by noise without a prior or if the settings say so."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 
 class Proposals:
-    """Draws poses of a skeleton. Raises `ShadowPuppetError` for a motion prior of another body."""
+    """Draws poses of a skeleton for the next frame. Raises `ShadowPuppetError` for a motion prior of another body."""
 
     def __init__(self, skeleton: Skeleton, settings: MultiviewSettings, prior: MotionPrior | None = None) -> None:
-        """`prior`: of poses at the film's rate."""
+        """`prior`: motion prior at the film's frame rate."""
         self.skeleton, self.settings, self.prior = skeleton, settings, prior
         sigma = [settings.sigma_heading if dof.name == "root_heading" else settings.sigma_translation if dof.kind == "translation"
                  else settings.sigma_rotation for dof in skeleton.dofs]  # fmt: skip
@@ -40,8 +40,11 @@ class Proposals:
                  mismatch: Callable[[Array], Array], scale: float = 1.0) -> Array:
         """Poses (N, D) for the next frame, from the `selected` particles' poses (N, D).
 
-        The first proposal by noise is the estimate `last` (D,). `velocity` (D,) is the last frame's motion; `mismatch` the silhouette cost
-        (M,) of poses (M, D), for `Exploration`; `scale` that of all noise but the prior's own.
+        Args:
+            last: the last estimate (D,), which is the first proposal by noise.
+            velocity: the estimate's change (D,) in the last frame.
+            mismatch: silhouette cost (M,) of poses (M, D), for `Exploration`.
+            scale: factor of all noise except the prior's own.
         """
         number, out = len(selected), self._moved_on(selected, velocity)
         noisy = number if self.prior is None else round(self.settings.defensive * number)
@@ -68,7 +71,7 @@ class Proposals:
         return self.exploration(rng, poses, mismatch, scale)
 
     def _moved_on(self, poses: Array, velocity: Array) -> Array:
-        """Poses (N, D) whose place and heading go on at the `velocity` (D,) of the last frame."""
+        """Poses (N, D) with position and heading advanced by the settings' share of `velocity` (D,)."""
         out = poses.copy()
         out[:, self.root] += self.settings.velocity * velocity[self.root]
         return out

@@ -16,8 +16,8 @@ class HullSettings:
     """How surface points are taken from the silhouettes of several cameras (Ni 2008, III). The paper gives no values."""
 
     rays: Annotated[int, Field(ge=1, le=1_000_000)] = 2000
-    """Viewing rays, spread evenly along the contours of all cameras (at most one for two pixels' sides). It sets the number of points,
-    whatever the pictures' size."""
+    """Number of viewing rays, spread evenly along the contours of all cameras (at most one for two pixels' sides). It sets the number of
+    points, whatever the pictures' size."""
     longest: Positive = 0.25
     """Viewing edges longer than this (m) are left out: few cameras see that place."""
     falloff: Positive = 0.1
@@ -25,20 +25,20 @@ class HullSettings:
     pitch: Positive = 0.25
     """Points on a viewing edge are at most this far apart (m)."""
     tolerated: Annotated[int, Field(ge=0, le=100)] = 1
-    """Number of cameras that may be outvoted where at least three times as many others see the person, as by a hole in one silhouette.
-    Used only on rays with no viewing edge otherwise. 0: every camera carves."""
+    """Number of cameras that may be overruled if at least three times as many others see the person, for example if one silhouette has a
+    hole. Used only on rays that have no viewing edge otherwise. 0: every camera carves."""
 
 
 @checked
 class SurfaceSettings:
-    """How far surface points are from a body (Ni 2008, eqs. 29-31). The paper gives no values."""
+    """Distance of surface points from a body (Ni 2008, eqs. 29-31). The paper gives no values."""
 
     epsilon: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    """Weight of the normals: a distance is multiplied by 1 - epsilon cos of the angle between them."""
+    """Weight of the normals: a distance is multiplied by 1 - epsilon times the cosine of the angle between them."""
     tau: Positive = 0.05
-    """Bound (m) of a point's distance."""
+    """Upper bound (m) of a point's distance."""
     nearest: Literal["euclidean", "modulated"] = "modulated"
-    """How a point's nearest body part is chosen: by the plain distance, as in the paper, or by the one that the normals have multiplied."""
+    """How a point's nearest body part is chosen: by the plain distance, as in the paper, or by the one weighted by the normals."""
 
 
 @checked
@@ -54,13 +54,13 @@ class GaussNewtonSettings:
     coarse_tau: Positive = 0.06
     """Distance (m) at which a point's weight is a quarter, in the coarse iterations."""
     fine_tau: Positive = 0.04
-    """The same in the fine ones."""
+    """Distance (m) at which a point's weight is a quarter, in the fine iterations."""
     emptiness: NonNegative = 2.0
     """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras."""
     damping: Positive = 0.03
     """Initial damping, as a share of each DOF's curvature."""
     pull: NonNegative = 1e-5
-    """Pull to the last pose (m^2 per rad^2 or m^2): it decides what the points do not show."""
+    """Weight of the pull to the last pose (m^2 per rad^2 or m^2), which determines what the points do not show."""
 
 
 @checked
@@ -68,22 +68,22 @@ class ForceSettings:
     """Refinement by simulated force and moment (Ni 2008, eqs. 32-41)."""
 
     iterations: Annotated[int, Field(ge=0, le=1000)] = 20
-    """Iterations."""
+    """Number of iterations."""
     translation: Positive = 1.0
     """Gain of the root's translation; 1 moves it by the mean force (m)."""
     rotation: Positive = 0.5
-    """Gain of the rotations, likewise; less than 1 because a joint and those below it turn at the same time."""
+    """Gain of the rotations; less than 1 because a joint and those below it turn at the same time."""
     modulated: bool = True
     """Whether forces are multiplied by the cosine between the normals, and zero where it is negative."""
     robust: bool = True
-    """Whether forces are bounded."""
+    """Whether the size of a force is bounded."""
     hierarchical: bool = True
-    """Whether a joint feels the moments on all parts below it, or only on its own."""
+    """Whether a joint is turned by the moments on all parts below it, or only by those on its own parts."""
 
 
 @checked
 class MultiviewSettings:
-    """The tracker for several cameras (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
+    """Settings of the several-camera tracker (Ni 2008). The values here are the default preset; `MULTIVIEW_PRESETS` has the paper's."""
 
     body: WholeBodyName = "anatomical"
     """Body model."""
@@ -96,7 +96,7 @@ class MultiviewSettings:
     resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
     """How particles are selected by their weights."""
     defensive: Share = 0.5
-    """Share of proposals that are the last poses with noise instead of the motion prior's: they find what the prior does not know."""
+    """Share of proposals that are the last poses with noise instead of the motion prior's, for motion that the prior does not contain."""
     keep: Share = 0.5
     """Share of a pose's offset from the prior's subspace that a proposal keeps."""
     sigma_rotation: Positive = 0.15
@@ -106,32 +106,32 @@ class MultiviewSettings:
     sigma_heading: Positive = 0.05
     """Noise of the heading (rad)."""
     explore: Share = 0.3
-    """Share of the defensive proposals that get an arm of another posture: an arm that was lost is found again."""
+    """Share of the defensive proposals in which an arm is replaced by one of another posture, so that a lost arm is found again."""
     velocity: Share = 0.0
     """Share of the last frame's motion of position and heading that is added to proposals, once a frame."""
     sigma_cost: Positive = 0.003
     """sigma of eq. 29 (m): a pose that costs sigma^2 more than the best weighs 1/e."""
     silhouettes: NonNegative = 0.1
-    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ, beside the distance of the surface points."""
+    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ; added to the cost of the surface points."""
     posture: NonNegative = 2e-6
-    """Pull to usual postures, or those of the training motion (m^2 per squared deviation): it decides what the surface does not show,
-    such as how pelvis and chest share a bend."""
+    """Weight of the pull to usual postures, or those of the training motion (m^2 per squared deviation). It determines what the surface
+    does not show, for example how a bend divides between pelvis and chest."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
     """Estimation cycles per frame (annealing)."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
     """Factor of the noise from one cycle to the next."""
     estimate: Literal["best", "mean"] = "best"
-    """The particle of greatest weight, or the weighted mean."""
+    """The estimated pose: that of the particle of greatest weight, or the weighted mean."""
     recover: bool = True
-    """Search for the person again after a loss, a jump or an absence. The paper's filter goes on from where it is."""
+    """Search for the person again after a loss, a jump or an absence. The paper's filter continues from its last particles."""
     surface: SurfaceSettings = SurfaceSettings()
-    """How poses are weighed by surface points."""
+    """How poses are weighted by surface points."""
     gauss_newton: GaussNewtonSettings = GaussNewtonSettings()
     """Refinement by Gauss-Newton."""
     forces: ForceSettings = ForceSettings()
     """Refinement by simulated forces."""
     hull: HullSettings = HullSettings()
-    """How surface points are made."""
+    """How surface points are computed from the silhouettes."""
 
 
 MULTIVIEW_PRESETS: dict[str, dict] = {
@@ -154,5 +154,5 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
 
 def make_multiview_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None,
                             source: str = "settings") -> MultiviewSettings:
-    """A preset of the tracker of several cameras with some values replaced, as `from_preset`."""
+    """A preset of the tracker for several cameras with some values replaced, as `from_preset`."""
     return from_preset(MultiviewSettings, MULTIVIEW_PRESETS, preset, overrides, source)

@@ -34,13 +34,13 @@ SIZES_FROM_JOINTS = (
 JOINT_DEVIATION = 0.001
 """Their standard deviation (m)."""
 ROUNDS = 2
-"""Times that the first frames are tracked and the sizes solved for."""
+"""Number of rounds; each tracks the first frames, then solves for the sizes."""
 MAX_FRAMES, POINT_STRIDE = 24, 4
-"""Most frames that are solved together, and the stride of their points."""
+"""Largest number of frames that are solved together, and the stride of their points."""
 INDEPENDENT_POINTS = {"anatomical": 10.0, "cylinders": 0.2}
-"""By body (see `bundle_adjustment`): cylinders fit no person well, and with more weight would make up for it by wrong bones."""
+"""Effective number of independent points per frame, by body. Cylinders fit no person well: more weight would distort the bones."""
 SIZE_PULL = 1e-5
-"""Pull of the poses to the tracked ones."""
+"""Weight of the pull of the poses to the tracked ones."""
 OVERLAP_LOSS = 0.06
 """A frame whose overlap is lower than the best by more than this is left out: its pose is wrong."""
 HEIGHT_SHARES, HEIGHT_FRAMES = (0.8, 0.86, 0.93, 1.0, 1.08, 1.2), 5
@@ -48,7 +48,7 @@ HEIGHT_SHARES, HEIGHT_FRAMES = (0.8, 0.86, 0.93, 1.0, 1.08, 1.2), 5
 HEIGHT_PENALTY, HEIGHT_DEVIATION = 0.02, 0.1
 """Relative cost of a height that deviates from the average by `HEIGHT_DEVIATION` (m); it grows with the square."""
 MIN_FRAMES = 4
-"""Fewest frames with a person for solving."""
+"""Smallest number of frames with a person from which sizes are solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class SizeEstimate(Generic[Measured]):
 
 
 def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
-    """Standard deviations (K,), metres, of the sizes among people; nearly none of bones if joints have `shown` them."""
+    """Standard deviations (K,), metres, of the sizes among people; `JOINT_DEVIATION` for bones that joints have `shown`."""
     shares = shares_of(type(sizes))
     stature = stature_of({name: getattr(sizes, name) for name in ("thigh_length", "shank_length", "upper_arm_length", "forearm_length")})
     return np.array([JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()])
@@ -101,8 +101,8 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
 
 def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cameras: Sequence[Camera],
                   first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings) -> float | None:
-    """Height (m) of the person in the `first` frames: of bodies of several heights, that which fits some frames best; None if no person is
-    visible. The hull's extent alone is no height: arms may be overhead, or the person crouches."""
+    """Height (m) of the person in the `first` frames: that of several which fits a few frames best; None if no person is visible. The
+    hull's extent alone does not give it: arms may be overhead, or the person may crouch."""
     extent = observed_height(first)
     if extent is None:
         return None
@@ -120,7 +120,7 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
               first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> list[tuple[int, MultiviewState]]:
-    """Indices and states of the frames in which the person is found: tracked, or searched for again where the overlap falls."""
+    """Indices and states of the frames in which the person is found: tracked, or searched for again if the overlap falls."""
     state, found, best = None, [], 0.0
     for n, (points, masks) in enumerate(first):
         state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)

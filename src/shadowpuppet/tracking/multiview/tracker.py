@@ -28,14 +28,14 @@ from shadowpuppet.tracking.silhouette_cost import Cost
 from shadowpuppet.tracking.status import status_of
 
 MIN_POINTS, MIN_EXTENT = 50, 0.5
-"""Fewer surface points, or a smaller extent of them (m), are no person."""
+"""Smallest number and smallest extent (m) of the surface points of a person."""
 MANY_CAMERAS = 6
 PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
 """Default particle numbers below and from `MANY_CAMERAS` cameras."""
 
 
 class MultiviewState(NamedTuple):
-    """What the tracker knows after a frame: all that the next frame needs."""
+    """The tracker's state after a frame: all that the next frame needs."""
 
     pose: Array
     """The estimate, of shape (D,)."""
@@ -63,7 +63,7 @@ class MultiviewTracker:
     prior: MotionPrior | None = None
     """Motion prior of poses at the film's rate; None: proposals by noise only."""
     library: Array | None = None
-    """Poses (L, D) to begin a search with, such as those of the training motion; None: usual postures only."""
+    """Initial poses (L, D) of a search, for example the training motion's; None: usual postures only."""
     scheme: Scheme | None = None
     """A resampling scheme of your own, in place of the settings'."""
 
@@ -130,7 +130,7 @@ class MultiviewTracker:
         return weigh
 
     def extra_costs(self, observation: MultiviewObservation) -> list[Cost]:
-        """Costs beside the paper's; none with `ni2008`."""
+        """Costs added to the paper's: silhouettes and posture (off in `ni2008`), and the caller's own."""
         s, extras = self.settings, list[Cost]()
         if s.silhouettes:
             extras.append(lambda poses: s.silhouettes * observation.mismatch(poses))
@@ -187,7 +187,7 @@ class MultiviewTracker:
 
     @cached_property
     def posture_prior(self) -> PosturePrior:
-        """Prior on postures, of the library where there is one."""
+        """Prior on postures, from the library if there is one."""
         return PosturePrior.of(self.body.skeleton, self.library)
 
     @cached_property

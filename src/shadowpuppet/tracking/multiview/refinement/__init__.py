@@ -1,1 +1,1 @@
-"""Poses refined by surface points: simulated forces (Ni 2008, V-B), Gauss-Newton."""
+"""Refinement of poses to surface points: simulated forces (Ni 2008, V-B), Gauss-Newton."""

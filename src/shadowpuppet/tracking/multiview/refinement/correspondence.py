@@ -20,18 +20,18 @@ from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 Single = NDArray[np.float32]
 LANES = 16
-"""Points of a group: as many as one AVX-512 instruction takes."""
+"""Points per group, the number that one AVX-512 instruction processes."""
 FAR = np.float32(1e6)
 TINY = np.float32(1e-12)
 PART_NUMBERS = 25
-"""Numbers of a part: axes (9), origin (3), centre and radius of the bounding sphere (4), length, shear (2), radii (4), caps (2)."""
+"""Constants per part: axes (9), origin (3), centre and radius of the bounding sphere (4), length, shear (2), radii (4), caps (2)."""
 
 
 class Cloud(NamedTuple):
-    """Surface points as the kernels take them."""
+    """Surface points in the kernels' layout."""
 
     rows: Single
-    """Of each group its points' x, y, z, normal (3) and weight, `LANES` of each in turn, of shape (G, 7 LANES); metres from `origin`.
+    """For each group the points' x, y, z, normal (3) and weight, `LANES` values of each, of shape (G, 7 LANES); metres from `origin`.
     Points that fill up the last group have weight 0."""
     spheres: Single
     """Centre and radius of each group's bounding sphere, of shape (G, 4)."""
@@ -78,7 +78,7 @@ def _along_a_curve(points: Array, bits: int = 6, reach: float = 1.5) -> NDArray[
 
 
 def part_constants(limbs: Limbs) -> Single:
-    """Numbers of the parts, of shape (S, PART_NUMBERS); those that change with the pose are filled in by `place_parts`."""
+    """Constants of the parts, of shape (S, PART_NUMBERS); those that change with the pose are filled in by `place_parts`."""
     out = np.zeros((len(limbs.joints), PART_NUMBERS), np.float32)
     out[:, 16], out[:, 17:19] = limbs.lengths, limbs.shears
     out[:, 19:23], out[:, 23:25] = limbs.radii.reshape(-1, 4), limbs.caps
@@ -119,7 +119,7 @@ def closest_on_part(q, rows, out):  # pragma: no cover
 
 @reduction_kernel
 def _compete(q, number, rows, epsilon, choice, near):  # pragma: no cover
-    """Enter part q into `near` (3 LANES,), as `nearest` has it, for those points of a group that are closer to it."""
+    """Enter part q into `near` (3 LANES,), laid out as in `nearest`, for those points of a group that are closer to it."""
     one = np.float32(1)
     for i in range(LANES):
         x, y, z, nx, ny, nz = _load(rows, i)

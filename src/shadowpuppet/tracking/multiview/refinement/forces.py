@@ -13,8 +13,8 @@ from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants
 @kernel
 def push(poses, bounded, modulated, hierarchical, gains, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
          vectors):  # pragma: no cover
-    """Move poses (N, D), in place, by `iterations` of forces and moments, as `Refiner.forces` describes. Without `hierarchical` a joint
-    feels only the parts fixed to it; the root's translation feels all in either case."""
+    """Move poses (N, D), in place, by `iterations` of forces and moments, as `Refiner.forces` describes. Without `hierarchical` only the
+    forces on parts fixed to a joint move it; the root is translated by the forces on all parts in either case."""
     T, screws, work, sums, force = room[1], room[2], room[3], room[6], vectors[1, :4]
     for n in range(poses.shape[0]):
         for _ in range(iterations):
@@ -52,8 +52,8 @@ def _sum_forces(bounded, modulated, T, limbs, rows, spheres, origin, numbers, wh
 
 @reduction_kernel
 def _add_forces(q, number, rows, near, tau, bounded, modulated, out, lanes):  # pragma: no cover
-    """Add the forces on part `number` to `lanes` (SUMS LANES,): moments about the cloud's origin (3), forces (3), and of the model's points
-    p' where they act the weight, the first (3) and the second moments (6)."""
+    """Add the forces on part `number` to `lanes` (SUMS LANES,): moments about the cloud's origin (3) and forces (3); and, for the model's
+    points p' on which they act, the weight, the first moments (3) and the second moments (6)."""
     nil = np.float32(0)
     for i in range(LANES):
         x, y, z = closest_point(q, out, i)
@@ -85,7 +85,7 @@ def _add_forces(q, number, rows, near, tau, bounded, modulated, out, lanes):  # 
 @device
 def _move_joints(pose, chain, T, screws, origin, sums, force, gains, step):  # pragma: no cover
     """Move a pose (D,) by the force on its root and the moments about its joints. The paper's weights rho and lambda are here the gain
-    divided by the mass or inertia of the points that act, so that a step does not depend on how many there are."""
+    divided by the mass or inertia of the points that act, so that a step does not depend on their number."""
     for d in range(pose.size):
         own, joint, s = sums[chain.owners[d]], T[chain.owners[d]], screws[d]
         mass = own[6] + 1e-9

@@ -1,7 +1,7 @@
-"""Free space: silhouettes penalise limbs that reach outside them, which surface points do not (not in Ni 2008).
+"""Silhouette constraint: penalises limbs that project outside the silhouettes (not in Ni 2008).
 
-No surface point draws back a limb that reaches out of a silhouette. Here spheres along the limbs' axes are pushed into the silhouettes of
-all cameras, along the gradient of the distance to the outline.
+Surface points do not pull back such a limb. Here spheres along the limbs' axes are pushed into the silhouettes of all cameras, along the
+gradient of the distance to the outline.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ RADIUS_SHARE = 0.7
 TAU = 0.1
 """Distance (m) beyond which the cost grows linearly, not with the square."""
 OUTVOTING_CAMERAS = 3
-"""Number of cameras with a silhouette at a place that outvote one without: its silhouette may lack a limb."""
+"""If a sphere's centre is outside one silhouette only and inside at least this many others, the one is ignored: it may lack a limb."""
 WINDOW_MARGIN = 24
-"""Pixels around the person with distances; farther out they are extrapolated."""
+"""Margin (pixels) around the person in which distances are computed; farther out they are extrapolated."""
 
 
 class Spheres(NamedTuple):
@@ -46,7 +46,7 @@ class FreeSpace(NamedTuple):
     """Distances to the silhouettes' outlines in C pictures, and the parameters of their cameras."""
 
     fields: NDArray[np.float32]
-    """Signed distances to the outline, pixels, negative inside; all windows one after the other, row by row."""
+    """Signed distances to the outline, pixels, negative inside; the windows are concatenated, each row by row."""
     windows: NDArray[np.int64]
     """First value, left column, top row, width, height of each window, and the picture's size, of shape (C, 7)."""
     views: Array
@@ -54,7 +54,7 @@ class FreeSpace(NamedTuple):
     matrices: Array
     """Camera matrices, of shape (C, 3, 3)."""
     bends: Array
-    """Distortion, padded (8); whether a fisheye; whether any; radius up to which it holds; of shape (C, 11)."""
+    """Distortion, padded (8); whether fisheye; whether there is any distortion; radius up to which it holds; of shape (C, 11)."""
 
 
 def spheres_in(limbs: Limbs) -> Spheres:
@@ -69,7 +69,7 @@ def spheres_in(limbs: Limbs) -> Spheres:
 
 
 def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
-    """Free space of cameras and their masks (H, W), each with a person."""
+    """Distances for cameras and their masks (H, W), each of which shows a person."""
     fields, windows, start = [np.zeros(0, np.float32)], [], 0
     for camera, mask in views:
         field, left, top = _distances(mask)

@@ -12,7 +12,7 @@ from shadowpuppet.jit import device, kernel, reduction_kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, nearest, place_parts
 
 SUMS = 29
-"""Room for the sums of a part: 21 + 6 for the normal equations, 3 + 3 + 1 + 3 + 6 for the forces."""
+"""Number of sums per part: 21 + 6 for the normal equations, 3 + 3 + 1 + 3 + 6 for the forces."""
 
 
 @kernel

@@ -1,6 +1,6 @@
-"""Poses and surface points: the cost D of poses (eq. 30), and poses refined by simulated forces (Ni 2008, V-B) or Gauss-Newton.
+"""Cost D of poses for surface points (eq. 30), and refinement of poses by simulated forces (Ni 2008, V-B) or Gauss-Newton.
 
-All take many poses and treat each by itself.
+All methods take many poses and treat each independently.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS, sum_costs
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 Refine = Callable[[Array], Array]
-"""Poses (N, D) to better ones (N, D)."""
+"""Function from poses (N, D) to refined poses (N, D)."""
 
 
 class Pass(NamedTuple):
@@ -37,7 +37,7 @@ class Pass(NamedTuple):
     space: FreeSpace | None = None
     """Distances to the silhouettes; None: the silhouettes do not count."""
     emptiness: float = 0.0
-    """Weight of the mean squared distance by which limbs reach out of the silhouettes, beside that of the points."""
+    """Weight of the mean squared distance by which limbs reach out of the silhouettes; added to that of the points."""
 
 
 class Refiner:
@@ -69,10 +69,10 @@ class Refiner:
         """Poses (N, D) refined by damped Gauss-Newton, robust and within limits.
 
         Args:
-            passes: worked through in turn; usually a share of the points first, then all.
-            centre: where the poses are pulled to, of shape (N or 1, D).
-            pull: weights (D,) of the squared distances from `centre`, beside the mean squared distance of the points (m^2).
-            damping: share of its own curvature by which each DOF is held back at first.
+            passes: applied one after another; usually a share of the points first, then all.
+            centre: poses toward which the poses are pulled, of shape (N or 1, D).
+            pull: weights (D,) of the squared distances from `centre`, added to the mean squared distance of the points (m^2).
+            damping: initial damping of each DOF, as a share of its curvature.
         """
         poses = self.body.skeleton.checked(poses).copy()
         centre = np.ascontiguousarray(np.atleast_2d(centre), float)

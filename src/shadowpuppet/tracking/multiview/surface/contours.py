@@ -70,7 +70,7 @@ def _follow(cells):  # pragma: no cover
 
 @compiled(nogil=True)
 def _left_sides(cells):  # pragma: no cover
-    """Flat indices, row by row, of pixels inside whose left neighbour is outside; eight equal pixels are skipped at once."""
+    """Flat indices, row by row, of inside pixels with an outside pixel to the left; eight equal pixels are skipped at once."""
     words, whole = cells.view(np.uint64), np.uint64(0x0101010101010101)
     out, n = np.empty(cells.size // 2, np.int64), 0
     for row in range(1, cells.shape[0] - 1):

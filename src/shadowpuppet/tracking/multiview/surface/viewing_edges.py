@@ -2,6 +2,7 @@
 
 Interval arithmetic along each ray (Matusik et al. 2000, "Image-based visual hulls"). Silhouettes are polygons on the plane z = 1 of their
 camera, where another camera's ray is a straight line. Runs of a polygon's sides that the line cannot cross are skipped by bounding circles.
+A view denies a place on a ray if the place is in the empty area of its picture.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Indices = NDArray[np.int64]
 FAR = 100.0
 """Length of a ray (m)."""
 MIN_LENGTH = 1e-6
-"""Shorter intervals of a ray (m) are rounding."""
+"""Shorter intervals of a ray (m) are rounding errors and left out."""
 MIN_BASELINE = 1e-3
 """Cameras nearer to each other than this (m) do not carve each other's rays."""
 CONFIRMING_VIEWS = 3
@@ -106,13 +107,13 @@ def spaced_vertices(lines, outward, step):  # pragma: no cover
 
 def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
         tolerated: int) -> tuple[Indices, Array]:
-    """The ray (E,) of each viewing edge, and the edge's depths (E, 2), of rays (R, 3), z = 1, of cameras (R,).
+    """Viewing edges of rays (R, 3), z = 1, from views `camera` (R,): the index (E,) of each edge's ray, and its depths (E, 2).
 
     Args:
         relative: transforms (V, V, 4, 4) from view to view.
         lines: vertices (2, N) of all polygons.
         spans, circles: runs (C, 2) and their circles (3, C); view j's are those from `bounds[j]` to `bounds[j + 1]`.
-        tolerated: number of views that may deny a place on rays of which nothing is left otherwise.
+        tolerated: number of views that may deny a place, on rays that have no viewing edge otherwise.
     """
     apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # no view carves its own rays
     most = lines.shape[1] + 2  # each side is crossed at most once
@@ -209,7 +210,7 @@ def _deny(T, i, j, u, v, lo, hi, polygons, scratch):  # pragma: no cover
 def _cross(nx, ny, c, low, high, polygons, j, scratch):  # pragma: no cover
     """Crossings of a line, nx x + ny y + c = 0, with the polygons between s = low and high, s = nx y - ny x; returns their number.
 
-    Of runs of sides wholly before `low` only the parity of crossings counts: whether their ends lie on different sides of the line.
+    For runs of sides wholly before `low` only the parity of the crossings counts: odd if a run's ends lie on different sides of the line.
     """
     x, y, spans, circles, bounds = polygons
     near, crossings = scratch[0], scratch[1]
@@ -278,7 +279,7 @@ def _carve(pieces, at, n, denied, m, level):  # pragma: no cover
 
 @kernel
 def _witnessed(T, i, apart, u, v, z, lenses, needed):  # pragma: no cover
-    """Whether `needed` other views have the place at depth z on a ray of view i inside their pictures."""
+    """Whether the place at depth z on a ray of view i is inside the pictures of at least `needed` other views."""
     for j in range(lenses.shape[0]):
         w = (T[i, j, 2, 0] * u + T[i, j, 2, 1] * v + T[i, j, 2, 2]) * z + T[i, j, 2, 3]
         if apart[i, j] and w >= NEAR_PLANE:

@@ -24,7 +24,7 @@ from shadowpuppet.tracking.multiview.surface.viewing_edges import bounding_circl
 GRID_PITCH = 4
 """Pitch (pixels) of the grid on which lens distortion is undone exactly; linear between."""
 MAX_RETURN_ERROR = 0.05
-"""Pixels whose ray is projected back farther off than this (pixels) are beyond the range of the distortion model."""
+"""Largest error (pixels) of a pixel's ray when projected back; with a larger one the pixel is outside the distortion model's range."""
 MAX_RADIUS = 20.0
 """Largest radius of rays on the plane z = 1: 87 degrees off the axis."""
 
@@ -43,7 +43,7 @@ class SurfacePoints(NamedTuple):
 
 
 class _View(NamedTuple):
-    """A camera as the kernels' arrays."""
+    """Arrays of a camera for the kernels."""
 
     rays: Array
     """Points on the plane z = 1 of a grid of pixels from (-0.5, -0.5) to (W - 0.5, H - 0.5), of shape (R, C, 2)."""
@@ -69,7 +69,7 @@ class _Silhouette(NamedTuple):
 
 
 class VisualHull:
-    """Calibrated cameras; `points` makes surface points of their silhouettes.
+    """The visual hull of calibrated cameras; `points` computes surface points from their silhouettes.
 
     Raises `CalibrationError` for fewer than two cameras, or for one without a pose in the world.
     """
@@ -150,7 +150,7 @@ def _view(camera: Camera) -> _View:
 
 
 def _seen(good: NDArray[np.bool_], size: tuple[int, int]) -> Mask:
-    """Pixels (H, W) in cells of the grid whose corners, and their neighbours, are all good."""
+    """Mask (H, W) of the pixels in grid cells where all corners, and the corners' neighbours, are good."""
     wide = np.pad(good, 1, mode="edge")
     firm = np.lib.stride_tricks.sliding_window_view(wide, (4, 4)).all((2, 3))
     columns, rows = (((np.arange(side) + 0.5) / side * cells).astype(int) for side, cells in zip(size, firm.shape[::-1]))
