@@ -27,7 +27,7 @@ from shadowpuppet.pipeline.options import PATHS, make_options, settings_in
 from shadowpuppet.settings import merged
 
 MAX_RUNS = 100_000
-"""Combinations, or seeds, beyond which a grid is taken for a mistake."""
+"""Greatest number of combinations, and of seeds; more are taken for a mistake."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}")
 """Name of a case; it becomes part of a folder's name."""
 DEFAULT_CASE = "default"
@@ -35,11 +35,11 @@ DEFAULT_CASE = "default"
 
 
 class Case(NamedTuple):
-    """One choice of settings."""
+    """One combination of settings."""
 
     name: str
     values: dict[str, Any]
-    """Plain values, as `make_options` takes them."""
+    """Plain values for `make_options`."""
     varied: dict[str, Any]
     """Settings of the case or the grid, by dotted name."""
     tried: tuple[str, ...] = ()
@@ -47,13 +47,13 @@ class Case(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The case's name, where it has one, and the grid's values."""
+        """The case's name, if it has one, and the grid's values."""
         values = (f"{name.rpartition('.')[2]} {short(self.varied[name])}" for name in self.tried)
         return ", ".join([*([self.name] if self.name != DEFAULT_CASE else []), *values])
 
 
 class Grid(NamedTuple):
-    """All choices of settings, and the file's seeds; None where it has none."""
+    """All combinations of settings, and the file's seeds; None if it has none."""
 
     cases: tuple[Case, ...]
     seeds: tuple[int, ...] | None = None
@@ -75,7 +75,8 @@ def make_grid(settings: Mapping[str, Any] | None = None, *, cases: Mapping[str, 
               seeds: object = None, flags: Mapping[str, Any] | None = None, source: str = "grid") -> Grid:
     """A grid from plain values: settings of all runs, named `cases` of settings, and `grid`, lists of values by dotted name.
 
-    The grid's values replace a case's, and these the settings. `flags` replace the settings and may not be varied. Raises `SettingsError`.
+    Values of the grid override those of a case, which override the settings. `flags` override the settings and may not be varied.
+    Raises `SettingsError`.
     """
     make_options(dict(settings or {}), source)
     common = merged(settings or {}, flags or {})
