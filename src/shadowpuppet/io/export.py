@@ -45,7 +45,7 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
     """Write a run's motion as `<run>.<format>` for each of `formats`; the files' paths.
 
     A killed run is exported up to its last frame. Warns of what a format cannot hold. Raises a `ShadowPuppetError` for an unknown format, a
-    run that cannot be read or has no frame, or has no person.toml where a format needs the body; files already written stay.
+    run that cannot be read or has no frame, or has no person.toml if a format needs the body; files already written stay.
 
     Args:
         folder: the run.
@@ -74,7 +74,7 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
     """Convert a motion file, with an ending of `READABLE`, into another, by its ending one of `EXPORTS`; what was written, as text.
 
     Skeletons of .bvh and .amc files are kept in .bvh and .glb files. Otherwise, where the target holds a skeleton, the poses of a whole
-    body are fitted to the joints (`fit_poses`), and the text states the residual. Raises a `ShadowPuppetError` where a file cannot be
+    body are fitted to the joints (`fit_poses`), and the text states the residual. Raises a `ShadowPuppetError` if a file cannot be
     read or written, or the joints are too few for a body.
 
     Args:

@@ -71,7 +71,7 @@ class HumanEva(NamedTuple):
     recording: Recording
     """Its `path` is the data's folder; its truth and training are in the fields below."""
     truth: JointTable | None
-    """Joints at the recording's frames; None where they are not published (test trials, HumanEva-II)."""
+    """Joints at the recording's frames; None if they are not published (test trials, HumanEva-II)."""
     training: JointTable | None
     """Joints in training frames of the same person and action, at `RATE`; None if there are none."""
 
@@ -109,7 +109,7 @@ def read_humaneva(folder: str | Path, subject: str, action: str, trial: int = 1,
 
 
 def write_humaneva(found: HumanEva, folder: str | Path) -> None:
-    """Write a recording folder that refers to the films. Raises `RecordingError` where the folder holds something else."""
+    """Write a recording folder that refers to the films. Raises `RecordingError` if the folder holds something else."""
     import tomli_w
 
     folder, recording = Path(folder), found.recording
@@ -178,7 +178,7 @@ def _in_order(cameras: Iterable[str]) -> list[str]:
 
 
 def _length(film: Path) -> int:
-    """Number of images of a film. Raises `RecordingError` where it is unknown."""
+    """Number of images of a film. Raises `RecordingError` if it is unknown."""
     source = open_frames(film, rate=RATE)
     count = source.count or source.duration * source.rate
     if not np.isfinite(count):

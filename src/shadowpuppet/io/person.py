@@ -41,7 +41,7 @@ class Person:
 def read_person(path: str | Path, body: str | None = None) -> Person:
     """Read a person.
 
-    Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible, or the sizes do not fit `body`.
+    Raises `FormatError`, naming file and field, if a key is unknown, a size missing or impossible, or the sizes do not fit `body`.
     """
     path, wanted = Path(path), body
     data = read_toml(path, FormatError)
@@ -63,7 +63,7 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
 
 
 def write_person(path: str | Path, person: Person) -> None:
-    """Write a person for `read_person`. Raises `ShadowPuppetError` where that fails."""
+    """Write a person for `read_person`. Raises `ShadowPuppetError` if that fails."""
     import tomli_w
 
     upper = isinstance(person.sizes, CardboxSizes)

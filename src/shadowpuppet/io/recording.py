@@ -85,7 +85,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     """Read a recording: a folder (video/, calibration.toml, ...), or one film, folder of pictures or live camera.
 
     `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera. Raises `RecordingError`,
-    `CalibrationError` or `VideoError`, naming file and field, where something is missing or does not fit.
+    `CalibrationError` or `VideoError`, naming file and field, if something is missing or does not fit.
     """
     folder = Path(str(path))
     try:
@@ -250,7 +250,7 @@ def _check_names(folder: Path, sources: Iterable[str], cameras: Iterable[Camera]
 
 
 def _check_sizes(views: Iterable[View]) -> None:
-    """Raise `RecordingError` where pictures do not have their camera's size; live cameras are not opened."""
+    """Raise `RecordingError` if pictures do not have their camera's size; live cameras are not opened."""
     for view in views:
         for source in (view.video, view.background, view.masks):
             if source is None or camera_number(source) is not None:

@@ -63,7 +63,7 @@ class RunWriter:
     """Writes a run: `with RunWriter(...) as run: run.write(frame)`; `run.metrics` may be filled until the end.
 
     The folder must be new, empty or an earlier run's, which the first frame replaces. Raises `ShadowPuppetError` for any other folder, and
-    where it cannot be written; frames written before stay readable.
+    if it cannot be written; frames written before stay readable.
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
@@ -79,7 +79,7 @@ class RunWriter:
         self._earlier = False
 
     def __enter__(self) -> Self:
-        """Make the folder. Raises `ShadowPuppetError` where it cannot be used."""
+        """Make the folder. Raises `ShadowPuppetError` if it cannot be used."""
         with self._system_errors():
             self.folder.mkdir(parents=True, exist_ok=True)
             self._earlier = _check_folder(self.folder)
@@ -109,7 +109,7 @@ class RunWriter:
                 self.folder.rmdir()
 
     def write(self, frame: MotionFrame) -> None:
-        """Add a frame. Raises `ShadowPuppetError` where it does not fit the run, or cannot be written."""
+        """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self._start()
         self._append(run_rows(self._motion.append(frame)))
 
@@ -160,7 +160,7 @@ class RunWriter:
 
 
 def read_run(folder: str | Path) -> Run:
-    """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, where something is malformed."""
+    """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
     if not (folder / "run.toml").exists():
         raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it")
@@ -172,7 +172,7 @@ def read_run(folder: str | Path) -> Run:
 
 
 def write_metrics(folder: str | Path, metrics: Mapping[str, Any]) -> None:
-    """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` where that fails."""
+    """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` if that fails."""
     text = json.dumps(for_json(plain(metrics, "metrics")), indent=1, ensure_ascii=False, allow_nan=False)
     write_whole(Path(folder) / "metrics.json", text + "\n")
 
@@ -187,7 +187,7 @@ def versions() -> dict[str, str]:
 
 
 def _check_folder(folder: Path) -> bool:
-    """Whether a folder holds an earlier run. Raises `ShadowPuppetError` where it holds other files."""
+    """Whether a folder holds an earlier run. Raises `ShadowPuppetError` if it holds other files."""
     names = sorted(path.name for path in folder.iterdir())
     if not names:
         return False

@@ -70,7 +70,7 @@ class LiveSession(ABC):
     # Input
 
     def step(self, shot: Any) -> Outcome:
-        """Take a picture. Raises `SilhouetteError` where the scene cannot be learnt."""
+        """Take a picture. Raises `SilhouetteError` if the scene cannot be learnt."""
         self._began = shot.captured if np.isnan(self._began) else self._began
         if trouble := self.check(shot):
             return self._pause(trouble)

@@ -50,7 +50,7 @@ def is_rig(source: str) -> bool:
 
 
 def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
-    """Open several cameras, streams or films. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Open several cameras, streams or films. Raises a `ShadowPuppetError` if something cannot be used."""
     if options.region is not None or options.background is not None:
         raise SettingsError(f"{'region' if options.region else 'background'}: found one for several cameras, expected none")
     if Path(settings.camera).is_dir():

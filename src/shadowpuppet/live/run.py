@@ -63,7 +63,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
     """Track a camera until Ctrl-C, the display's command or a film's end, into a run folder; what is in metrics.json, or None.
 
     Every frame is given to the `outlets`, too. The folder gets what `io.run` describes, person.toml, calibration.toml and, with
-    `LiveSettings.record`, recording/. None, and no folder, where nobody was tracked. Raises a `ShadowPuppetError` where something
+    `LiveSettings.record`, recording/. None, and no folder, where nobody was tracked. Raises a `ShadowPuppetError` if something
     cannot be used.
     """
     options, settings = options or Options(), settings or LiveSettings()
@@ -119,7 +119,7 @@ class _Live:
         return session, sources.capture, sources.rate, sources.live
 
     def run(self) -> None:
-        """From the first picture to the last. Raises `_Nobody` where nobody was tracked."""
+        """From the first picture to the last. Raises `_Nobody` if nobody was tracked."""
         try:
             with ExitStack() as stack:
                 stack.enter_context(self.stop)

@@ -21,7 +21,7 @@ USUAL_FOV = 65.0
 
 
 def lens(options: Options, size: Size) -> Camera:
-    """The camera for pictures of a size. Raises `CalibrationError` where the calibration is not for them."""
+    """The camera for pictures of a size. Raises `CalibrationError` if the calibration is not for them."""
     if options.calibration is None:
         if options.fov is None:
             _warn(f"no field of view is given: {USUAL_FOV:g} degrees are assumed, and depths are as wrong as that; give --fov or "

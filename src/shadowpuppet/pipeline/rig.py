@@ -101,7 +101,7 @@ class Rig:
 def open_rig(path: str | Path, options: Options) -> Rig:
     """Open the cameras of a recording: all, or those that `options.camera` names.
 
-    Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError` where something cannot be used.
+    Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError` if something cannot be used.
     """
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)

@@ -66,11 +66,11 @@ class Prepared(NamedTuple):
 
     survey: Survey
     subject: TrackedSubject | None
-    """The fitted person; None where tracking is hopeless."""
+    """The fitted person; None if tracking is hopeless."""
     look: Look | RigLook
 
     def check(self) -> TrackedSubject:
-        """The fitted person. Raises `TrackingError` where tracking is hopeless."""
+        """The fitted person. Raises `TrackingError` if tracking is hopeless."""
         self.survey.check()
         assert self.subject is not None
         return self.subject

@@ -24,7 +24,7 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
                 rate: float | None = None) -> FrameSource:
     """Open a film, a picture, a folder of pictures (in natural order), or a live camera (its number or `camera:N`).
 
-    Raises `VideoError` where nothing can be read. A film that breaks off or is damaged gives the frames before the break, then a
+    Raises `VideoError` if nothing can be read. A film that breaks off or is damaged gives the frames before the break, then a
     `ShadowPuppetWarning`.
 
     Args:

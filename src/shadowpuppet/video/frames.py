@@ -54,7 +54,7 @@ def size_of(image: Image) -> Size:
 
 
 def check_size(name: object, n: int, time: float, image: Image, size: Size) -> None:
-    """Raise `VideoError` where frame `n` differs in size from those before it."""
+    """Raise `VideoError` if frame `n` differs in size from those before it."""
     found = size_of(image)
     if found != size:
         raise VideoError(f"{name}: frame {n} ({time:.3f} s) is {found[0]} x {found[1]} pixels, those before it "

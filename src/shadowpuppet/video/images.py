@@ -54,7 +54,7 @@ def write_image(path: str | Path, image: Image) -> None:
 
 
 def check_image(path: Path, image: Image) -> None:
-    """Raise `VideoError` where an array is no (H, W, 3) or (H, W) picture of uint8."""
+    """Raise `VideoError` if an array is no (H, W, 3) or (H, W) picture of uint8."""
     found = np.asarray(image)
     if found.dtype != np.uint8 or found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] != 3) or not found.size:
         raise VideoError(f"{path}: found a picture of {found.dtype}, shape {found.shape}; expected uint8, (H, W, 3) or (H, W)")

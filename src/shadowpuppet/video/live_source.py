@@ -48,14 +48,14 @@ class Feed:
     live: bool
     """Whether to reopen it when it ends; False for films."""
     read: Callable[[], Iterator[Snapshot]] = field(repr=False)
-    """Pictures as they come, until the source ends. Raises `VideoError` where it cannot be opened or breaks off."""
+    """Pictures as they come, until the source ends. Raises `VideoError` if it cannot be opened or breaks off."""
 
 
 def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0) -> Feed:
     """Open a camera (its number, or `camera:N`), a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures.
 
     A film is played at its own times, `speed` times as fast; `rate` (frames/s) replaces them, and is requested from a camera.
-    Raises `VideoError` where nothing can be read, or a film has no times and no rate is given.
+    Raises `VideoError` if nothing can be read, or a film has no times and no rate is given.
     """
     number = int(source) if str(source).isdecimal() else camera_number(source)
     scheme = ADDRESS.match(str(source))
@@ -116,7 +116,7 @@ def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] 
 
 
 def _timed(path: Path, rate: float | None) -> FrameSource:
-    """Open a film. Raises `VideoError` where it has no times and no rate is given."""
+    """Open a film. Raises `VideoError` if it has no times and no rate is given."""
     if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file():
         raise VideoError(f"{path}: found a single picture, expected a film, a folder of pictures, the number of a camera, or a network "
                          "address")

@@ -28,7 +28,7 @@ OPEN_SECONDS, READ_SECONDS = 8.0, 3.0
 def open_stream(address: str) -> tuple[Iterator[tuple[float, Image]], Size, float]:
     """Open a stream: its pictures (H, W, 3) with seconds of the monotonic clock, their size, and the stated rate (NaN if none).
 
-    A picture's time is when its data had arrived, before decoding. Waits for the first picture. Raises `VideoError` where nothing answers
+    A picture's time is when its data had arrived, before decoding. Waits for the first picture. Raises `VideoError` if nothing answers
     in time or the stream has no pictures; the iterator raises it where the stream breaks off.
     """
     name = without_secrets(address)

@@ -30,7 +30,7 @@ class Seeker:
     """
 
     def __init__(self, source: Path, size: Size, rate: float | None = None) -> None:
-        """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` where nothing can be read."""
+        """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` if nothing can be read."""
         self.source, self.size, self.rate = source, size, rate
         self._lock, self._stack = threading.Lock(), contextlib.ExitStack()
         if source.is_dir():

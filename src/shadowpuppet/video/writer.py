@@ -29,7 +29,7 @@ def write_frames(path: str | Path, rate: float, *, size: Size | None = None, los
 
     H.264 (.mp4, .mov, .mkv; of odd sizes the last row or column is doubled), or FFV1 if `lossless` (.mkv; grey or colour as the first
     picture). The film is named `<name>.part.<ending>` until it is finished; an interrupted one can be played under that name. Raises
-    `VideoError` where it cannot be written (no such folder, disk full, no frames).
+    `VideoError` if it cannot be written (no such folder, disk full, no frames).
 
     Args:
         path: the film.

@@ -85,7 +85,7 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
     """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
     Formats, recognised by content: TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML,
-    EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field where
+    EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
     something is missing or impossible.
 
     Args:
@@ -122,7 +122,7 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file or folder. Raises `CalibrationError` where it is none of `FORMATS`."""
+    """The format of a file or folder. Raises `CalibrationError` if it is none of `FORMATS`."""
     if path.is_dir():
         if any(path.glob("*.cal")):
             return HUMANEVA
@@ -223,7 +223,7 @@ def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
     """Write cameras for `read_calibration`, in metres: TOML for Pose2Sim and Anipose; into a folder, or for intri.yml or extri.yml,
     EasyMocap's two files.
 
-    Raises `CalibrationError` where they cannot be written.
+    Raises `CalibrationError` if they cannot be written.
     """
     path, made = Path(path), list(cameras)
     names = [camera.name for camera in made]
@@ -255,7 +255,7 @@ def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
 def find_calibration(folder: Path) -> Path | None:
     """The calibration in a recording folder, or in its folder `calibration`; None without one. calibration.toml comes first.
 
-    Raises `CalibrationError` where there are several.
+    Raises `CalibrationError` if there are several.
     """
     if (folder / "calibration.toml").exists():
         return folder / "calibration.toml"

@@ -24,7 +24,7 @@ class Draft:
     distortion: object
     """In OpenCV's order."""
     T: Array | None
-    """World to camera, (4, 4), translation in the file's unit; None where the file has the lens only."""
+    """World to camera, (4, 4), translation in the file's unit; None if the file has the lens only."""
     size: Sequence[float] | None = None
     """Width and height, pixels; None if not stated."""
     fisheye: bool = False
@@ -44,7 +44,7 @@ class Drafts(NamedTuple):
 
 
 def text_of(path: Path) -> str:
-    """The text of a calibration file. Raises `CalibrationError` where it cannot be read, is too long or no text."""
+    """The text of a calibration file. Raises `CalibrationError` if it cannot be read, is too long or no text."""
     text = read_limited(path, TOML_LIMIT, CalibrationError, "a calibration file", "a calibration")
     if "\0" in text:
         raise CalibrationError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")

@@ -30,7 +30,7 @@ SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
 
 
 def read_tables(path: Path) -> Drafts:
-    """Cameras of a TOML file. Raises `CalibrationError` with the section and field where something is missing or impossible."""
+    """Cameras of a TOML file. Raises `CalibrationError` with the section and field if something is missing or impossible."""
     data = read_toml(path, CalibrationError)
     nested = data.get("cameras")
     if isinstance(nested, dict) and nested and all(isinstance(table, dict) for table in nested.values()):

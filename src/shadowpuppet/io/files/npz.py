@@ -37,7 +37,7 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
 
 
 def read_all_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
-    """The arrays `names` of an archive. Raises as `read_arrays`, also where one is missing."""
+    """The arrays `names` of an archive. Raises as `read_arrays`, also if one is missing."""
     arrays = read_arrays(path, names)
     missing = [name for name in names if name not in arrays]
     if missing:

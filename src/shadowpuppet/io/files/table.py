@@ -32,12 +32,12 @@ class Table:
         return np.array(rows, float).reshape(len(rows), len(places))
 
     def texts(self, name: str) -> list[str]:
-        """A column's text. Raises `FormatError` where it is missing."""
+        """A column's text. Raises `FormatError` if it is missing."""
         place = self._place(name)
         return [row[place].strip() for row in self.rows]
 
     def times(self) -> Array:
-        """The column `time` (T,), seconds. Raises `FormatError` where a time is missing or does not increase."""
+        """The column `time` (T,), seconds. Raises `FormatError` if a time is missing or does not increase."""
         times = self.numbers(["time"])[:, 0]
         check_times(self.path, times, self.lines)
         return times
@@ -63,7 +63,7 @@ def number(path: Path, line: int, column: str, cell: str) -> float:
 
 
 def check_times(path: Path, times: Array, lines: Sequence[int]) -> None:
-    """Raise `FormatError`, naming the line, where times (T,) are missing or do not increase."""
+    """Raise `FormatError`, naming the line, if times (T,) are missing or do not increase."""
     bad = np.flatnonzero(~np.isfinite(times) | (np.diff(times, prepend=-np.inf) <= 0))
     if len(bad):
         i = int(bad[0])

@@ -18,7 +18,7 @@ TOML_LIMIT = 10_000_000
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file. Raises `FormatError` where it cannot be read, is empty, too long or no text."""
+    """The text of a UTF-8 file. Raises `FormatError` if it cannot be read, is empty, too long or no text."""
     text = read_limited(path, TEXT_LIMIT, FormatError, "a text file")
     if "\0" in text:
         raise FormatError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
@@ -28,7 +28,7 @@ def read_text(path: Path) -> str:
 
 
 def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any]:
-    """The tables of a TOML file. Raises `error` where it is missing, too long or not TOML."""
+    """The tables of a TOML file. Raises `error` if it is missing, too long or not TOML."""
     text = read_limited(Path(path), TOML_LIMIT, error, "a TOML file")
     try:
         return tomllib.loads(text)
@@ -60,7 +60,7 @@ def errors_named(where: object) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file completely or not at all. Raises `ShadowPuppetError` where it cannot be written."""
+    """Write a file completely or not at all. Raises `ShadowPuppetError` if it cannot be written."""
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_bytes(content.encode("utf-8", "replace") if isinstance(content, str) else content)

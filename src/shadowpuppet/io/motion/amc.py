@@ -69,7 +69,7 @@ class Capture:
     def joints(self, rate: float = 120.0) -> JointTable:
         """Joints of `ENDS`, `pelvis` and `face` at `rate` frames/s from 0 s, metres, z up.
 
-        Raises `FormatError` where the skeleton lacks a bone.
+        Raises `FormatError` if the skeleton lacks a bone.
         """
         places = {name: self.ends[:, self.skeleton.index(bone)] for name, bone in ENDS.items()}
         places["pelvis"] = (places["left_hip"] + places["right_hip"]) / 2
@@ -85,7 +85,7 @@ class Capture:
 
 
 def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
-    """Read an AMC file. Raises `FormatError`, naming the line, where it is malformed or of another skeleton."""
+    """Read an AMC file. Raises `FormatError`, naming the line, if it is malformed or of another skeleton."""
     path = Path(path)
     lines = read_text(path).splitlines()
     first, degrees = _header(path, lines, skeleton)

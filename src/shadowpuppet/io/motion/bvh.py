@@ -104,7 +104,7 @@ class Bvh:
 
 
 def read_bvh(path: str | Path) -> Bvh:
-    """Read a BVH file. Raises `FormatError`, naming the line, where it is malformed; warns where it breaks off."""
+    """Read a BVH file. Raises `FormatError`, naming the line, if it is malformed; warns where it breaks off."""
     path = Path(path)
     lines = read_text(path).splitlines()
     motion = next((n for n, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
@@ -234,7 +234,7 @@ def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
 
 
 def _numbers(words: list[str]) -> Array | None:
-    """Words as finite numbers; None where one is not."""
+    """Words as finite numbers; None if one is not."""
     try:
         values = np.array(words, float)
     except ValueError:

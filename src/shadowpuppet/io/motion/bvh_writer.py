@@ -27,7 +27,7 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
 
     The format has neither gaps nor times: unknown frames are interpolated, and frames at no constant rate are resampled, each with a
     warning. A joint rotates about Z, X, Y if these stay away from their singularity, else in another order; it has position channels only
-    if its position changes. `unit`: m (as Blender expects), cm or mm. Raises `ShadowPuppetError` where no frame is known or the file cannot
+    if its position changes. `unit`: m (as Blender expects), cm or mm. Raises `ShadowPuppetError` if no frame is known or the file cannot
     be written.
     """
     path = Path(path)

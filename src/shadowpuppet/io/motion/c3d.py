@@ -74,10 +74,10 @@ class C3d:
 
 
 def read_c3d(path: str | Path) -> JointTable:
-    """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN where not measured.
+    """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN if not measured.
 
     Not measured: a negative residual, a position that is exactly the origin, as some programs write it, or no finite one. Raises
-    `FormatError` where the file is malformed; warns where it breaks off or has no unit.
+    `FormatError` if the file is malformed; warns where it breaks off or has no unit.
     """
     path = Path(path)
     header = read_header(path)
@@ -182,7 +182,7 @@ def _metres(header: C3d) -> float:
 
 
 def _parameters(section: bytes, processor: int) -> dict[str, Any]:
-    """Values by GROUP:NAME. Raises `struct.error`, `IndexError` or `ValueError` where the section is damaged."""
+    """Values by GROUP:NAME. Raises `struct.error`, `IndexError` or `ValueError` if the section is damaged."""
     groups, found = dict[int, str](), list[tuple[int, str, Any]]()
     at, order = 4, ">" if processor == MIPS else "<"
     while at + 2 <= len(section):

@@ -59,7 +59,7 @@ def renamed(table: JointTable) -> JointTable:
     """The joints of a table that are ours, by our names and in our order.
 
     A joint between a pair of markers is their middle. A missing `pelvis` is the middle of the hips. A head beside a nose is the crown, as
-    in 2D detectors, and left out. Raises `FormatError` where no joint is known.
+    in 2D detectors, and left out. Raises `FormatError` if no joint is known.
     """
     columns, pairs = columns_of(table.names), pairs_of(table.names)
     if not columns and not pairs:

@@ -116,7 +116,7 @@ def _known(table: JointTable) -> JointTable:
 
 
 def unit_of(path: Path, table: JointTable) -> float:
-    """A table's unit in metres, by the length of legs or arms. Warns of it. Raises `FormatError` where none fits."""
+    """A table's unit in metres, by the length of legs or arms. Warns of it. Raises `FormatError` if none fits."""
     length = leg_length(_known(table))
     for unit, (low, high, metres) in LEG_LENGTHS.items():
         if low <= length < high:
@@ -128,7 +128,7 @@ def unit_of(path: Path, table: JointTable) -> float:
 
 
 def leg_length(table: JointTable) -> float:
-    """Median length of the legs, or of the arms in proportion, in the table's unit; NaN where unknown."""
+    """Median length of the legs, or of the arms in proportion, in the table's unit; NaN if unknown."""
     p = dict(zip(table.names, np.moveaxis(table.positions, 1, 0)))
     for chain, factor in ((("hip", "knee", "ankle"), 1.0), (("shoulder", "elbow", "wrist"), ARM_TO_LEG)):
         sides = [[p.get(f"{side}_{joint}") for joint in chain] for side in ("left", "right")]
@@ -164,7 +164,7 @@ def up_axis(table: JointTable) -> str:
 
 
 def _middle(table: JointTable, joints: tuple[str, ...]) -> Array:
-    """The middle (T, 3) of the first of `joints` that the table has, both sides; NaN where it has none."""
+    """The middle (T, 3) of the first of `joints` that the table has, both sides; NaN if it has none."""
     for joint in joints:
         columns = [n for n, name in enumerate(table.names) if name in (joint, f"left_{joint}", f"right_{joint}")]
         if columns:

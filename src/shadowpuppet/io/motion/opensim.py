@@ -88,7 +88,7 @@ def coordinates(animation: Animation) -> dict[str, Array]:
     """`COORDINATES` and `PELVIS_POSITION` over time, each (T,), rad or metres, of a skeleton whose joints have our names.
 
     Angles are continuous over the known frames, NaN in others. An elbow's rotation about the upper arm is added to the shoulder's.
-    Raises `ShadowPuppetError` where the root is not the pelvis, or no frame is known.
+    Raises `ShadowPuppetError` if the root is not the pelvis, or no frame is known.
     """
     known = np.flatnonzero(animation.known)
     if animation.names[0] != "pelvis" or not len(known):
@@ -156,7 +156,7 @@ class Coordinates(NamedTuple):
 def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> None:
     """Write coordinates (T,), rad or metres, as a MOT file. Frames with an unknown coordinate are left out: OpenSim has no gaps.
 
-    Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
+    Raises `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
     path = Path(path)
     table = np.stack([times, *(values[name] if name.endswith(TRANSLATIONS) else np.degrees(values[name]) for name in values)], 1)
@@ -170,7 +170,7 @@ def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> No
 
 
 def read_mot(path: str | Path) -> Coordinates:
-    """Read a MOT file. Raises `FormatError`, naming line and column, where it is malformed; warns of a wrong number of rows."""
+    """Read a MOT file. Raises `FormatError`, naming line and column, if it is malformed; warns of a wrong number of rows."""
     path = Path(path)
     lines = read_text(path).splitlines()
     end = next((n for n, line in enumerate(lines[:MAX_HEADER]) if line.strip().lower() == "endheader"), None)

@@ -21,7 +21,7 @@ METADATA = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z
 
 
 def write_parquet(path: str | Path, columns: Columns) -> None:
-    """Write columns; null for NaN. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
+    """Write columns; null for NaN. Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
     write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
 
 
@@ -37,7 +37,7 @@ def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
 def read_parquet(path: str | Path) -> JointTable:
     """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; ignores other columns; null where unknown.
 
-    Raises `FormatError` where the file is malformed; `ShadowPuppetError` where pyarrow is missing.
+    Raises `FormatError` if the file is malformed; `ShadowPuppetError` where pyarrow is missing.
     """
     path = Path(path)
     arrow, parquet = _arrow(path)

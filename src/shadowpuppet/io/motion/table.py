@@ -34,7 +34,7 @@ def joint_columns(names: Sequence[str], suffix: str = "") -> list[str]:
 
 
 def column_joints(path: Path, columns: Sequence[str]) -> tuple[str, ...]:
-    """The joints to which columns belong, in order. Raises `FormatError` where there is none, or one lacks a column."""
+    """The joints to which columns belong, in order. Raises `FormatError` if there is none, or one lacks a column."""
     stems = list(dict.fromkeys(column[:-2] for column in columns if column.endswith(AXES)))
     names = tuple(stem for stem in stems if not stem.endswith(SD))
     missing = [column for column in joint_columns(names) if column not in columns]
@@ -158,6 +158,6 @@ def dof_unit(name: str) -> str:
 
 
 def write_columns(path: Path, columns: Columns) -> None:
-    """Write columns as CSV, to the micrometre; empty cells for NaN. Raises `ShadowPuppetError` where that fails."""
+    """Write columns as CSV, to the micrometre; empty cells for NaN. Raises `ShadowPuppetError` if that fails."""
     texts = [column.tolist() if column.dtype.kind == "U" else cells(column.tolist()) for column in columns.values()]
     write_whole(path, "".join([csv_line(columns), *map(csv_line, zip(*texts))]))

@@ -20,7 +20,7 @@ MAX_BUFFERED = 1
 
 
 class LslOutlet(Outlet):
-    """A stream of type MoCap: seven channels a joint, position (metres) and quaternion, NaN where unknown.
+    """A stream of type MoCap: seven channels a joint, position (metres) and quaternion, NaN if unknown.
 
     A sample's time stamp is when its picture was captured.
     """
@@ -30,7 +30,7 @@ class LslOutlet(Outlet):
     def __init__(self, stream: str, scope: str = "machine") -> None:
         """`stream`: its name; `scope`: how far it is announced (machine, link or site).
 
-        Raises `SettingsError` where pylsl or liblsl is missing.
+        Raises `SettingsError` if pylsl or liblsl is missing.
         """
         try:
             import pylsl  # pyright: ignore[reportMissingImports]

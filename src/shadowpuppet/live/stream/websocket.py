@@ -29,7 +29,7 @@ class WebSocketOutlet(Outlet):
     def __init__(self, host: str, port: int, origins: Sequence[str] = ()) -> None:
         """`origins`: web pages that may connect, such as https://example.org, * for all; programs and this machine's pages always may.
 
-        Raises `SettingsError` where the address or port is not available, or the library is missing.
+        Raises `SettingsError` if the address or port is not available, or the library is missing.
         """
         try:
             import websockets.asyncio.server  # noqa: F401

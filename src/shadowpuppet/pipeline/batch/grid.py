@@ -160,7 +160,7 @@ def short(value: Any) -> str:
 
 
 def _check_flags(flags: Mapping[str, Any], cases: Sequence[Case]) -> None:
-    """Raises `SettingsError` where a flag sets what the grid varies."""
+    """Raises `SettingsError` if a flag sets what the grid varies."""
     for case in cases:
         for name in set(flags) & set(case.varied):
             raise SettingsError(f"flags: {name}: found {shown(flags[name])}, but the grid varies it; expected one of them")

@@ -63,7 +63,7 @@ def done_run(task: Task, folder: Path, mark: Mapping[str, Any], tries: int | Non
 
 
 def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
-    """Write the rows as .csv or .parquet. Raises `ShadowPuppetError` where that fails."""
+    """Write the rows as .csv or .parquet. Raises `ShadowPuppetError` if that fails."""
     rows = [run.row() for run in runs]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     if path.suffix == ".parquet":
