@@ -45,7 +45,7 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
     """Write a run's motion as `<run>.<format>` for each of `formats`; the files' paths.
 
     A killed run is exported up to its last frame. Warns of what a format cannot hold. Raises a `ShadowPuppetError` for an unknown format, a
-    run that cannot be read or has no frame, or has no person.toml if a format needs the body; files already written stay.
+    run that cannot be read or has no frame, or has no person.toml although a format needs the body; files already written stay.
 
     Args:
         folder: the run.

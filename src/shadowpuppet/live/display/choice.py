@@ -1,4 +1,4 @@
-"""The display that `--show` asks for."""
+"""Opens the display selected by `--show`."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
 
 CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
-"""Configuration of liblsl: how far the stream is announced, no log."""
+"""Configuration of liblsl: scope of the stream's announcement; no log."""
 KINDS = (*(f"Position{axis}" for axis in "XYZ"), *(f"Orientation{axis}" for axis in "XYZW"))
 """Channels of a joint, named as in XDF's meta-data for motion capture."""
 MAX_BUFFERED = 1
