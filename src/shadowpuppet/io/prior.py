@@ -1,4 +1,4 @@
-"""Motion priors as archives of arrays (.npz)."""
+"""Reads and writes motion priors as archives of arrays (.npz)."""
 
 from __future__ import annotations
 

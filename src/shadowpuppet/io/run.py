@@ -1,4 +1,4 @@
-"""Run folders: a tracked motion, written frame by frame, with its settings and metrics.
+"""Reads and writes run folders: a tracked motion, written frame by frame, with its settings and metrics.
 
     joints.csv    time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1)
     angles.csv    time, every degree of freedom (rad or m), then <dof>_sd
@@ -39,14 +39,14 @@ OWN_KEYS = ("complete", "frames", "body", "versions")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run that was read."""
+    """The content of a run folder."""
 
     folder: Path
     motion: Motion
     info: dict[str, Any]
-    """run.toml."""
+    """Contents of run.toml."""
     metrics: dict[str, Any]
-    """metrics.json; empty if there is none."""
+    """Contents of metrics.json; empty if there is none."""
 
     @property
     def complete(self) -> bool:
@@ -62,13 +62,13 @@ class Run:
 class RunWriter:
     """Writes a run: `with RunWriter(...) as run: run.write(frame)`; `run.metrics` may be filled until the end.
 
-    The folder must be new, empty or an earlier run's, which the first frame replaces. Raises `ShadowPuppetError` for any other folder, and
-    if it cannot be written; frames written before stay readable.
+    The folder must be new, empty or that of an earlier run, which is replaced when the first frame is written. Raises
+    `ShadowPuppetError` for any other folder, and if it cannot be written; frames written before stay readable.
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
                  info: Mapping[str, Any]) -> None:
-        """`info`: entries of run.toml; dataclasses, arrays and paths are converted, None is left out."""
+        """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
             raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
@@ -91,7 +91,7 @@ class RunWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the remaining files; after an error as far as possible."""
+        """Write the remaining files, after an error as far as possible."""
         if kind is None:
             self._start()
             self._finish(complete=True)
@@ -150,7 +150,7 @@ class RunWriter:
 
     @contextlib.contextmanager
     def _system_errors(self) -> Iterator[None]:
-        """Raises `OSError` as `ShadowPuppetError`, which says what was saved."""
+        """Convert `OSError` to `ShadowPuppetError`, which states what was saved."""
         try:
             yield
         except OSError as error:
@@ -207,7 +207,7 @@ def _read_tables(folder: Path, body_name: str, cut: bool) -> Motion:
 
 
 def _common_frames(joints: Table, angles: Table, cut: bool) -> int:
-    """Number of frames in both tables; one of a killed run (`cut`) may be a frame ahead."""
+    """Number of frames in both tables; in a killed run (`cut`), one table may have a frame more."""
     times, others = joints.times(), angles.times()
     frames = min(len(times), len(others)) if cut else max(len(times), len(others))
     if not np.array_equal(times[:frames], others[:frames]):

@@ -36,7 +36,7 @@ def play_run(folder: str | Path, outlets: Outlets, listener: LiveListener | None
     """Send every frame of a run to outlets when it is due, until the run's end, or with `loop` until Ctrl-C. Returns the number sent.
 
     `speed`: ratio to the run's own rate. With `loop`, times keep increasing when the run begins again. Raises a `ShadowPuppetError` if the
-    run cannot be read or has no person.toml, which rotations need.
+    run cannot be read, has no person.toml, which rotations need, or has no frame with a pose.
     """
     listener = listener or LiveListener()
     with outlets, Stop() as stop:

@@ -1,4 +1,4 @@
-"""Frames read from films, folders of pictures and live cameras, one at a time; films and pictures written."""
+"""Reads frames of films, folders of pictures and live cameras, one at a time; writes films and pictures."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
 
     Args:
         source: the path or number.
-        grey: (H, W) frames; of films the luma scaled to 0..255, without decoding colours.
+        grey: give frames (H, W); for films the luma, scaled to 0..255, without decoding colours.
         size: width and height to which frames are scaled.
-        rate: frames/s, in place of the source's times; a folder has those in `timestamps.txt` or `.csv` (seconds, one a picture).
+        rate: frames/s, replaces the source's times; a folder's times are in `timestamps.txt` or `.csv` (seconds, one per picture).
     """
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise VideoError(f"{source}: rate: found {rate}, expected a positive number of frames/s")

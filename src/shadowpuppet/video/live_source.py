@@ -46,7 +46,7 @@ class Feed:
     rate: float
     """Stated frames/s; NaN if unknown."""
     live: bool
-    """Whether to reopen it when it ends; False for films."""
+    """Whether the source is live, and reopened if it ends; False for films."""
     read: Callable[[], Iterator[Snapshot]] = field(repr=False)
     """Pictures as they come, until the source ends. Raises `VideoError` if it cannot be opened or breaks off."""
 
@@ -84,7 +84,7 @@ def _camera(number: int, rate: float | None) -> Feed:
 
 def _stream(address: str) -> Feed:
     shown, size, rate = open_stream(address)
-    ready = [shown]  # many senders serve one reader only once
+    ready = [shown]  # many senders accept only one connection
 
     def read() -> Iterator[Snapshot]:
         for now, image in ready.pop() if ready else open_stream(address)[0]:
@@ -95,7 +95,7 @@ def _stream(address: str) -> Feed:
 
 def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] = time.monotonic,
               wait: Callable[[float], None] = time.sleep) -> Feed:
-    """A film played as if live: each frame comes when it is due, with that time as its time of capture."""
+    """A feed that plays a film as if live: each frame comes when it is due, and that is its time of capture."""
 
     def read() -> Iterator[Snapshot]:
         start, warned = math.nan, False
@@ -104,7 +104,7 @@ def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] 
             due = start + time_ / speed
             while (ahead := due - clock()) > 0:
                 wait(ahead)
-            if -ahead > MAX_DELAY:  # as a camera would, play it slower
+            if -ahead > MAX_DELAY:  # too slow: set the clock back
                 start, due = start - ahead, due - ahead
                 if not warned:
                     warnings.warn(f"{film.name}: cannot be decoded as fast as it is to be played; it is played slower", ShadowPuppetWarning,

@@ -1,4 +1,4 @@
-"""Text and TOML files read, and files written whole."""
+"""Reads text and TOML files; writes files completely or not at all."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import Any
 from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 
 TEXT_LIMIT = 1_000_000_000
-"""Bytes of a table or motion; a longer one would not fit into memory as numbers."""
+"""Greatest size of a table or motion, bytes; a longer one would not fit into memory as numbers."""
 TOML_LIMIT = 10_000_000
-"""Bytes of a calibration or settings; a film given by mistake is not read."""
+"""Greatest size of a calibration or settings file, bytes, so that a film given by mistake is not read."""
 
 
 def read_text(path: Path) -> str:
@@ -50,7 +50,7 @@ def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: s
 
 @contextlib.contextmanager
 def errors_named(where: object) -> Iterator[None]:
-    """Raises `ShadowPuppetError` as `FormatError` that begins with the file."""
+    """Convert `ShadowPuppetError` to `FormatError`, whose message begins with the file."""
     try:
         yield
     except FormatError:

@@ -1,4 +1,4 @@
-"""Files of motion: one module a format; `motion_files` reads any of `READABLE`, `io.export` writes any of `EXPORTS`."""
+"""Motion files: one module per format; `motion_files` reads any of `READABLE`, `io.export` writes any of `EXPORTS`."""
 
 READABLE = (".amc", ".bvh", ".c3d", ".csv", ".npz", ".parquet", ".trc")
 EXPORTS = ("c3d", "trc", "csv", "npz", "bvh", "glb", "mot", "parquet")

@@ -1,4 +1,4 @@
-"""ASF files (Acclaim): the skeleton of a motion capture."""
+"""Reads ASF files (Acclaim): the skeleton of a motion capture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""C3D files (c3d.org) read: markers over time in blocks of 512 bytes, as integers or floats of three kinds of processors.
+"""Reads C3D files (c3d.org): markers over time in blocks of 512 bytes, as integers or floats of three kinds of processors.
 
 A reader of our own: damaged files crash ezc3d.
 """
@@ -29,7 +29,7 @@ KEY = 0x50
 INTEL, DEC, MIPS = 84, 85, 86
 """Kinds of processors in the parameter section."""
 MAX_COORDINATE = 1e6
-"""Metres; larger coordinates are unknown."""
+"""Largest coordinate, metres; larger ones count as unknown."""
 CHAR, BYTE, INT, FLOAT = -1, 1, 2, 4
 """Types of parameters, by their bytes."""
 
@@ -42,11 +42,11 @@ class C3d:
     parameters: dict[str, Any]
     """By GROUP:NAME: a list of words, or an array of numbers."""
     points: int
-    """Markers, N."""
+    """Number of markers, N."""
     analog: int
-    """Analog values a frame."""
+    """Number of analog values per frame."""
     frames: int
-    """Frames that are both stated and present."""
+    """Number of frames that are both stated and present."""
     start: int
     """First byte of the data."""
     scale: float
@@ -77,7 +77,7 @@ def read_c3d(path: str | Path) -> JointTable:
     """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN if not measured.
 
     Not measured: a negative residual, a position that is exactly the origin, as some programs write it, or no finite one. Raises
-    `FormatError` if the file is malformed; warns where it breaks off or has no unit.
+    `FormatError` if the file is malformed; warns if it breaks off or has no unit.
     """
     path = Path(path)
     header = read_header(path)

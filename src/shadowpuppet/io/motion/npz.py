@@ -1,4 +1,4 @@
-"""Joints, and whole motions of runs, as archives of arrays (NPZ)."""
+"""Reads and writes joints, and whole motions of runs, as archives of arrays (NPZ)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.motion import JointTable, Motion
 
 JOINT_ARRAYS = ("times", "joint_names", "joints")
-"""Seconds (T,), names (J,), and positions (T, J, 3) in the world, metres, NaN if unknown. A run's motion.npz has them, too."""
+"""Seconds (T,), names (J,), and positions (T, J, 3) in the world, metres, NaN if unknown. A run's motion.npz has these arrays, too."""
 MOTION_ARRAYS = tuple(field.name for field in fields(Motion))
 
 
@@ -34,7 +34,7 @@ def write_npz(path: str | Path, table: JointTable) -> None:
 
 
 def read_motion_npz(path: Path) -> Motion:
-    """A run's motion. Raises `FormatError`."""
+    """Read a run's motion. Raises `FormatError`."""
     try:
         arrays: dict[str, Any] = read_all_arrays(path, MOTION_ARRAYS)
         arrays["body_name"] = str(arrays["body_name"])

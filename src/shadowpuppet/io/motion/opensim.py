@@ -45,7 +45,7 @@ class Ball(NamedTuple):
     """Joint of the skeleton."""
     names: tuple[str, str, str]
     limits: tuple[Pair, Pair, Pair]
-    """Usual ranges, degrees; of the equivalent triples of angles the one least outside is taken."""
+    """Usual ranges, degrees; of equivalent triples of angles, the one least outside these is used."""
     signs: tuple[int, int, int] = (1, 1, 1)
 
 
@@ -56,7 +56,7 @@ class Hinge(NamedTuple):
     name: str
     sign: int
     first: bool = False
-    """Whether it comes before the joint's other rotation (an ankle's inversion); else after it (an elbow's about the upper arm)."""
+    """Whether this rotation precedes the joint's other one (an ankle's inversion); else it follows it (an elbow's about the upper arm)."""
 
 
 COORDINATES: tuple[Ball | Hinge, ...] = (

@@ -1,4 +1,4 @@
-"""Tables of ours: joints over time (CSV), a run's joints.csv and angles.csv, and a whole motion as columns.
+"""Our own tables: joints over time (CSV), a run's joints.csv and angles.csv, and a whole motion as columns.
 
 The names of all columns are made here. `MotionFrame` and `Motion` (motion.motion) hold what stands in them.
 """
@@ -21,7 +21,7 @@ from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
 
 AXES = ("_x", "_y", "_z")
 SD = "_sd"
-"""Ending of standard deviations; no joint or degree of freedom may end in it."""
+"""Suffix of columns of standard deviations; no name of a joint or degree of freedom may end in it."""
 TRANSLATIONS = ("torso_y", "root_x", "root_y", "root_z")
 """Degrees of freedom in metres; all others are angles."""
 Columns = dict[str, Array | NDArray[np.str_]]
@@ -153,7 +153,7 @@ def table_columns(table: JointTable) -> Columns:
 
 
 def dof_unit(name: str) -> str:
-    """The unit of a degree of freedom: m or rad."""
+    """The unit of a degree of freedom by its name: m or rad."""
     return "m" if name in TRANSLATIONS else "rad"
 
 

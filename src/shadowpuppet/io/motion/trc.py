@@ -1,4 +1,4 @@
-"""TRC files (Motion Analysis; OpenSim, Pose2Sim): markers over time, separated by tabs, usually in millimetres."""
+"""Reads and writes TRC files (Motion Analysis; OpenSim, Pose2Sim): markers over time, separated by tabs, usually in millimetres."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def read_trc(path: str | Path) -> JointTable:
 
 
 def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
-    """Write joints as markers without changing axes; empty if unknown. Raises `ShadowPuppetError` if that fails."""
+    """Write joints as markers without changing axes; cells are empty if unknown. Raises `ShadowPuppetError` if that fails."""
     path = Path(path)
     if unit not in METRES:
         raise ShadowPuppetError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
