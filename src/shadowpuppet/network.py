@@ -116,13 +116,13 @@ def known_host(header: str, loopback: bool) -> bool:
 
 
 def is_same_origin(headers: Any) -> bool:
-    """Whether a request comes from a page of the same server, or from no page."""
+    """Whether a request comes from a page of the same server, or from a program that is no web page."""
     host = (headers.get_all("Host") or [""])[0].lower()
     return all(origin.lower().partition("://")[2] == host for origin in headers.get_all("Origin") or [])
 
 
 def are_origins_allowed(headers: Any, allowed: frozenset[str]) -> bool:
-    """Whether a request comes from a page of this machine, of an origin in `allowed` (* for any), or from no page."""
+    """Whether a request comes from a page of this machine, of an origin in `allowed` (* for any), or not from a page."""
     return all(is_loopback(host_of(origin)) or origin in allowed or "*" in allowed for origin in headers.get_all("Origin") or [])
 
 

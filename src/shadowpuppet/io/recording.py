@@ -90,7 +90,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     folder = Path(str(path))
     try:
         exists = folder.exists()
-    except OSError as error:  # such as for a name that is too long
+    except OSError as error:  # for example, a name that is too long
         raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
     if camera_number(path) is None and not exists:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")

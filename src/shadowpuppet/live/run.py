@@ -111,7 +111,7 @@ class _Live:
         return session, Capture(feed), feed.rate, feed.live
 
     def _several(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
-        """The same of several cameras."""
+        """The session of several cameras, their reader, their frame sets/s, and whether they are live (not films)."""
         sources = open_rig_sources(self.options, self.settings)
         watchdogs = tuple(CameraWatchdog(camera.name, size, sources.live) for camera, size in zip(sources.cameras, sources.sizes))
         session = RigSession(self.options, self.settings, np.random.default_rng(self.options.seed), self.clock, Timing(sources.rate),

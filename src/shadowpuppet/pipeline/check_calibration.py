@@ -30,8 +30,8 @@ MAX_SET_RATE = 31.0
 SETS_COMPARED = 12
 """Number of sets, spread over all, in which places are compared."""
 MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 3.0
-"""Offset, in sets, above which a film counts as late; the same for a camera whose places disagree, which makes its time less certain; least
-ratio of the offset to its spread over camera pairs."""
+"""Least offset, in sets, of a film that is late; the same for a camera that disagrees about places, so that its time is less certain;
+least ratio of the offset to its spread over camera pairs."""
 SLIGHT_DISAGREEMENT = 0.004
 """Disagreement, over the picture's longer side, above which the worst camera is tested for a rotation (2.6 of 640 pixels)."""
 STANDOUT_FACTOR = 3.0

@@ -38,7 +38,7 @@ class Look:
     jitter: float
     """Standard deviation of the frames' interval, seconds."""
     scale: str
-    """What fixes the scale."""
+    """Known lengths that fix the scale, in words."""
     background: str
     """Where the silhouettes come from."""
     key: str
@@ -57,7 +57,7 @@ class Look:
     """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
     it was not fitted."""
     doubts: tuple[str, ...] = ()
-    """What may harm the run, and the remedy, a sentence each."""
+    """Possible problems of the run with their remedies, a sentence each."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
 
@@ -107,7 +107,7 @@ class RigLook:
     person: dict[str, Any] | None = None
     """Sizes and how they were found; None if the person was not measured."""
     doubts: tuple[str, ...] = ()
-    """What may harm the run, and the remedy, a sentence each."""
+    """Possible problems of the run with their remedies, a sentence each."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
 
@@ -127,11 +127,11 @@ class Survey:
 
     rig: Rig
     silhouettes: tuple[Silhouettes, ...]
-    """For each camera, for tracking."""
+    """For each camera, the silhouettes used for tracking."""
     clean: tuple[Silhouettes, ...]
-    """For each camera, for measuring the person; the same as `silhouettes` if these are clean."""
+    """For each camera, the silhouettes used for measuring the person; the same as `silhouettes` if these are clean."""
     first: FirstSeconds
-    """Made by `clean`."""
+    """Silhouettes of the beginning, made by `clean`."""
     look: Look | RigLook
 
     def check(self) -> None:

@@ -38,7 +38,7 @@ def _corners(value: object) -> object:
 
 
 def _metres(limits: tuple[float, float]) -> WrapValidator:
-    """A validator whose error names the possible lengths in metres."""
+    """A validator of lengths; its error states the limits in metres."""
 
     def check(value: Any, handler: Callable[[Any], Any]) -> Any:
         try:

@@ -65,7 +65,7 @@ class TrackedSubject(ABC):
     summary: dict[str, Any]
     """How the person was fitted, as plain values: the entry `person` of look.json."""
     doubts: tuple[str, ...] = ()
-    """What may harm the run, a sentence each."""
+    """Doubts about the fit, a sentence each."""
 
     @abstractmethod
     def observe(self, masks: Sequence[Mask | None]) -> Any:

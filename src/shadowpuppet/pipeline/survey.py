@@ -107,7 +107,7 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
 
 
 def known_scale(footage: Footage) -> str:
-    """What fixes the scale, in words."""
+    """Known lengths that fix the scale, in words."""
     subject = footage.recording.subject
     known = [f"{name} {value:.2f} m" for name, value in (("height", subject.height), ("distance", subject.distance)) if value]
     return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"

@@ -89,7 +89,7 @@ class Drawing:
 
 
 SHOWN, SHOWN_SEVERAL = 6, (4, 2)
-"""Number of frames on the contact sheet of one camera; number of frames and of columns with several, whose frames are grids."""
+"""Number of frames on the contact sheet of one camera; numbers of frames and columns with several cameras, where each frame is a grid."""
 
 
 def run_demo(folder: str | Path, options: Options, listener: Listener | None = None) -> tuple[Summary, Summary]:

@@ -54,7 +54,7 @@ class Calibration:
     path: Path
     format: str
     cameras: tuple[Camera, ...]
-    """In metres, Z up if known."""
+    """Cameras in metres, Z up if known."""
     unit: str
     """Unit of the file: m, cm or mm."""
     unit_known: bool
@@ -77,7 +77,7 @@ HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), rea
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
 FORMATS = (QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
-"""In the order in which they are tried."""
+"""All formats, in the order in which they are tried."""
 
 
 def read_calibration(path: str | Path, *, unit: str | None = None, up: str | None = None,
@@ -188,7 +188,7 @@ def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
 
 
 def rotated_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
-    """Cameras in the world rotated so that its direction `up` (of `UPS`) is Z."""
+    """The cameras after a rotation of the world that brings its direction `up` (of `UPS`) to Z."""
     direction = UPS[up]
     if direction is None:
         direction = _level(cameras)
@@ -197,9 +197,9 @@ def rotated_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
 
 
 def _level(cameras: tuple[Camera, ...]) -> Array:
-    """The up direction (3,) for cameras without roll: normal to the rows of all pictures, whatever the tilt.
+    """The up direction (3,) for cameras without roll: the normal to the rows of all pictures, which does not depend on the tilt.
 
-    Where rows are parallel, or the normal disagrees with the pictures' mean up direction, that mean.
+    If the rows are parallel, or the normal disagrees with the pictures' mean up direction, the mean is returned.
     """
     mean = -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
     rows = np.array([camera.T_camera_world[0, :3] for camera in cameras])

@@ -1,6 +1,6 @@
-"""OpenCV's FileStorage, YAML and XML, read as matrices, numbers, words and lists of these.
+"""Reads OpenCV's FileStorage, YAML and XML, as matrices, numbers, words and lists of these.
 
-A reader of our own: damaged files crash OpenCV's parser.
+OpenCV's own parser is not used because damaged files crash it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Calibrations in TOML: the schema of Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export, and Caliscope's own.
+"""Reads calibrations in TOML: the schema of Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export, and Caliscope's own.
 
-A section a camera: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to camera, or a
-3 x 3 matrix), `translation`, `fisheye`. Caliscope's own file (camera_array.toml) has its sections below `cameras`, by number.
+Each camera has a section: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to
+camera, or a 3 x 3 matrix), `translation`, `fisheye`. Caliscope's own file (camera_array.toml) has its sections below `cameras`, by number.
 """
 
 from __future__ import annotations

@@ -92,8 +92,8 @@ class Bvh:
     def _is_added(self, n: int) -> bool:
         """Whether a node's position channels are added to its offset, rather than replace it.
 
-        For the root they are, by the format's first description. For other joints programs differ: most write the whole position, which
-        shows by values near the offset.
+        They are for the root, by the format's first description. For other joints programs differ: most write the whole position, which is
+        recognised by values near the offset.
         """
         node, columns = self.nodes[n], self._columns[n]
         shifts = [(node.offset[channel], self.values[:, column]) for channel, column in zip(node.channels, columns) if channel < 3]

@@ -25,7 +25,7 @@ UNKNOWN_END = (0.0, 0.0, 0.0)
 def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     """Write an animated skeleton: constant offsets, Euler angles in degrees, Y up.
 
-    The format has neither gaps nor times: unknown frames are interpolated, and frames at no constant rate are resampled, each with a
+    The format has neither gaps nor times: unknown frames are interpolated, and frames at a varying rate are resampled, each with a
     warning. A joint rotates about Z, X, Y if these stay away from their singularity, else in another order; it has position channels only
     if its position changes. `unit`: m (as Blender expects), cm or mm. Raises `ShadowPuppetError` if no frame is known or the file cannot
     be written.

@@ -1,6 +1,6 @@
 """Reads C3D files (c3d.org): markers over time in blocks of 512 bytes, as integers or floats of three kinds of processors.
 
-A reader of our own: damaged files crash ezc3d.
+The library ezc3d is not used because damaged files crash it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class C3d:
 
     path: Path
     parameters: dict[str, Any]
-    """By GROUP:NAME: a list of words, or an array of numbers."""
+    """Parameters by GROUP:NAME, each a list of words or an array of numbers."""
     points: int
     """Number of markers, N."""
     analog: int
@@ -76,8 +76,8 @@ class C3d:
 def read_c3d(path: str | Path) -> JointTable:
     """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN if not measured.
 
-    Not measured: a negative residual, a position that is exactly the origin, as some programs write it, or no finite one. Raises
-    `FormatError` if the file is malformed; warns if it breaks off or has no unit.
+    A point is not measured if its residual is negative, or its position is not finite or exactly the origin, as some programs write it.
+    Raises `FormatError` if the file is malformed; warns if it breaks off or has no unit.
     """
     path = Path(path)
     header = read_header(path)

@@ -33,14 +33,14 @@ Angles = Mapping[str, tuple[str, Array]]
 def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None) -> None:
     """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, one value per frame.
 
-    Frames get one rate: missing ones are unknown; frames at no constant rate are resampled, with a warning. Raises `ShadowPuppetError`
-    if there is no frame, a name is too long, or the file cannot be written.
+    The file has a constant rate: missing frames become unknown; frames at a varying rate are resampled, with a warning. Raises
+    `ShadowPuppetError` if there is no frame, a name is too long, or the file cannot be written.
 
     Args:
         path: the file.
         table: the joints; an unknown one gets the residual -1.
-        spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 where None or NaN.
-        angles: NaN if unknown.
+        spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 for None or NaN.
+        angles: unit and values (T,) of each angle; NaN if unknown.
     """
     path, angles = Path(path), angles or {}
     bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= MAX_LETTERS]

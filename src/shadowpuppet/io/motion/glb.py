@@ -115,7 +115,7 @@ def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
 
 
 def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> dict[str, Any]:
-    """Samplers and channels: rotations and positions of joints where they change, and scale 0 in unknown frames."""
+    """Samplers and channels: rotations and positions of joints if they change, and scale 0 in unknown frames."""
     times = animation.times - animation.times[0]
     keys, shifts = buffer.add(times[known], "SCALAR", FLOAT, bounds=True), _shifts(animation)[known]
     samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()

@@ -56,10 +56,10 @@ LETTERS = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
 def renamed(table: JointTable) -> JointTable:
-    """The joints of a table that are ours, by our names and in our order.
+    """Our joints in a table, by our names and in our order.
 
-    A joint between a pair of markers is their middle. A missing `pelvis` is the middle of the hips. A head beside a nose is the crown, as
-    in 2D detectors, and left out. Raises `FormatError` if no joint is known.
+    A joint with a pair of markers is their midpoint. A missing `pelvis` is the midpoint of the hips. If there is also a nose, the head is
+    taken for the crown, as in 2D detectors, and left out. Raises `FormatError` if no joint is known.
     """
     columns, pairs = columns_of(table.names), pairs_of(table.names)
     if not columns and not pairs:

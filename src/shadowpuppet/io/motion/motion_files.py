@@ -66,10 +66,10 @@ READERS = {".c3d": read_c3d, ".csv": read_joints, ".npz": read_npz, ".parquet": 
 
 
 def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
-    """True joints to compare a run with, by our names, metres; joints named in `known` (the run's) are kept, too.
+    """Read the ground truth of a run: joints by our names, metres; joints named in `known` (the run's) are kept, too.
 
-    The axes of the file stay, as a truth must be in the cameras' world; BVH and AMC, which have worlds of their own, are read by
-    `read_motion`. Raises `FormatError`, naming the file and what is in it.
+    The file's axes are kept, as the truth must be in the cameras' world; BVH and AMC files, which have their own worlds, are read by
+    `read_motion`. Raises `FormatError`, naming the file and its content.
     """
     path = Path(path)
     ending = path.suffix.lower()

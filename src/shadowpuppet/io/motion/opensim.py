@@ -72,8 +72,8 @@ COORDINATES: tuple[Ball | Hinge, ...] = (
         Hinge(f"{side}_elbow", f"elbow_flex_{s}", -1),
     )),
 )  # fmt: skip
-"""In the order of the file. Positive: a knee bends, an ankle bends up; hips and arms move forward, inward, and rotate inward. The upper
-body's `torso` is the chest. Not included: the head's rotation, and an ankle's inversion, whose axis is not the model's."""
+"""Coordinates in the order of the file. Positive: a knee bends, an ankle bends up; hips and arms move forward, inward, and rotate inward.
+The upper body's `torso` is the chest. Not included: the head's rotation, and an ankle's inversion, whose axis is not the model's."""
 PELVIS_POSITION = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 TO_MODEL = np.array([[0.0, 0, 1], [0, 1.0, 0], [-1.0, 0, 0]])
 """From a skeleton's axes at rest (left, up, forward) to the model's (forward, up, right)."""

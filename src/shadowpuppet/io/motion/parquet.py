@@ -35,7 +35,7 @@ def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
 
 
 def read_parquet(path: str | Path) -> JointTable:
-    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; ignores other columns; null where unknown.
+    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; ignores other columns; null if unknown.
 
     Raises `FormatError` if the file is malformed; `ShadowPuppetError` if pyarrow is missing.
     """

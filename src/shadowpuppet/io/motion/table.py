@@ -133,7 +133,7 @@ def _statuses(table: Table) -> np.ndarray:
 def motion_columns(motion: Motion) -> Columns:
     """A whole motion: `time`, joints (world, metres), their deviations, `status`, `cost`, `overlap`, then degrees of freedom.
 
-    The latter have their unit in the name, `chest_x [rad]`, so that none is taken for a joint's. Columns without a known value are
+    Names of degrees of freedom end in their unit, `chest_x [rad]`, so that none is taken for a joint's. Columns without a known value are
     left out.
     """
     found: Columns = table_columns(motion.table)

@@ -24,7 +24,7 @@ DIM, TINT = 0.45, 0.15
 
 
 def drawn(view: View) -> Image | None:
-    """The view's picture (H, W, 3), blue green red, with outline, body and skeleton drawn where known; None without a picture."""
+    """The view's picture (H, W, 3), blue green red, with outline, body and skeleton drawn if known; None without a picture."""
     import cv2
 
     if view.image is None:

@@ -46,7 +46,7 @@ class Subject:
     T_world_base: Array
     """From the body's frame (in the zero pose X forward, Y left, Z up) to the world, (4, 4)."""
     height: float | None = None
-    """Metres, shoes on."""
+    """Height with shoes, metres; None if unknown."""
     floor: float | None = None
     """Z of the floor in the world, metres; None if unknown, as with one camera that was not calibrated."""
 

@@ -32,7 +32,7 @@ def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome
 
 
 class Cluster(WorkerPool):
-    """The workers of a Dask cluster, which must have this package and see the same files under the same names."""
+    """Runs tasks on the workers of a Dask cluster, which must have this package and see the same files at the same paths."""
 
     def __init__(self, address: str, out: Path, start: str, reuse: bool, listener: BatchListener) -> None:
         """`address`: of the scheduler, or a scheduler file; `out`: the batch's folder; `start` as in `do_there`."""

@@ -33,7 +33,7 @@ class Batch:
 
     folder: Path
     runs: tuple[BatchRun, ...]
-    """In the order of recordings, cases and seeds."""
+    """All runs, in the order of recordings, cases and seeds."""
 
     @property
     def failed(self) -> list[BatchRun]:

@@ -24,8 +24,8 @@ from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 
 MARK, PART, PLAN, RUNS = "task.json", ".part", "batch.toml", "runs"
-"""In a run folder: the file with its task's id, written last. In a batch's folder: the ending of unfinished run folders, the file that
-every batch has, and the folder of the runs."""
+"""File with the task's id in a run folder, written last; ending of unfinished run folders; file with the settings of a batch, which every
+batch's folder contains; folder of the runs in it."""
 PERMANENT = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EEXIST, errno.EINVAL, errno.ENAMETOOLONG}
 """System errors that another try would meet again."""
 

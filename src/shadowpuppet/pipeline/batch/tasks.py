@@ -46,7 +46,7 @@ class Task:
     varied: dict[str, Any]
     """Settings that differ between tasks, by dotted name."""
     film: str
-    """Hash that tasks with the same silhouettes share."""
+    """Hash of recording and options that determine the silhouettes; tasks with the same hash can share these."""
 
     choice: str
     """Label of case and grid values; empty if nothing varies."""
