@@ -166,7 +166,7 @@ class LiveSession(ABC):
     def _forget_time(self) -> None:
         """Restart countdowns and collections, after a gap in the pictures."""
 
-    # Does not
+    # Shared by all sessions
 
     def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
         assert self.subject is not None

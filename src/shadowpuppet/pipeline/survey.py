@@ -38,7 +38,7 @@ RATES, LENGTHS = 0.02, 0.1
 
 
 class FilmSurvey(NamedTuple):
-    """Result of examining one camera's film."""
+    """Result of examining one camera's film: its sample, silhouettes and findings."""
 
     sample: Sample
     silhouettes: Silhouettes

@@ -80,7 +80,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 longest, n = max(longest, time - before), n + 1
         except Break as cause:
             broken = str(cause)
-    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # false where the duration is unknown
+    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # False if the duration is unknown
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
         of = f" of {film.count}" if film.count else ""
@@ -93,13 +93,13 @@ def _say(warning: str) -> None:
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
     if container.format.name == "avi" and stream.frames and stream.average_rate:
-        return float(stream.frames / stream.average_rate)  # FFmpeg states the duration of what is left of a cut file
+        return float(stream.frames / stream.average_rate)  # for a cut file FFmpeg states the remaining duration
     if stream.duration is not None and stream.time_base is not None:
         return float(stream.duration * stream.time_base)
-    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska's, per stream
+    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska states it per stream
     if tag:
         return int(tag[1]) * 3600 + int(tag[2]) * 60 + float(tag[3])
-    alone = len(container.streams) == 1  # the container's is that of its longest stream, perhaps audio
+    alone = len(container.streams) == 1  # the container's duration is that of its longest stream, perhaps audio
     return container.duration / 1e6 if alone and container.duration else math.nan
 
 
@@ -164,7 +164,7 @@ def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:
             step = frame.pts - last.pts if last and frame.pts is not None and last.pts is not None else 0
             if last and 0 < 1.5 * last.duration < step:
                 break
-            frame.time_base = stream.time_base  # known by packets only
+            frame.time_base = stream.time_base  # only packets state it
             frames.append(frame)
             last = frame
     return frames
@@ -203,7 +203,7 @@ class _Clock:
         self._warn(self.last, "is followed by one that is not later; times are moved so that they increase")
         if self.last - time < LONGEST_STUTTER:  # later times are correct again
             return self.last + self.step / 2
-        self.shift += self.last + self.step - time  # a new start
+        self.shift += self.last + self.step - time  # the clock restarted
         return self.last + self.step
 
     def _warn(self, time: float, what: str) -> None:

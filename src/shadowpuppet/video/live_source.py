@@ -84,7 +84,7 @@ def _camera(number: int, rate: float | None) -> Feed:
 
 def _stream(address: str) -> Feed:
     shown, size, rate = open_stream(address)
-    ready = [shown]  # many senders accept only one connection
+    ready = [shown]  # many senders accept one connection only: the first reader continues with it
 
     def read() -> Iterator[Snapshot]:
         for now, image in ready.pop() if ready else open_stream(address)[0]:

@@ -118,7 +118,7 @@ class _Film:
             raise VideoError(f"{path}: no frame of it can be decoded ({self.stream.codec_context.name})")
         if self.zero is None:  # frames without times
             self.step = 1 / float(self.stream.guessed_rate or rate or ASSUMED_RATE)
-        self.scale = 1.0 if rate is None else rate * self.step  # from requested times to the film's
+        self.scale = 1.0 if rate is None else rate * self.step  # ratio of the film's times to requested times
 
     def close(self) -> None:
         """Close the file."""

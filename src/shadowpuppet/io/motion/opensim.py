@@ -1,8 +1,8 @@
-"""OpenSim: names of markers, a skeleton's motion as coordinates of a full-body model, and MOT files, which hold coordinates.
+"""OpenSim formats: marker names, a skeleton's motion as coordinates of a full-body model, and MOT files, which contain coordinates.
 
 Markers are named as in Pose2Sim's marker sets; coordinates are those of the full-body model of Rajagopal et al. (2016). Its world and
-bodies have X forward, Y up, Z to the right, and ball joints rotate about Z, then X, then Y. A MOT file is a table behind a short header,
-angles in degrees, lengths in metres.
+bodies have X forward, Y up, Z to the right, and ball joints rotate about Z, then X, then Y. A MOT file is a table after a short header,
+with angles in degrees and lengths in metres.
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ class Outlet:
 
 
 class Outlets(Outlet):
-    """Several outlets as one. An outlet that raises is dropped; the session and the others go on."""
+    """Several outlets as one. An outlet that raises is dropped; the session and the other outlets continue."""
 
     def __init__(self, outlets: Iterable[Outlet] = ()) -> None:
         """`outlets`: any number of outlets."""
@@ -174,6 +174,6 @@ class Outlets(Outlet):
         for outlet in self._working:
             try:
                 call(outlet)
-            except Exception as error:  # whatever it is, tracking goes on
+            except Exception as error:  # any error of an outlet: tracking continues
                 self._problems.append(f"{outlet.name}: {type(error).__name__}: {error}; nothing more is given to it")
                 self._working = [other for other in self._working if other is not outlet]

@@ -35,7 +35,7 @@ class Cluster(WorkerPool):
     """Runs tasks on the workers of a Dask cluster, which must have this package and see the same files at the same paths."""
 
     def __init__(self, address: str, out: Path, start: str, reuse: bool, listener: BatchListener) -> None:
-        """`address`: of the scheduler, or a scheduler file; `out`: the batch's folder; `start` as in `do_there`."""
+        """`address`: the scheduler's address or a scheduler file; `out`: the batch's folder; `start` as in `do_there`."""
         self._address, self._out, self._start, self._reuse, self._listener = address, out, start, reuse, listener
         self._tasks: dict[Future, Task] = {}
         self._tries: dict[str, int] = {}

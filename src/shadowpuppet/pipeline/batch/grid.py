@@ -155,7 +155,7 @@ def _case(source: str, name: str, table: object, common: Mapping[str, Any], chos
 
 
 def short(value: Any) -> str:
-    """A value for a label; paths by the file's name."""
+    """A value as text for a label; only the file name of a path."""
     return Path(value).name if isinstance(value, str) else "-".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
@@ -167,7 +167,7 @@ def _check_flags(flags: Mapping[str, Any], cases: Sequence[Case]) -> None:
 
 
 def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted names as tables."""
+    """Convert dotted names to nested tables."""
     made: dict[str, Any] = {}
     for name, value in flat.items():
         *outer, last = name.split(".")
@@ -177,7 +177,7 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Tables as dotted names."""
+    """Convert nested tables to pairs of dotted names and values."""
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{before}{name}.")

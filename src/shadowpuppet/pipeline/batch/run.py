@@ -140,7 +140,7 @@ class _Work:
     def _fail(self, task: Task, outcome: Outcome) -> None:
         self.failed[task.id] = outcome
         if outcome.get("trace"):
-            with contextlib.suppress(ShadowPuppetError, OSError):  # a full disk is no reason to stop
+            with contextlib.suppress(ShadowPuppetError, OSError):  # a full disk does not stop the batch
                 (self.out / FAILURES).mkdir(exist_ok=True)
                 write_whole(self.out / FAILURES / f"{task.folder}.txt", outcome["trace"])
 

@@ -165,7 +165,7 @@ def _elsewhere(folder: Path) -> Iterator[Path]:
     try:
         said = read_toml(folder / "recording.toml", ShadowPuppetError) if (folder / "recording.toml").exists() else {}
     except ShadowPuppetError:
-        return  # the run says what is wrong with it
+        return  # the run reports the error
     texts = [value for of in (said, *(t for t in said.values() if isinstance(t, dict))) for value in of.values() if isinstance(value, str)]
     yield from (path for text in texts if text and "\0" not in text and (path := folder / text).exists() and path != folder)
 
@@ -176,7 +176,7 @@ def _names(paths: Sequence[Path]) -> list[str]:
         names = ["-".join(path.parts[-depth:]) for path in paths]
         if len(set(names)) == len(names):
             return names
-    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # a-b/c and a/b-c
+    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # such as a-b/c and a/b-c
 
 
 def _found(settings: Mapping[str, Any], name: str) -> Any:
