@@ -1,4 +1,4 @@
-"""Network addresses, and what all servers here share: ports tried, requests accepted, headers of answers, opening the browser."""
+"""Network addresses, and functions shared by the HTTP and WebSocket servers: ports, checks of requests, response headers, the browser."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def is_loopback(listen: str) -> bool:
 
 
 def address_of(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """The IP address that a text is; None for a name."""
+    """The IP address in a text; None if the text is not an address, such as a host name."""
     try:
         return ipaddress.ip_address(text)
     except ValueError:
@@ -46,7 +46,7 @@ def address_of(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | Non
 
 
 def shown_host(listen: str) -> str:
-    """The host to put into a URL of a server that listens at an address."""
+    """The host for URLs of a server that listens at an address; an IPv6 address is put in brackets."""
     address = address_of(listen)
     if address is not None and address.is_unspecified:
         return socket.gethostname()
@@ -54,7 +54,7 @@ def shown_host(listen: str) -> str:
 
 
 def address_family(listen: str) -> socket.AddressFamily:
-    """IPv6 or IPv4, by how an address is written."""
+    """AF_INET6 for an address with a colon, else AF_INET."""
     return socket.AF_INET6 if ":" in listen else socket.AF_INET
 
 
@@ -62,9 +62,9 @@ def address_family(listen: str) -> socket.AddressFamily:
 
 
 def open_page(open_at: Callable[[int], Server], listen: str, port: int | None, usual: int) -> Server:
-    """What `open_at` returns for the first port that is free: `port`, or if it is None `usual`, else any.
+    """Open a server with `open_at` at `port`; if that is None, at port `usual` or else any free one. Returns the result of `open_at`.
 
-    Raises `SettingsError` where `open_at` raises `OSError` or `OverflowError` for all of them.
+    Raises `SettingsError` if `open_at` raises `OSError` or `OverflowError` for all of these ports.
     """
     why = ""
     for tried in (usual, 0) if port is None else (port,):
@@ -96,15 +96,15 @@ def has_screen() -> bool:
 
 
 def is_own_host(headers: Any, loopback: bool) -> bool:
-    """Whether a request has one Host header, and that means this machine (`known_host`)."""
+    """Whether a request has exactly one Host header, and it names this machine (`known_host`)."""
     hosts = headers.get_all("Host") or []
     return len(hosts) == 1 and known_host(hosts[0], loopback)
 
 
 def known_host(header: str, loopback: bool) -> bool:
-    """Whether a Host header is an IP address or this machine's name; for a server on the loopback, whether it is a loopback one.
+    """Whether a Host header is an IP address or this machine's name; for a server on the loopback, whether it is a loopback address.
 
-    Another site can let its own name resolve to this machine (DNS rebinding), but not an address.
+    Protects from DNS rebinding: another site can let its own name resolve to this machine, but cannot make the header an address.
     """
     name = host_of(f"//{header}")
     if name == "localhost":
@@ -116,18 +116,18 @@ def known_host(header: str, loopback: bool) -> bool:
 
 
 def is_same_origin(headers: Any) -> bool:
-    """Whether a request comes from a page of the same server, or from no page."""
+    """Whether a request comes from a page of the same server, or from a program that is no web page."""
     host = (headers.get_all("Host") or [""])[0].lower()
     return all(origin.lower().partition("://")[2] == host for origin in headers.get_all("Origin") or [])
 
 
 def are_origins_allowed(headers: Any, allowed: frozenset[str]) -> bool:
-    """Whether a request comes from a page of this machine, of an origin in `allowed` (* for any), or from no page."""
+    """Whether a request comes from a page of this machine, of an origin in `allowed` (* for any), or not from a page."""
     return all(is_loopback(host_of(origin)) or origin in allowed or "*" in allowed for origin in headers.get_all("Origin") or [])
 
 
 def host_of(url: str) -> str:
-    """The host in a URL; empty where it has none."""
+    """The host in a URL; empty if it has none."""
     try:
         return urlsplit(url).hostname or ""
     except ValueError:

@@ -1,1 +1,1 @@
-"""Files: one module a format, reading beside writing."""
+"""Reads and writes files: one module per format."""

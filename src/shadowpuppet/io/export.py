@@ -1,4 +1,4 @@
-"""Motion for other programs: a run exported to files, and motion files converted into one another."""
+"""Exports a run's motion to files of other programs, and converts motion files."""
 
 from __future__ import annotations
 
@@ -36,16 +36,17 @@ from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
 
 TOLERANCE = 1e-3
-"""Distance, metres, of the exported skeleton's joints from the run's above which a warning says so."""
+"""Distance, metres, between the exported skeleton's joints and the run's above which a warning is given."""
 BVH_UNITS = {**METRES, "in": 0.0254}
 """Units of length that a BVH file may have, in metres."""
 
 
 def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str = "m") -> list[Path]:
-    """Write a run's motion as `<run>.<format>` for each of `formats`; the files' paths.
+    """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths.
 
-    A killed run is exported up to its last frame. Warns of what a format cannot hold. Raises a `ShadowPuppetError` for an unknown format, a
-    run that cannot be read or has no frame, or has no person.toml where a format needs the body; files already written stay.
+    A killed run is exported up to its last frame. Warns of data that a format cannot hold. Raises a `ShadowPuppetError` for an
+    unknown format, or a run that cannot be read, has no frame, or has no person.toml although a format needs the body; files already
+    written stay.
 
     Args:
         folder: the run.
@@ -71,16 +72,16 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
 
 def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = False, rate: float | None = None, unit: float | None = None,
                    target_unit: str = "m") -> str:
-    """Convert a motion file, with an ending of `READABLE`, into another, by its ending one of `EXPORTS`; what was written, as text.
+    """Convert a motion file (ending in `READABLE`) to another format (ending in `EXPORTS`); returns a summary of what was written.
 
-    Skeletons of .bvh and .amc files are kept in .bvh and .glb files. Otherwise, where the target holds a skeleton, the poses of a whole
-    body are fitted to the joints (`fit_poses`), and the text states the residual. Raises a `ShadowPuppetError` where a file cannot be
+    Skeletons of .bvh and .amc files are kept in .bvh and .glb files. Otherwise, if the target holds a skeleton, the poses of a whole body
+    are fitted to the joints (`fit_poses`), and the summary states the residual. Raises a `ShadowPuppetError` if a file cannot be
     read or written, or the joints are too few for a body.
 
     Args:
         source: file to read.
         target: file to write.
-        own_names: keep all points under the file's names; else our joints only.
+        own_names: keep all points under the file's names; else keep only our joints.
         rate: frames/s of an .amc file.
         unit: metres of a .bvh source's unit, if known.
         target_unit: of a .bvh target: m, cm or mm.
@@ -108,7 +109,7 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
 
 
 def _fitted(source: Path, target: Path, table: JointTable, written: Format, unit: str) -> str:
-    """Write the poses of a body fitted to joints."""
+    """Fit a body's poses to joints and write them; returns a summary."""
     try:
         fit = fit_poses(table, source=str(source))
     except ShadowPuppetError as error:
@@ -120,7 +121,7 @@ def _fitted(source: Path, target: Path, table: JointTable, written: Format, unit
 
 @dataclass(frozen=True, eq=False)
 class _RunExport:
-    """A run, and what formats need of it."""
+    """A run, and the data that formats need, each computed on first use."""
 
     run: Run
     unit: str
@@ -165,14 +166,14 @@ def _made(folder: Path) -> Path:
 
 
 class Format(NamedTuple):
-    """How a format is written: from a run or joints alone, or from a skeleton."""
+    """The writers of a format: of a run, of joints alone, or of a skeleton; None if there is none."""
 
     run: Callable[[_RunExport, Path], None] | None = None
     joints: Callable[[Path, JointTable], None] | None = None
     skeleton: Callable[[Path, Animation, Mesh, str], None] | None = None
-    """Writes an animated skeleton with its mesh; last the unit of length."""
+    """Writes an animated skeleton with its mesh; the last argument is the unit of length."""
     any_skeleton: bool = False
-    """Whether `skeleton` writes skeletons with any names, not just our bodies'."""
+    """Whether `skeleton` accepts any joint names, not only those of our bodies."""
 
     def write_run(self, export: _RunExport, path: Path) -> None:
         """Write a run."""
@@ -202,4 +203,4 @@ FORMATS = {
     "parquet": Format(lambda export, path: write_parquet(path, motion_columns(export.run.motion)),
                       lambda path, table: write_parquet(path, table_columns(table))),
 }
-"""How each of `EXPORTS` is written."""
+"""The writers of each of `EXPORTS`."""

@@ -1,8 +1,8 @@
-"""HumanEva-I and II: trials read as recordings, with calibration, synchronisation and motion capture.
+"""Reads trials of HumanEva-I and II as recordings, with calibration, synchronisation and motion capture.
 
 L. Sigal, A. O. Balan, M. J. Black: HumanEva, International Journal of Computer Vision 87, 2010. The data needs a licence.
 
-Frames of a trial are counted from 1, as in the owners' programs: the first that all cameras and the motion capture have.
+Frames of a trial are counted from 1, as in the owners' programs; frame 1 is the first that all cameras and the motion capture have.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ from shadowpuppet.video import open_frames
 RATE = 60.0
 """Frames/s of all films."""
 FIRST_VALID = 6
-"""Films are valid from this frame on."""
+"""First valid frame of the films."""
 PARTS = {
     "S1": {"Walking": (590, 1203), "Jog": (367, 740), "ThrowCatch": (473, 945), "Gestures": (395, 801), "Box": (385, 789)},
     "S2": {"Walking": (438, 876), "Jog": (398, 795), "ThrowCatch": (550, 1128), "Gestures": (500, 901), "Box": (382, 734)},
     "S3": {"Walking": (448, 939), "Jog": (401, 842), "ThrowCatch": (493, 1027), "Gestures": (533, 1102), "Box": (512, 1021)},
 }
-"""First trials of HumanEva-I: the last frame of validation, which begins at `FIRST_VALID`, and of training, which follows it (the owners'
-partition, as in VideoPose3D). Ni 2008 tracks S2's validation frames: 433 of walking, 393 of jogging, 377 of boxing."""
+"""First trials of HumanEva-I: last frames of the validation part, which begins at `FIRST_VALID`, and of the training part, which follows it
+(the owners' partition, as in VideoPose3D). Ni 2008 tracks S2's validation frames: 433 of walking, 393 of jogging, 377 of boxing."""
 HEAD = "# A trial of HumanEva; made by `shadowpuppet humaneva`. The films stay where they are.\n"
-"""First line of recording.toml; marks folders that may be replaced."""
+"""First line of recording.toml; marks folders that may be overwritten."""
 WRITTEN = ("recording.toml", "calibration.toml", "truth.csv", "training.csv")
 
 Part = Literal["validation", "training", "all"]
 
 
 class Sync(NamedTuple):
-    """An .ofs file: image `image` of a film matches frame `mocap` of the motion capture (from 1); `scale`: such frames per image."""
+    """An .ofs file: image `image` of a film matches frame `mocap` of the motion capture (from 1); `scale`: mocap frames per image."""
 
     image: float
     mocap: float
@@ -55,30 +55,30 @@ class Sync(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Where frame 1 of a trial lies."""
+    """Position of frame 1 of a trial in the films and the motion capture."""
 
     images: dict[str, int]
-    """Image of each camera's film, from 1."""
+    """Image number in each camera's film, from 1."""
     mocap: float
-    """Frame of the motion capture, from 1."""
+    """Frame number in the motion capture, from 1."""
     scale: float
     """Frames of the motion capture per frame of the trial."""
 
 
 class HumanEva(NamedTuple):
-    """A trial."""
+    """A trial of HumanEva: recording, truth and training motion."""
 
     recording: Recording
     """Its `path` is the data's folder; its truth and training are in the fields below."""
     truth: JointTable | None
-    """Joints at the recording's frames; None where they are not published (test trials, HumanEva-II)."""
+    """Joints at the recording's frames; None if they are not published (test trials, HumanEva-II)."""
     training: JointTable | None
     """Joints in training frames of the same person and action, at `RATE`; None if there are none."""
 
 
 def read_humaneva(folder: str | Path, subject: str, action: str, trial: int = 1, part: Part = "validation",
                   training_frames: int = 100) -> HumanEva:
-    """Read a trial of HumanEva; of films only the first frame.
+    """Read a trial of HumanEva; only the first frame of each film is decoded.
 
     Raises `RecordingError`, `CalibrationError` or `FormatError`, naming the file.
 
@@ -109,7 +109,7 @@ def read_humaneva(folder: str | Path, subject: str, action: str, trial: int = 1,
 
 
 def write_humaneva(found: HumanEva, folder: str | Path) -> None:
-    """Write a recording folder that refers to the films. Raises `RecordingError` where the folder holds something else."""
+    """Write a recording folder that refers to the films. Raises `RecordingError` if the folder holds something else."""
     import tomli_w
 
     folder, recording = Path(folder), found.recording
@@ -178,7 +178,7 @@ def _in_order(cameras: Iterable[str]) -> list[str]:
 
 
 def _length(film: Path) -> int:
-    """Number of images of a film. Raises `RecordingError` where it is unknown."""
+    """Number of images of a film. Raises `RecordingError` if it is unknown."""
     source = open_frames(film, rate=RATE)
     count = source.count or source.duration * source.rate
     if not np.isfinite(count):
@@ -202,7 +202,7 @@ def _frames(folder: Path, subject: str, action: str, trial: int, part: Part) -> 
 
 
 def _joints(folder: Path, subject: str, action: str, trial: int, timing: Timing, first: int, last: int) -> JointTable | None:
-    """Joints at frames `first` to `last` of a trial, times from 0; None without motion capture of them."""
+    """Joints at frames `first` to `last` of a trial, times from 0; None if there is no motion capture of these frames."""
     path = folder / subject / "Mocap_Data" / f"{action}_{trial}.c3d"
     if not path.exists():
         return None
@@ -212,7 +212,7 @@ def _joints(folder: Path, subject: str, action: str, trial: int, timing: Timing,
 
 
 def _between(places: Array, at: Array) -> Array:
-    """`places` (T, J, 3) interpolated at fractional rows `at` (K,), (K, J, 3); NaN outside, or beside a gap."""
+    """`places` (T, J, 3) interpolated at fractional rows `at` (K,): (K, J, 3); NaN outside, or next to a gap."""
     low = np.floor(at).astype(int)
     share = (at - low)[:, None, None]
     padded = np.concatenate([places, np.full((1, *places.shape[1:]), np.nan)])
@@ -224,7 +224,7 @@ def _between(places: Array, at: Array) -> Array:
 
 
 def _training(folder: Path, subject: str, action: str, count: int) -> JointTable | None:
-    """Joints in the training frames of the first trial."""
+    """Joints in the training frames of the first trial; None if there are none."""
     person, known = folder / subject, PARTS.get(subject, {}).get(action)
     cameras = _in_order(path.stem.rpartition("(")[2].rstrip(")") for path in person.glob(f"Sync_Data/{action}_1_(*.ofs"))
     if known is None or not cameras:

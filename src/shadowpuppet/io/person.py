@@ -1,4 +1,4 @@
-"""A person's sizes as a file (person.toml)."""
+"""Reads and writes a person's sizes (person.toml)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
 
 KEYS = ("body", "height", "source", "notes", "sizes")
 DEFAULT_BODY = "rounded"
-"""Body of a file that names none; all upper bodies have the same sizes."""
+"""Body model of a file without one; all upper bodies have the same sizes."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Person:
     """Any text."""
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check height, source and notes."""
         if self.height is not None and not is_within(self.height, HEIGHTS):
             raise ShadowPuppetError(f"height: found {shown(self.height)}, {expected_metres(self.height, HEIGHTS)}")
         for key in ("source", "notes"):
@@ -39,9 +39,9 @@ class Person:
 
 
 def read_person(path: str | Path, body: str | None = None) -> Person:
-    """Read a person.
+    """Read a person's sizes.
 
-    Raises `FormatError`, naming file and field, where a key is unknown, a size missing or impossible, or the sizes do not fit `body`.
+    Raises `FormatError`, naming file and field, if a key is unknown, a size missing or impossible, or the sizes do not fit `body`.
     """
     path, wanted = Path(path), body
     data = read_toml(path, FormatError)
@@ -63,7 +63,7 @@ def read_person(path: str | Path, body: str | None = None) -> Person:
 
 
 def write_person(path: str | Path, person: Person) -> None:
-    """Write a person for `read_person`. Raises `ShadowPuppetError` where that fails."""
+    """Write a person for `read_person`. Raises `ShadowPuppetError` if that fails."""
     import tomli_w
 
     upper = isinstance(person.sizes, CardboxSizes)

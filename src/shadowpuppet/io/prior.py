@@ -1,4 +1,4 @@
-"""Motion priors as archives of arrays (.npz)."""
+"""Reads and writes motion priors as archives of arrays (.npz)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from shadowpuppet.motion.prior.motion_prior import MotionPrior
 
 FORMAT, VERSION = "shadowpuppet motion prior", 1
 NUMBERS = ("centres", "bases", "variances", "noise", "transitions", "initial", "rate")
-"""Numeric arrays of the file: fields of `Subspaces` and `MotionPrior`; `rate` is NaN where unknown."""
+"""Numeric arrays of the file: fields of `Subspaces` and `MotionPrior`; `rate` is NaN if unknown."""
 
 
 def read_prior(path: str | Path) -> MotionPrior:
-    """Read a prior. Raises `FormatError`, naming file and array, where it is malformed."""
+    """Read a prior. Raises `FormatError`, naming file and array, if it is malformed."""
     try:
         return _prior(read_arrays(Path(path), ("format", "version", "names", *NUMBERS)))
     except BrokenArchive:
@@ -30,7 +30,7 @@ def read_prior(path: str | Path) -> MotionPrior:
 
 
 def write_prior(path: str | Path, prior: MotionPrior) -> None:
-    """Write a prior so that `read_prior` gives back the same numbers. Raises `ShadowPuppetError` where that fails."""
+    """Write a prior so that `read_prior` gives back the same numbers. Raises `ShadowPuppetError` if that fails."""
     subspaces, rate = prior.subspaces, np.nan if prior.rate is None else prior.rate
     content = archive_bytes(format=FORMAT, version=VERSION, names=np.array(prior.names, str), centres=subspaces.centres,
                             bases=subspaces.bases, variances=subspaces.variances, noise=subspaces.noise, transitions=prior.transitions,

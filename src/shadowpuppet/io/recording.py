@@ -1,4 +1,4 @@
-"""Recording folders: calibrated cameras, films, empty scenes, masks, reference pictures, and facts about the person."""
+"""Reads recording folders: calibrated cameras, films, empty scenes, masks, reference pictures, and facts about the person."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks")
 """Keys of recording.toml."""
 RATES = (0.1, 10_000.0)
-"""Limits, frames/s."""
+"""Limits of `rate`, frames/s."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
-"""Limits, seconds."""
+"""Limits of `start` and `duration`, seconds."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Subject:
     """Known facts about the person; metres."""
 
     height: float | None = None
-    """With shoes."""
+    """Height with shoes."""
     distance: float | None = None
-    """From the only camera to the middle of the body at the start."""
+    """Distance from the only camera to the middle of the body at the start."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class View:
     camera: Camera
     video: Path | int | str
     background: Path | None = None
-    """The empty scene."""
+    """Pictures or film of the empty scene."""
     masks: Path | None = None
-    """Silhouettes made by another program."""
+    """Ready silhouettes, made by another program."""
     start: float = 0.0
-    """Time of the film, seconds, at the recording's time 0; earlier frames are left out."""
+    """The recording's time 0 on the film's clock, seconds; earlier frames are left out."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording on disk; of its films only the first frames have been read."""
+    """A recording on disk; only the first frames of its films have been decoded."""
 
     path: Path
     name: str
@@ -76,21 +76,21 @@ class Recording:
     truth: Path | None = None
     training: Path | None = None
     rate: float | None = None
-    """Frames/s that replace the films' times; None to keep those."""
+    """Frames/s that replace the films' times; None to keep the films' times."""
     duration: float | None = None
-    """Seconds used, from time 0; None for all."""
+    """Duration used, seconds from time 0; None for all."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
     """Read a recording: a folder (video/, calibration.toml, ...), or one film, folder of pictures or live camera.
 
     `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera. Raises `RecordingError`,
-    `CalibrationError` or `VideoError`, naming file and field, where something is missing or does not fit.
+    `CalibrationError` or `VideoError`, naming file and field, if something is missing or does not fit.
     """
     folder = Path(str(path))
     try:
         exists = folder.exists()
-    except OSError as error:  # as for a name that is too long
+    except OSError as error:  # for example, a name that is too long
         raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
     if camera_number(path) is None and not exists:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
@@ -101,7 +101,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
                              "(video/<camera>.mp4 and calibration.toml) or a folder of pictures")
     source = folder if camera_number(path) is None else path
     if source is folder:
-        open_frames(folder)  # raises for a file that is no film, before a calibration is demanded
+        open_frames(folder)  # raises for a file that is no film, before the calibration is read
     cameras = _cameras(folder, {folder.stem: source}, fov, calibration)
     named = [c for c in cameras if c.name == folder.stem or len(cameras) == 1]
     if not named:
@@ -250,7 +250,7 @@ def _check_names(folder: Path, sources: Iterable[str], cameras: Iterable[Camera]
 
 
 def _check_sizes(views: Iterable[View]) -> None:
-    """Raise `RecordingError` where pictures do not have their camera's size; live cameras are not opened."""
+    """Raise `RecordingError` if pictures do not have their camera's size; live cameras are not opened."""
     for view in views:
         for source in (view.video, view.background, view.masks):
             if source is None or camera_number(source) is not None:

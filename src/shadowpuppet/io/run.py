@@ -1,4 +1,4 @@
-"""Run folders: a tracked motion, written frame by frame, with its settings and metrics.
+"""Reads and writes run folders: a tracked motion, written frame by frame, with its settings and metrics.
 
     joints.csv    time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1)
     angles.csv    time, every degree of freedom (rad or m), then <dof>_sd
@@ -39,14 +39,14 @@ OWN_KEYS = ("complete", "frames", "body", "versions")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run that was read."""
+    """The content of a run folder."""
 
     folder: Path
     motion: Motion
     info: dict[str, Any]
-    """run.toml."""
+    """Contents of run.toml."""
     metrics: dict[str, Any]
-    """metrics.json; empty if there is none."""
+    """Contents of metrics.json; empty if there is none."""
 
     @property
     def complete(self) -> bool:
@@ -62,13 +62,13 @@ class Run:
 class RunWriter:
     """Writes a run: `with RunWriter(...) as run: run.write(frame)`; `run.metrics` may be filled until the end.
 
-    The folder must be new, empty or an earlier run's, which the first frame replaces. Raises `ShadowPuppetError` for any other folder, and
-    where it cannot be written; frames written before stay readable.
+    The folder must be new, empty or that of an earlier run, which is replaced when the first frame is written. Raises
+    `ShadowPuppetError` for any other folder, and if it cannot be written; frames written before stay readable.
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
                  info: Mapping[str, Any]) -> None:
-        """`info`: entries of run.toml; dataclasses, arrays and paths are converted, None is left out."""
+        """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
             raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
@@ -79,7 +79,7 @@ class RunWriter:
         self._earlier = False
 
     def __enter__(self) -> Self:
-        """Make the folder. Raises `ShadowPuppetError` where it cannot be used."""
+        """Make the folder. Raises `ShadowPuppetError` if it cannot be used."""
         with self._system_errors():
             self.folder.mkdir(parents=True, exist_ok=True)
             self._earlier = _check_folder(self.folder)
@@ -91,7 +91,7 @@ class RunWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the remaining files; after an error as far as possible."""
+        """Write the remaining files, after an error as far as possible."""
         if kind is None:
             self._start()
             self._finish(complete=True)
@@ -109,7 +109,7 @@ class RunWriter:
                 self.folder.rmdir()
 
     def write(self, frame: MotionFrame) -> None:
-        """Add a frame. Raises `ShadowPuppetError` where it does not fit the run, or cannot be written."""
+        """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self._start()
         self._append(run_rows(self._motion.append(frame)))
 
@@ -150,7 +150,7 @@ class RunWriter:
 
     @contextlib.contextmanager
     def _system_errors(self) -> Iterator[None]:
-        """Raises `OSError` as `ShadowPuppetError`, which says what was saved."""
+        """Convert `OSError` to `ShadowPuppetError`, which states what was saved."""
         try:
             yield
         except OSError as error:
@@ -160,7 +160,7 @@ class RunWriter:
 
 
 def read_run(folder: str | Path) -> Run:
-    """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, where something is malformed."""
+    """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
     if not (folder / "run.toml").exists():
         raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it")
@@ -172,7 +172,7 @@ def read_run(folder: str | Path) -> Run:
 
 
 def write_metrics(folder: str | Path, metrics: Mapping[str, Any]) -> None:
-    """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` where that fails."""
+    """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` if that fails."""
     text = json.dumps(for_json(plain(metrics, "metrics")), indent=1, ensure_ascii=False, allow_nan=False)
     write_whole(Path(folder) / "metrics.json", text + "\n")
 
@@ -187,7 +187,7 @@ def versions() -> dict[str, str]:
 
 
 def _check_folder(folder: Path) -> bool:
-    """Whether a folder holds an earlier run. Raises `ShadowPuppetError` where it holds other files."""
+    """Whether a folder holds an earlier run. Raises `ShadowPuppetError` if it holds other files."""
     names = sorted(path.name for path in folder.iterdir())
     if not names:
         return False
@@ -207,7 +207,7 @@ def _read_tables(folder: Path, body_name: str, cut: bool) -> Motion:
 
 
 def _common_frames(joints: Table, angles: Table, cut: bool) -> int:
-    """Number of frames in both tables; one of a killed run (`cut`) may be a frame ahead."""
+    """Number of frames in both tables; in a killed run (`cut`), one table may have a frame more."""
     times, others = joints.times(), angles.times()
     frames = min(len(times), len(others)) if cut else max(len(times), len(others))
     if not np.array_equal(times[:frames], others[:frames]):

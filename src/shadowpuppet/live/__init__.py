@@ -1,1 +1,1 @@
-"""Tracking as it happens: a camera, a stream, or a film played as if it were one."""
+"""Live tracking of a camera, a network stream, or a film played as if live."""

@@ -1,4 +1,4 @@
-"""What live sessions with one camera and with several have in common: phases, timing, views. Knows no threads, files or sockets."""
+"""Base class of live sessions with one camera and with several: phases, timing, views. Uses no threads, files or sockets."""
 
 from __future__ import annotations
 
@@ -24,53 +24,53 @@ from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.video import Image
 
 GONE = 2.0
-"""Seconds for which a person is lost, after which a new measurement is advised."""
+"""Seconds of being lost after which a new measurement is advised."""
 
 
 class Outcome(NamedTuple):
-    """The result of a picture, or of none."""
+    """Result of processing a picture, or of waiting for one."""
 
     view: View
     frame: MotionFrame | None = None
-    """The person's motion, while they are tracked."""
+    """Motion of the frame; None unless a person is tracked."""
     images: tuple[Image, ...] = ()
-    """Each camera's picture, of the size that is worked on."""
+    """Each camera's picture, of the working size."""
 
 
 def at_once(task: Callable[[], Any]) -> Callable[[], Any]:
-    """Do a task; the answer gives its result."""
+    """Do a task now; returns a function that returns its result."""
     return partial(lambda result: result, task())
 
 
 @dataclass(eq=False)
 class LiveSession(ABC):
-    """State of a session; `step` is called with every picture (or set of pictures), `idle` if none came."""
+    """State of a session. Call `step` with every picture (or set of pictures), and `idle` if none came."""
 
     options: Options
     settings: LiveSettings
     rng: np.random.Generator
     """The only source of randomness."""
     clock: Callable[[], float]
-    """Seconds of a clock that never goes back, by which pictures are stamped."""
+    """Returns seconds of a monotonic clock, the one of the pictures' times of capture."""
     timing: Timing
     work: Callable[[Callable[[], Any]], Callable[[], Any]] = at_once
-    """Runs a long task; its answer is called until it gives a result that is not None."""
+    """Starts a long task; returns a function that returns the result, or None while it is not ready."""
     phase: str = "learning"
     """One of `PHASES`."""
     subject: TrackedSubject | None = None
-    """The person, once measured."""
+    """The measured person; None before."""
     trouble: str = ""
     """Why no pictures come; empty while they do."""
 
     def __post_init__(self) -> None:
-        """Nothing has come yet."""
+        """Set the state before the first picture."""
         self._began, self._lost_since, self._new, self._state = np.nan, np.nan, False, None
         self._measured: Callable[[], Any] = lambda: None
 
     # Input
 
     def step(self, shot: Any) -> Outcome:
-        """Take a picture. Raises `SilhouetteError` where the scene cannot be learnt."""
+        """Process a picture, or a set of pictures. Raises `SilhouetteError` if the background cannot be learnt."""
         self._began = shot.captured if np.isnan(self._began) else self._began
         if trouble := self.check(shot):
             return self._pause(trouble)
@@ -80,12 +80,12 @@ class LiveSession(ABC):
         return phases[self.phase](shot, self._scaled(shot))
 
     def idle(self, problem: str = "") -> Outcome:
-        """No picture came for a moment; `problem`: why, if that is known."""
+        """Handle that no picture came for a moment; `problem`: the reason, if known."""
         trouble = self.silence(self.clock(), problem)
         return self._pause(trouble) if trouble else Outcome(self._view())
 
     def ask(self, wish: str) -> None:
-        """`learn` the background again, or `measure` the person again; ignored in other phases than those that can."""
+        """Carry out a command: `learn` the background again, or `measure` the person again. Ignored in phases that do not allow it."""
         if wish == "learn" and self.phase in ("waiting", "tracking"):
             self.begin_learning()
             self.phase = "learning"
@@ -94,50 +94,50 @@ class LiveSession(ABC):
             self.phase = "waiting"
 
     def newly_measured(self) -> bool:
-        """Whether the person was measured since this was last asked."""
+        """Whether the person was measured since the last call."""
         new, self._new = self._new, False
         return new
 
-    # What depends on the number of cameras
+    # Depends on the number of cameras
 
     @property
     @abstractmethod
     def cameras(self) -> tuple[Camera, ...]:
-        """The cameras as they give their pictures."""
+        """The cameras for pictures of full size."""
 
     @property
     @abstractmethod
     def worked_cameras(self) -> tuple[Camera, ...]:
-        """For pictures of the size that is worked on."""
+        """The cameras for pictures of the working size."""
 
     @property
     @abstractmethod
     def scenes(self) -> Sequence[list[Image]]:
-        """Pictures of each camera's empty scene, of the size that is worked on."""
+        """Pictures of each camera's empty scene, of the working size."""
 
     @abstractmethod
     def check(self, shot: Any) -> str:
-        """What is wrong with a picture, in a sentence; empty if nothing is."""
+        """The problem of a picture, in a sentence; empty if there is none."""
 
     @abstractmethod
     def silence(self, now: float, problem: str) -> str:
-        """What is wrong if no picture came until now (s); empty if nothing is."""
+        """The problem, in a sentence, if no picture has come by time `now` (s); empty if it is too early to tell."""
 
     @abstractmethod
     def asks_again(self, now: float) -> bool:
-        """Whether a frozen camera is to be opened again."""
+        """Whether a frozen camera should be opened again."""
 
     @abstractmethod
     def placed(self) -> tuple[Array, float | None]:
-        """The body's frame in the world (4, 4), and Z of the floor (m), if it is known."""
+        """The body's frame in the world (4, 4), and Z of the floor (m), None if unknown."""
 
     @abstractmethod
     def begin_learning(self) -> None:
-        """Forget what was collected of the empty scene."""
+        """Discard the collected pictures of the empty scene."""
 
     @abstractmethod
     def begin_waiting(self) -> None:
-        """Wait for a person."""
+        """Start waiting for a person."""
 
     @abstractmethod
     def _scaled(self, shot: Any) -> tuple[Image, ...]: ...
@@ -156,17 +156,17 @@ class LiveSession(ABC):
 
     @abstractmethod
     def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
-        """Image, mask and picture of a view."""
+        """The fields image, mask and picture of a `View`."""
 
     @abstractmethod
     def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
-        """What the person is to do, and the seconds of a countdown."""
+        """Instruction to the person, and the seconds of a countdown or None."""
 
     @abstractmethod
     def _forget_time(self) -> None:
-        """Begin again what waits for time to pass."""
+        """Restart countdowns and collections, after a gap in the pictures."""
 
-    # What does not
+    # Shared by all sessions
 
     def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
         assert self.subject is not None
@@ -187,7 +187,7 @@ class LiveSession(ABC):
         self.timing.pause()
 
     def _pause(self, trouble: str) -> Outcome:
-        """No usable picture: the person is kept, what waits for time to pass begins again."""
+        """Handle a missing or unusable picture: keep the person, restart countdowns and collections."""
         self.trouble = trouble
         self._forget_time()
         self.timing.pause()
@@ -206,12 +206,12 @@ class LiveSession(ABC):
 
     @property
     def _gone(self) -> bool:
-        """Whether the person has been lost for long."""
+        """Whether the person has been lost for longer than `GONE`."""
         return not np.isnan(self._lost_since) and self.clock() - self._lost_since > GONE
 
 
 def scaled(image: Image, camera: Camera) -> Image:
-    """A picture of the camera's size."""
+    """A picture scaled to the camera's size."""
     import cv2
 
     if image.shape[1::-1] == camera.size:
@@ -220,7 +220,7 @@ def scaled(image: Image, camera: Camera) -> Image:
 
 
 def _angles(body: Body, pose: Array | None) -> tuple[Angle, ...]:
-    """All rotations, degrees; one without limits goes from -180 to 180."""
+    """All rotational DOF, degrees; limits are -180 and 180 for a DOF without limits."""
     values: Sequence[float] = np.full(len(body.skeleton.dofs), np.nan).tolist() if pose is None else pose.tolist()
     rotations = [(dof, value) for dof, value in zip(body.skeleton.dofs, values) if dof.kind == "rotation"]
     return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)) if math.isfinite(dof.low) else -180,

@@ -1,4 +1,4 @@
-"""Ctrl-C as the normal end of a session: what is being done is finished first."""
+"""Ctrl-C as the normal end of a session, which finishes its current step first."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from typing import Self
 
 
 class Stop:
-    """In its `with` block Ctrl-C sets `wished`; a second one, or one while `hasty`, is a `KeyboardInterrupt` as ever."""
+    """Within its `with` block, Ctrl-C sets `wished`; a second Ctrl-C, or one while `hasty` is set, raises `KeyboardInterrupt`."""
 
     def __init__(self) -> None:
-        """Nothing is wished."""
+        """Neither flag is set."""
         self.wished = self.hasty = False
         self._before = None
 
     def __enter__(self) -> Self:
-        """Take over the signal, where it is not ignored, and this is the thread that gets it."""
+        """Replace the handler of SIGINT, if the signal is not ignored and this is the main thread."""
         if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
             self._before = signal.signal(signal.SIGINT, self._heard)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give it back."""
+        """Restore the former handler."""
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
 

@@ -1,4 +1,4 @@
-"""What happens before tracking: the empty scene is collected, a person stands still, the sizes are fitted in a thread."""
+"""Helpers for the phases before tracking: collect the empty scene, detect a person standing still, fit the sizes in a thread."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from shadowpuppet.silhouette.quality import MIN_CONTACT, NEARLY_ALL
 from shadowpuppet.video import Image
 
 NOBODY, TOO_NEAR = 0.015, 0.6
-"""Share of the picture under which a silhouette is no person, and from which on a person is too near."""
+"""Shares of the picture: a smaller silhouette is no person, a larger one is a person too near."""
 STILL = 0.1
-"""Largest share of a silhouette's pixels that differ from an earlier one while a person stands still..."""
+"""Largest difference to an earlier silhouette, as a share of the silhouette's pixels, while a person stands still."""
 APART = 0.25
-"""... this many seconds before."""
+"""Age of that earlier silhouette, seconds."""
 MEASURED = 6
-"""Number of silhouettes in which a person is measured."""
+"""Number of silhouettes from which a person is measured."""
 
 
 class StandStillDetector:
-    """Looks at silhouettes until a person has stood still for long enough to be measured."""
+    """Detects from silhouettes when a person has stood still for long enough to be measured."""
 
     def __init__(self, seconds: float) -> None:
         """`seconds`: how long a person must stand still."""
@@ -34,7 +34,7 @@ class StandStillDetector:
         self._since = np.nan
 
     def see(self, now: float, mask: Mask) -> list[Mask] | None:
-        """Take a silhouette (H, W) at a time (s); returns those of the person who stood still, once there is one, else None."""
+        """Take a silhouette (H, W) at time `now` (s). Returns up to `MEASURED` silhouettes once a person has stood still, else None."""
         while len(self._seen) > 1 and self._seen[0][0] < now - max(self.seconds, APART) - 0.5:
             self._seen.popleft()
         hint = unfit(mask)
@@ -51,12 +51,12 @@ class StandStillDetector:
         return [still[k] for k in np.unique(np.linspace(0, len(still) - 1, MEASURED).astype(int))]
 
     def wait(self) -> None:
-        """No pictures came for a while: start again."""
+        """Start again, after a gap in the pictures."""
         self._seen.clear()
         self._since = np.nan
 
     def _moves(self, now: float, mask: Mask) -> bool:
-        """Whether the silhouette differs from that of a quarter of a second ago, or from the last where there is none."""
+        """Whether the silhouette differs from the one `APART` seconds earlier, or from the last one if there is none that old."""
         earlier = [seen for time, seen in self._seen if time <= now - APART] or [seen for _, seen in self._seen]
         return not earlier or bool(np.count_nonzero(mask ^ earlier[-1]) > STILL * np.count_nonzero(mask))
 
@@ -79,9 +79,9 @@ Result = TypeVar("Result")
 
 
 def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
-    """Start a task in a daemon thread; the answer gives its result, None before it is ready.
+    """Start a task in a daemon thread; returns a function that returns the result, or None while it is not ready.
 
-    An error of the task is raised by the answer.
+    That function raises the task's error.
     """
     done: list[Result] = []
     failed: list[BaseException] = []
@@ -102,24 +102,24 @@ def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
 
 
 KEPT = 20
-"""Pictures of the empty scene that are kept: this many to twice as many."""
+"""Least number of pictures of the empty scene that are kept; at most twice as many are."""
 MOVED, MOVED_SHARE = 20.0, 0.005
-"""Difference (grey levels) of a pixel between the first and the last pictures, and share of such pixels, from which on something moved."""
+"""The scene moved if more than this share of pixels differ by more than this many grey levels between the first and the last pictures."""
 TRIES = 3
-"""Attempts to learn a moving scene, before it is taken as it is."""
+"""Number of attempts; the last one is used even if the scene moved."""
 
 
 class BackgroundCollector:
-    """Counts down, then collects the empty scene, from the first picture on."""
+    """Counts down from the first picture on, then collects pictures of the empty scene."""
 
     def __init__(self, countdown: float, seconds: float) -> None:
-        """Seconds until learning begins, and how long it takes."""
+        """`countdown`: seconds until collecting begins; `seconds`: how long it lasts."""
         self.countdown, self.seconds = countdown, seconds
         self.tries, self.note = 0, ""
         self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, countdown + seconds
 
     def see(self, now: float, image: Image) -> list[Image] | None:
-        """A picture (H, W, 3) or (H, W) at a time (s); the empty scene's pictures, once there are enough."""
+        """Take a picture (H, W, 3) or (H, W) at time `now` (s). Returns the pictures of the empty scene once it is complete, else None."""
         self._began = now if np.isnan(self._began) else self._began
         self._left = self._began + self.countdown + self.seconds - now
         if self._left <= self.seconds:
@@ -134,22 +134,22 @@ class BackgroundCollector:
         return scene
 
     def wait(self) -> None:
-        """No pictures came for a while: start again with the next one."""
+        """Start again with the next picture, after a gap in the pictures."""
         self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, self.countdown + self.seconds
 
     @property
     def left(self) -> float:
-        """Seconds until the countdown ends, or then until all is learnt."""
+        """Seconds left of the countdown, or, after it, of collecting."""
         return max(self._left - self.seconds if self._left > self.seconds else self._left, 0.0)
 
     @property
     def message(self) -> str:
-        """What the person is to do."""
+        """Instruction to the person."""
         return f"{self.note}step out of the picture" if self._left > self.seconds else "stay out: the empty scene is learnt"
 
 
 def moved(scene: list[Image]) -> bool:
-    """Whether the last third of some pictures differs from the first."""
+    """Whether the last third of the pictures differs from the first third."""
     third = max(len(scene) // 3, 1)
     before, after = (np.mean([smoothed(to_planes(image)).astype(np.float32) for image in part], axis=0)
                      for part in (scene[:third], scene[-third:]))

@@ -1,4 +1,4 @@
-"""A run's motion given to other programs at its own pace, as a live session does."""
+"""Streams a recorded run to other programs at its own rate, like a live session."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ from shadowpuppet.motion.body_animation import base_in_world
 from shadowpuppet.motion.motion import Motion, MotionFrame
 
 NAP = 0.05
-"""Seconds after which Ctrl-C is heeded."""
+"""Longest sleep, seconds, between checks for Ctrl-C."""
 MOVED = 0.01
-"""How far, in metres and radians, the body's frame moves where somebody was measured anew."""
+"""Change of the body's frame, in metres and radians, above which the person was measured again."""
 UNMOVED = 2e-3
-"""The same, up to which it is the world's: several cameras were calibrated, and the floor is at Z = 0."""
+"""Difference of the body's frame from the world's up to which they are equal: the run has several calibrated cameras, and the floor is at
+Z = 0."""
 
 
 def play_run(folder: str | Path, outlets: Outlets, listener: LiveListener | None = None, *, speed: float = 1.0, loop: bool = False,
              clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], None] = time.sleep) -> int:
-    """Give every frame of a run to outlets when it is due, until its end, or with `loop` until Ctrl-C; how many were given.
+    """Send every frame of a run to outlets when it is due, until the run's end, or with `loop` until Ctrl-C. Returns the number sent.
 
-    Times go on where the run begins again. Raises a `ShadowPuppetError` for a run that cannot be read, has no person.toml, which
-    rotations need, or has no frame with a pose.
+    `speed`: ratio to the run's own rate. With `loop`, times keep increasing when the run begins again. Raises a `ShadowPuppetError` if the
+    run cannot be read, has no person.toml, which rotations need, or has no frame with a pose.
     """
     listener = listener or LiveListener()
     with outlets, Stop() as stop:
@@ -62,14 +63,14 @@ def play_run(folder: str | Path, outlets: Outlets, listener: LiveListener | None
 
 
 class _Played(NamedTuple):
-    """A run, and what its rotations need."""
+    """A run, and the body that the joints' rotations are computed with."""
 
     motion: Motion
     body: Body
     height: float | None
-    """Metres, shoes on."""
+    """Height with shoes, metres; None if unknown."""
     bases: Array
-    """Where the body's frame stands in the world, of shape (T, 4, 4)."""
+    """The body's frame in the world, (T, 4, 4)."""
 
 
 def _read(folder: Path) -> _Played:
@@ -84,7 +85,7 @@ def _read(folder: Path) -> _Played:
 
 
 def _frames(motion: Motion, loop: bool) -> Iterator[tuple[int, MotionFrame]]:
-    """Every frame with its number; with `loop` again and again, at later times."""
+    """Yields each frame with its number; with `loop` endlessly, at increasing times."""
     step = float(np.median(np.diff(motion.times))) if len(motion) > 1 else 1.0
     length = float(motion.times[-1] - motion.times[0]) + step
     for turn in count() if loop else (0,):

@@ -1,4 +1,4 @@
-"""The pictures of a session, kept as a recording, where that was asked for."""
+"""Saves the pictures of a live session as a recording."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.video import FrameWriter, Image, write_frames
 
 FALLBACK_RATE = 15.0
-"""Frames/s that the film is said to have, where the camera tells none; its pictures have their own times."""
+"""Nominal frames/s of the film if the camera does not state its rate; each picture has its own time anyway."""
 
 
 class Recorder:
-    """Writes the recording layout: the empty scenes, the tracked pictures, the cameras, the height."""
+    """Writes a recording folder: the empty scenes, the tracked pictures, the cameras, the height."""
 
     def __init__(self, folder: Path, cameras: Sequence[Camera], rate: float) -> None:
-        """`cameras`: for the pictures as they are kept. Nothing is written before the first of them."""
+        """`cameras`: for the saved pictures; `rate`: their frames/s. Nothing is written before the first picture."""
         self.folder, self.cameras, self.rate = folder, cameras, rate if np.isfinite(rate) else FALLBACK_RATE
         self._films: list[FrameWriter] = []
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        """Use it in a `with` block."""
+        """Return itself; nothing is open yet."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Finish the film; after an error what there is can be played from its partial name."""
+        """Finish the films; after an error they keep their partial names, and can be played."""
         self._open.__exit__(kind, error, trace)
 
     def write(self, time: float, images: Sequence[Image], scenes: Sequence[list[Image]], height: float | None) -> None:
-        """Add each camera's picture (H, W, 3) at their time (s); with the first come the empty scenes and the person's height (m)."""
+        """Add a picture (H, W, 3) of each camera at a time (s). The first call also writes the empty scenes and the person's height (m)."""
         if not self._films:
             self._films = self._begin(scenes, height)
             self._first = time

@@ -1,4 +1,4 @@
-"""Several cameras read at once, each in a thread of its own: sets of pictures that were taken together."""
+"""Reads several cameras at once, each in its own thread, and combines simultaneous pictures into sets."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from shadowpuppet.video.live_source import Feed, Snapshot
 
 
 class SnapshotSet(NamedTuple):
-    """Pictures of all cameras that were taken together."""
+    """Simultaneous pictures of all cameras."""
 
     captured: float
-    """When the last of them was taken, in seconds of a clock that never goes back."""
+    """Time of capture of the latest picture, seconds of the monotonic clock."""
     images: tuple[Image, ...]
     shown: float | None = None
-    """The films' own time, seconds."""
+    """Time in the films, seconds; None for cameras."""
     number: int = 0
     """Number of sets before it."""
 
 
 class NewestSet:
-    """The newest set of pictures; has the interface of `Newest`."""
+    """Buffer for the newest set of pictures, with the interface of `Newest`."""
 
     def __init__(self, captures: Sequence[Capture], interval: float) -> None:
-        """`interval`: seconds between two pictures."""
+        """`interval`: seconds between two pictures of a camera."""
         self.captures, self.interval, self.put_count = captures, interval, 0
         self._next: list[Snapshot | None] = [None] * len(captures)
 
     def take(self, timeout: float = 0.0) -> SnapshotSet | None:
-        """A set, waited for (seconds); None if none comes."""
+        """The next set, waiting up to `timeout` seconds; None if none comes."""
         end = time.monotonic() + timeout
         while behind := self.behind():
             for n in behind:
@@ -49,7 +49,7 @@ class NewestSet:
                            self.put_count - 1)
 
     def behind(self) -> list[int]:
-        """Cameras that lack a picture, or whose picture is older than another's by over half an interval."""
+        """Indices of cameras without a picture, or with one older than another camera's by more than about half an interval (`NEAR`)."""
         films = all(shot is None or shot.shown is not None for shot in self._next)
         moments = [None if shot is None else shot.shown if films else shot.captured for shot in self._next]
         latest = max((moment for moment in moments if moment is not None), default=0.0)
@@ -57,31 +57,31 @@ class NewestSet:
 
     @property
     def waiting(self) -> bool:
-        """Whether every camera that lacks a picture of the next set has one, or can still get one."""
+        """Whether the next set can still be completed: every camera that lacks a picture has one in its buffer, or has not ended."""
         return not any(self.captures[n].ended and not self.captures[n].newest.waiting for n in self.behind())
 
 
 class RigCapture:
-    """Reads several feeds from `with` to their end; has the interface of `Capture`."""
+    """Reads several feeds within its `with` block; has the interface of `Capture`."""
 
     def __init__(self, feeds: Sequence[Feed], interval: float) -> None:
-        """Nothing is read yet; `interval`: seconds between two pictures."""
+        """Reading starts with the `with` block; `interval`: seconds between two pictures of a camera."""
         self.captures = [Capture(feed) for feed in feeds]
         self.newest = NewestSet(self.captures, interval)
         self._open = ExitStack()
 
     def __enter__(self) -> Self:
-        """Begin to read."""
+        """Start reading."""
         for capture in self.captures:
             self._open.enter_context(capture)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let the feeds go."""
+        """Stop reading."""
         self._open.close()
 
     def again(self) -> None:
-        """Open the cameras once more."""
+        """Close and reopen all cameras."""
         for capture in self.captures:
             capture.again()
 
@@ -92,10 +92,10 @@ class RigCapture:
 
     @property
     def ended(self) -> bool:
-        """Whether a film is over."""
+        """Whether any film is over."""
         return any(capture.ended for capture in self.captures)
 
     @property
     def error(self) -> BaseException | None:
-        """What is not a camera's fault."""
+        """An error that ended reading, other than a camera's breaking off; None if there is none."""
         return next((capture.error for capture in self.captures if capture.error is not None), None)

@@ -1,4 +1,4 @@
-"""A live session with several calibrated cameras: the person is measured in their first seconds, and tracked in all cameras at once."""
+"""A live session with several calibrated cameras: measures the person in the first seconds, then tracks in all cameras at once."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ STEP_IN = "step in between the cameras and move a little"
 
 @dataclass(eq=False, kw_only=True)
 class RigSession(LiveSession):
-    """A session with several cameras."""
+    """A live session with several cameras."""
 
     full: tuple[Camera, ...]
-    """The cameras as they give their pictures."""
+    """The cameras for pictures of full size."""
     watchdogs: tuple[CameraWatchdog, ...]
     scene: list[list[Image]] = field(default_factory=list)
-    """For each camera pictures of its empty scene, of the size that is worked on; learnt if there are none."""
+    """Pictures of each camera's empty scene, of the working size; learnt if there are none."""
     height: float | None = None
-    """Height of the person, if it is known (m)."""
+    """Height of the person, metres; None if unknown."""
 
     def __post_init__(self) -> None:
         """Raises `SettingsError` for a body that several cameras cannot track."""
@@ -60,12 +60,12 @@ class RigSession(LiveSession):
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
-        """The cameras as they give their pictures."""
+        """The cameras for pictures of full size."""
         return self.full
 
     @property
     def worked_cameras(self) -> tuple[Camera, ...]:
-        """For pictures of the size that is worked on."""
+        """The cameras for pictures of the working size."""
         return self._worked
 
     @property
@@ -74,16 +74,16 @@ class RigSession(LiveSession):
         return self.scene
 
     def check(self, shot: SnapshotSet) -> str:
-        """What is wrong with one of the pictures."""
+        """The first problem of the pictures; empty if there is none."""
         troubles = [dog.see(shot.captured, image) for dog, image in zip(self.watchdogs, shot.images)]
         return next(filter(None, troubles), "")
 
     def silence(self, now: float, problem: str) -> str:
-        """What is wrong if no set of pictures came."""
+        """The first camera's problem if no set of pictures came; empty if there is none."""
         return next(filter(None, (dog.silence(now, problem, self.timing.interval) for dog in self.watchdogs)), "")
 
     def asks_again(self, now: float) -> bool:
-        """Whether a frozen camera is to be opened again."""
+        """Whether a frozen camera should be opened again."""
         asking = [dog.asks_again(now) for dog in self.watchdogs]
         return any(asking)
 
@@ -92,12 +92,12 @@ class RigSession(LiveSession):
         return np.eye(4), 0.0
 
     def begin_learning(self) -> None:
-        """Forget what was collected of the empty scenes."""
+        """Discard the collected pictures of the empty scenes."""
         self._collectors = [BackgroundCollector(self.settings.countdown, self.settings.learn) for _ in self.full]
         self._collected: list[list[Image] | None] = [None] * len(self.full)
 
     def begin_waiting(self) -> None:
-        """Wait until two cameras see somebody."""
+        """Start waiting until two cameras see a person."""
         self._first: list[tuple[float, tuple[Mask, ...]]] = []
         self._hint = STEP_IN
 
@@ -126,7 +126,7 @@ class RigSession(LiveSession):
         return Outcome(self._view(images, masks))
 
     def _fitting(self) -> Callable[[], MultiviewSubject | TrackingError]:
-        """Measures the person in the first seconds; nobody there is a result, too."""
+        """A task that measures the person in the first seconds; it returns, rather than raises, the error if there is no person."""
         chosen = np.unique(np.linspace(0, len(self._first) - 1, OPENED).astype(int)).tolist()
         fit = partial(fit_in_views, self.rng.spawn(1)[0], self._worked, [self._first[n][1] for n in chosen], self.options,
                       1 / self.timing.interval, self.height)
@@ -140,7 +140,7 @@ class RigSession(LiveSession):
         return tried
 
     def _measure(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
-        """Wait for the fit."""
+        """Check whether the fit is ready."""
         found: MultiviewSubject | TrackingError | None = self._measured()
         if found is None:
             return Outcome(self._view(images, self._masks(shot, images)))
@@ -163,7 +163,7 @@ class RigSession(LiveSession):
         self._first.clear()
 
     def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
-        """A grid of the cameras, drawn here: the display knows one picture."""
+        """The field image of a `View`: a grid of all cameras, drawn here because the display shows a single picture."""
         if not images:
             return {}
         pictures = self.subject.pictures if isinstance(self.subject, MultiviewSubject) else self._pictures

@@ -1,4 +1,4 @@
-"""What a session with several cameras begins with: films played together, or cameras read at once; calibration and empty scenes."""
+"""Opens the sources of a session with several cameras: films played together or live cameras, their calibration and empty scenes."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from shadowpuppet.video.live_source import ADDRESS, Feed, film_feed, open_feed
 
 
 class RigSources(NamedTuple):
-    """Several cameras, and what is known of their scene."""
+    """Several opened cameras, with calibration, empty scenes and the person's height."""
 
     capture: RigCapture | Capture
     cameras: tuple[Camera, ...]
-    """As they give their pictures."""
+    """The cameras for pictures of full size."""
     sizes: tuple[Size, ...]
-    """Of the pictures that come."""
+    """Sizes of the pictures that `capture` gives."""
     rate: float
     """Sets of pictures/s."""
     live: bool
     """False for films."""
     scenes: list[list[Image]]
-    """Pictures of each camera's empty scene, of the size that is worked on; empty if they are to be learnt."""
+    """Pictures of each camera's empty scene, of the working size; empty if they must be learnt."""
     height: float | None
-    """Height of the person, if the recording says it (m)."""
+    """Height of the person, metres; None if the recording does not state it."""
 
 
 def is_rig(source: str) -> bool:
-    """Whether a source is several: names with commas between, or the folder of a recording."""
+    """Whether a source stands for several cameras: names separated by commas, or the folder of a recording."""
     path = Path(source)
     return (path / "video").is_dir() if path.exists() else len(_parts(source)) > 1
 
 
 def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
-    """Open several cameras, streams or films. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Open several cameras, streams or films. Raises a `ShadowPuppetError` if something cannot be used."""
     if options.region is not None or options.background is not None:
         raise SettingsError(f"{'region' if options.region else 'background'}: found one for several cameras, expected none")
     if Path(settings.camera).is_dir():
@@ -77,7 +77,7 @@ def _recorded(folder: str, options: Options) -> Rig:
 
 
 def _calibrated(options: Options, count: int) -> tuple[Camera, ...]:
-    """The cameras of the calibration, which come in the order of the sources."""
+    """The cameras of the calibration, in its order, which must be that of the sources. Raises `CalibrationError`."""
     if options.calibration is None:
         raise CalibrationError(f"found {count} cameras without a calibration, expected one that knows where they stand; give --calibration")
     cameras = tuple(read_calibration(options.calibration))
@@ -116,7 +116,7 @@ def _scene(footage: Footage) -> list[Image]:
 
 @dataclass(frozen=True)
 class _FilmSet:
-    """Synchronized films as one: iterates over times and tuples of pictures."""
+    """Synchronized films as one film: yields times (s) and tuples of pictures, one for each camera."""
 
     rig: Rig
     name: str

@@ -1,4 +1,4 @@
-"""A live run: a camera in, a run folder out, and something to look at meanwhile. Prints nothing: it tells a `Listener`."""
+"""A live run: tracks a camera into a run folder, and serves the display and the outlets. Prints nothing: it notifies a `Listener`."""
 
 from __future__ import annotations
 
@@ -40,31 +40,31 @@ from shadowpuppet.video.live_source import open_feed
 from shadowpuppet.video.network_stream import without_secrets
 
 IDLE = 0.05
-"""Seconds that a new picture is waited for before the display is served."""
+"""Longest wait for a new picture, seconds, before the display is updated."""
 
 
 class LiveListener(Listener):
-    """Is told how a session goes, and does nothing: derive from it."""
+    """Receives messages of a session. Every method does nothing: override those of interest."""
 
     def note(self, message: str) -> None:
-        """Something that the person before the camera, or at the terminal, is to know now."""
+        """A message for the person before the camera or at the terminal."""
 
     def trouble(self, message: str) -> None:
-        """No pictures come, or none that can be used; or what is found cannot be given to other programs."""
+        """A problem: no usable pictures come, or the motion cannot be sent to other programs."""
 
 
 class _Nobody(Exception):
-    """Nobody was tracked: there is nothing to keep."""
+    """Nobody was tracked, so there is no run to keep."""
 
 
 def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
              listener: LiveListener | None = None, display: Display | None = None,
              clock: Callable[[], float] = time.monotonic, outlets: Outlets | None = None) -> dict[str, Any] | None:
-    """Track a camera until Ctrl-C, the display's command or a film's end, into a run folder; what is in metrics.json, or None.
+    """Track a camera, or several, into a run folder, until Ctrl-C, the display's command `stop` or a film's end.
 
-    Every frame is given to the `outlets`, too. The folder gets what `io.run` describes, person.toml, calibration.toml and, with
-    `LiveSettings.record`, recording/. None, and no folder, where nobody was tracked. Raises a `ShadowPuppetError` where something
-    cannot be used.
+    Also sends every frame to the `outlets`. In addition to the files that `io.run` describes, the folder gets person.toml,
+    calibration.toml and, with `LiveSettings.record`, recording/. Returns the contents of metrics.json; None if nobody was tracked, and then
+    no folder remains. Raises a `ShadowPuppetError` if something cannot be used.
     """
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
@@ -90,7 +90,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
 
 
 class _Live:
-    """What belongs together while it runs."""
+    """The parts of a live run: session, capture, run folder, display, outlets."""
 
     def __init__(self, run: RunWriter, options: Options, settings: LiveSettings, listener: LiveListener, display: Display,
                  clock: Callable[[], float], outlets: Outlets) -> None:
@@ -101,7 +101,7 @@ class _Live:
         self.frames, self.breaks, self.broke, self.said = 0, 0, np.nan, ""
 
     def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
-        """The session of one camera, what reads it, its frames/s, and whether it is live."""
+        """The session of one camera, its reader, its frames/s, and whether it is live (not a film)."""
         person, settings = known_person(self.options), self.settings
         feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
         full = lens(self.options, feed.size)
@@ -111,7 +111,7 @@ class _Live:
         return session, Capture(feed), feed.rate, feed.live
 
     def _several(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
-        """The same of several cameras."""
+        """The session of several cameras, their reader, their frame sets/s, and whether they are live (not films)."""
         sources = open_rig_sources(self.options, self.settings)
         watchdogs = tuple(CameraWatchdog(camera.name, size, sources.live) for camera, size in zip(sources.cameras, sources.sizes))
         session = RigSession(self.options, self.settings, np.random.default_rng(self.options.seed), self.clock, Timing(sources.rate),
@@ -119,7 +119,7 @@ class _Live:
         return session, sources.capture, sources.rate, sources.live
 
     def run(self) -> None:
-        """From the first picture to the last. Raises `_Nobody` where nobody was tracked."""
+        """Process all pictures. Raises `_Nobody` if nobody was tracked."""
         try:
             with ExitStack() as stack:
                 stack.enter_context(self.stop)
@@ -137,7 +137,7 @@ class _Live:
             raise _Nobody
 
     def _open(self, stack: ExitStack) -> None:
-        """Get ready, and let the pictures come; those of a film do not come before."""
+        """Warm up and start reading. Reading starts before the warm-up for a camera, and after it for a film."""
         self.listener.begin("getting ready")
         self.stop.hasty = True
         if self.is_live:
@@ -186,17 +186,17 @@ class _Live:
         return self.session.subject
 
     def _stream_subject(self) -> Subject:
-        """The measured person, for other programs."""
+        """The measured person, for the outlets."""
         base, floor = self.session.placed()
         return Subject(self._person.body, base, self._person.person.height, floor)
 
     def _write_beside(self) -> None:
-        """Person and cameras of this run; again when the person was measured again."""
+        """Write person.toml and calibration.toml; called again whenever the person was measured again."""
         write_person(self.run_.folder / "person.toml", self._person.person)
         write_calibration(self.run_.folder / "calibration.toml", self.session.cameras)
 
     def _tell(self, outcome: Outcome) -> None:
-        """Say what changed, once."""
+        """Report changes to the listener, each once."""
         view, now = outcome.view, self.clock()
         if said := self.outlets.trouble():
             self.listener.trouble(said)
@@ -218,7 +218,7 @@ class _Live:
 
 
 def _said(phase: str, message: str, countdown: float | None) -> str:
-    """What a view is to say, with the seconds of a countdown; nothing at its very end."""
+    """The message of a view, with the seconds of a countdown; empty when the countdown reaches 0."""
     if countdown is None:
         return message or phase
     return f"{message}: {np.ceil(countdown):.0f}" if countdown > 0 else ""

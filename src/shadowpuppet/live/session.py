@@ -29,17 +29,17 @@ from shadowpuppet.video.live_source import Snapshot
 
 @dataclass(eq=False, kw_only=True)
 class Session(LiveSession):
-    """A session with one camera."""
+    """A live session with one camera."""
 
     full: Camera
-    """The camera as it gives its pictures."""
+    """The camera for pictures of full size."""
     watchdog: CameraWatchdog
     person: Person | None = None
-    """The person, if their sizes are known."""
+    """The person's known sizes; None to measure them."""
     scene: list[Image] = field(default_factory=list)
-    """Pictures of the empty scene, of the size that is worked on; learnt if there are none."""
+    """Pictures of the empty scene, of the working size; learnt if there are none."""
     fit: SizeFit | None = None
-    """Sizes and place, once they are found."""
+    """Fitted sizes and place; None before."""
 
     def __post_init__(self) -> None:
         """Raises `SettingsError` for a region outside the picture."""
@@ -56,12 +56,12 @@ class Session(LiveSession):
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
-        """The camera as it gives its pictures."""
+        """The camera for pictures of full size."""
         return (self.full,)
 
     @property
     def worked_cameras(self) -> tuple[Camera, ...]:
-        """The camera for pictures of the size that is worked on."""
+        """The camera for pictures of the working size."""
         return (self.camera,)
 
     @property
@@ -71,34 +71,34 @@ class Session(LiveSession):
 
     @property
     def measured(self) -> SizeFit:
-        """Sizes and place of the person, who was found."""
+        """Fitted sizes and place; valid only after the person was measured."""
         assert self.fit is not None
         return self.fit
 
     def check(self, shot: Snapshot) -> str:
-        """What is wrong with a picture."""
+        """The problem of a picture; empty if there is none."""
         return self.watchdog.see(shot.captured, shot.image)
 
     def silence(self, now: float, problem: str) -> str:
-        """What is wrong if no picture came."""
+        """The problem if no picture came; empty if there is none."""
         return self.watchdog.silence(now, problem, self.timing.interval)
 
     def asks_again(self, now: float) -> bool:
-        """Whether the frozen camera is to be opened again."""
+        """Whether the frozen camera should be opened again."""
         return self.watchdog.asks_again(now)
 
     def placed(self) -> tuple[Array, float | None]:
-        """Where the body's frame stands in the world; the floor is not known."""
+        """The body's frame in the world (4, 4), and None: the floor is unknown with one camera."""
         assert isinstance(self.subject, MonocularSubject)
         picture = self.subject.picture
         return inverse(picture.camera.T_camera_world) @ picture.T_camera_base, None
 
     def begin_learning(self) -> None:
-        """Forget what was collected of the empty scene."""
+        """Discard the collected pictures of the empty scene."""
         self._collector = BackgroundCollector(self.settings.countdown, self.settings.learn)
 
     def begin_waiting(self) -> None:
-        """Wait until somebody stands still."""
+        """Start waiting until a person stands still."""
         self._still, self._recent = StandStillDetector(self.settings.still), []
 
     def _learn(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
@@ -116,7 +116,7 @@ class Session(LiveSession):
         return Outcome(self._view(images, masks))
 
     def _fitting(self, masks: list[Mask]) -> Callable[[], SizeFit]:
-        """Finds sizes and place of the person who stood still; the place alone if the sizes are known."""
+        """A task that fits sizes and place to the `masks` of a person standing still; only the place if the sizes are known."""
         known = self.fit.guess if self.fit else self.person
         sizes, height = (known.sizes, known.height) if known else (None, None)
         height = height if self.fit else self.options.height or height
@@ -125,7 +125,7 @@ class Session(LiveSession):
                        body=self.options.tracker.body, settings=self.options.initialization)
 
     def _measure(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
-        """Wait for the fit."""
+        """Check whether the fit is ready."""
         fit: SizeFit | None = self._measured()
         if fit is None:
             return Outcome(self._view(images, self._masks(shot, images)))
@@ -140,7 +140,7 @@ class Session(LiveSession):
         return Outcome(self._view(images))
 
     def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
-        """Learn the background; from pictures of the person also how blurred outlines are."""
+        """Learn the background from `scene`, and, from `film`, pictures with the person, also the blur of outlines."""
         blank = Silhouettes("live", None, self._region, scene[0] if self._region else None)
         visible = [blank.visible(image) for image in film] if film else None
         asked, clean = self.options.silhouette, clean_settings(self.options.silhouette)
@@ -153,7 +153,7 @@ class Session(LiveSession):
         return (scaled(shot.image, self.camera),)
 
     def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
-        """The silhouette (H, W): before tracking a clean one, in which a person can be measured."""
+        """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
         silhouettes = self._silhouettes if self.phase == "tracking" else self._clean
         assert silhouettes is not None
         return (silhouettes(CameraFrame(shot.captured, images[0], None)),)

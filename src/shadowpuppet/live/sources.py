@@ -1,4 +1,4 @@
-"""What a session with one camera begins with: its calibration, the person, the empty scene."""
+"""Reads the inputs of a session with one camera: its calibration, the person, the empty scene."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ USUAL_FOV = 65.0
 
 
 def lens(options: Options, size: Size) -> Camera:
-    """The camera for pictures of a size. Raises `CalibrationError` where the calibration is not for them."""
+    """The camera for pictures of `size`, from the options. Raises `CalibrationError` if the calibration does not fit."""
     if options.calibration is None:
         if options.fov is None:
             _warn(f"no field of view is given: {USUAL_FOV:g} degrees are assumed, and depths are as wrong as that; give --fov or "
@@ -40,7 +40,7 @@ def lens(options: Options, size: Size) -> Camera:
 
 
 def known_person(options: Options) -> Person | None:
-    """The person of `options.person`; None without. Raises `FormatError`."""
+    """The person in the file `options.person`; None without it. Warns if neither height nor distance is known. Raises `FormatError`."""
     person = read_person(options.person, options.tracker.body) if options.person is not None else None
     if options.height is None and (person is None or person.height is None) and options.distance is None:
         _warn("neither height nor distance is known: the average height is assumed, and all lengths are as wrong as that; give --height")
@@ -48,7 +48,7 @@ def known_person(options: Options) -> Person | None:
 
 
 def empty_scene(options: Options, full: Camera) -> list[Image]:
-    """Pictures of the empty scene from `options.background`, of the worked size; empty without. Raises `RecordingError`."""
+    """Pictures of the empty scene from `options.background`, of the working size; empty without it. Raises `RecordingError`."""
     if options.background is None:
         return []
     size = open_frames(options.background).size

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 RECENT = 15
-"""Pictures over which the displayed rate is averaged."""
+"""Number of pictures over which the displayed rate is averaged."""
 
 
 class Timing:
@@ -25,16 +25,16 @@ class Timing:
         self._last, self._tracked, self._worked = (0.0, 0), -1, 0.0
 
     def came(self, captured: float, number: int) -> None:
-        """The camera's n-th picture, and when it was captured (s)."""
+        """Record that picture `number` was captured at a time (s)."""
         self._first, self._last = self._first or (captured, number), (captured, number)
 
     def pause(self) -> None:
-        """No pictures came for a while: leave the gap out of the rates."""
+        """Leave a gap in the pictures out of the rates."""
         self._usual, self._first, self._tracked = self.interval, None, -1
         self._done.clear()
 
     def done(self, captured: float, now: float, number: int) -> None:
-        """The pose of the n-th picture, captured at a time (s), was found now (s)."""
+        """Record that the pose of picture `number`, captured at a time (s), was found at time `now` (s)."""
         self.dropped += number - self._tracked - 1 if self._tracked >= 0 else 0
         self._tracked = number
         self.latencies.append(now - captured)
@@ -43,17 +43,17 @@ class Timing:
 
     @property
     def interval(self) -> float:
-        """Seconds from picture to picture; as the camera states it, before two came."""
+        """Seconds between pictures; by the camera's stated rate before two have come."""
         (last, number), (first, before) = self._last, self._first or self._last
         return (last - first) / (number - before) if number > before and last > first else self._usual
 
     @property
     def rate(self) -> float:
-        """Recent poses/s; NaN before two."""
+        """Poses/s over recent pictures; NaN before two poses."""
         return (len(self._done) - 1) / (self._done[-1] - self._done[0]) if len(self._done) > 1 else np.nan
 
     def summary(self) -> dict[str, Any]:
-        """For metrics.json: latencies in milliseconds and in frames of the camera."""
+        """Entries of metrics.json: latencies in milliseconds and in frames of the camera, interval, rate."""
         if not self.latencies:
             return {}
         late, interval = np.array(self.latencies), self.interval

@@ -1,4 +1,4 @@
-"""Compiles everything before a session begins, by using it once."""
+"""Compiles all Numba functions before a session begins, by calling them once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 
 def warm_up(cameras: Sequence[Camera], options: Options) -> None:
-    """Segment, measure and track a drawn person, in pictures of the cameras' sizes, and forget the result."""
+    """Segment, measure and track a rendered person, in pictures of the cameras' sizes; discards the result."""
     if len(cameras) > 1:
         return _warm_up_rig(tuple(cameras), options)
     (camera,), rng = cameras, np.random.default_rng(0)

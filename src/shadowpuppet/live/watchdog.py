@@ -1,4 +1,4 @@
-"""Watches a camera: whether pictures come, change, and keep their size."""
+"""Checks that a camera's pictures come, change, and keep their size."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from shadowpuppet.video import Image, Size
 from shadowpuppet.video.frames import size_of
 
 SILENT, SILENT_FRAMES = 1.0, 5.0
-"""Seconds, and multiples of the camera's interval, without a picture after which it counts as silent."""
+"""Seconds, and multiples of the camera's interval, without a picture after which it counts as silent; the longer one holds."""
 FROZEN, FROZEN_FRAMES = 1.5, 5
 """Seconds and number of identical pictures after which a camera counts as frozen: real ones have noise."""
 FIRST_PATIENCE, LONGEST_PATIENCE = 3.0, 60.0
@@ -16,10 +16,10 @@ FIRST_PATIENCE, LONGEST_PATIENCE = 3.0, 60.0
 
 
 class CameraWatchdog:
-    """Says what is wrong with a camera's pictures."""
+    """Reports problems of a camera's pictures, in sentences for the user."""
 
     def __init__(self, name: str, size: Size, live: bool) -> None:
-        """`size`: of its pictures; a film, which is not `live`, cannot freeze."""
+        """`size`: expected size of the pictures; a source that is not `live`, a film, is never reported as frozen or silent."""
         self.name, self.size, self.live = name, size, live
         self._last: Image | None = None
         self._changed = self._came = np.nan
@@ -27,7 +27,7 @@ class CameraWatchdog:
         self._patience, self._asked = FIRST_PATIENCE, np.nan
 
     def see(self, now: float, image: Image) -> str:
-        """What is wrong with a picture that came at a time (s), in a sentence; empty if nothing is."""
+        """The problem of a picture that came at time `now` (s), in a sentence; empty if there is none."""
         self._came = now
         if size_of(image) != self.size:
             found = size_of(image)
@@ -41,11 +41,14 @@ class CameraWatchdog:
         return f"{self.name}: the picture stands still" if self.frozen(now) else ""
 
     def frozen(self, now: float) -> bool:
-        """Whether the same picture has come again and again."""
+        """Whether the same picture has come repeatedly for `FROZEN` seconds."""
         return self.live and self._same >= FROZEN_FRAMES and now - self._changed >= FROZEN
 
     def silence(self, now: float, problem: str, interval: float) -> str:
-        """What is wrong if no picture came until now (s); `problem`: what the reader says, `interval`: seconds from picture to picture."""
+        """The problem if no picture has come by time `now` (s), in a sentence; empty if it is too early to tell.
+
+        `problem`: the reader's message; `interval`: seconds between pictures.
+        """
         self._came = now if np.isnan(self._came) else self._came
         if problem:
             return f"{problem} (it is tried again)"
@@ -54,7 +57,7 @@ class CameraWatchdog:
         return f"{self.name}: no picture for {now - self._came:.0f} s" if silent else ""
 
     def asks_again(self, now: float) -> bool:
-        """Whether a frozen camera is to be opened again; true once per waiting time."""
+        """Whether a frozen camera should be opened again; true once per waiting time."""
         if not self.frozen(now):
             return False
         self._asked = now if np.isnan(self._asked) else self._asked

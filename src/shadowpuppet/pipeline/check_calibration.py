@@ -1,4 +1,4 @@
-"""A calibration tested against silhouettes: which camera disagrees, by how much, and how late each film is."""
+"""Tests a calibration against silhouettes: finds cameras that disagree, by how much, and the time offset of each film."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from shadowpuppet.threads import usable_cores
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
 """Number of sets of silhouettes compared; their least number if the films are long enough; the greatest number of sets read."""
 MAX_SET_RATE = 31.0
-"""Greatest rate of sets, 1/s: a higher one adds nothing."""
+"""Greatest rate of the sets compared, 1/s; a higher one adds nothing."""
 SETS_COMPARED = 12
 """Number of sets, spread over all, in which places are compared."""
 MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 3.0
-"""Sets from which on a film counts as late; the same for a camera that disagrees about places, whose time is less certain; and how
-many times the spread of its pairs the offset must be."""
+"""Least offset, in sets, of a film that is late; the same for a camera that disagrees about places, so that its time is less certain;
+least ratio of the offset to its spread over camera pairs."""
 SLIGHT_DISAGREEMENT = 0.004
-"""Disagreement, over the picture's longer side, from which on the worst camera is tested for a rotation (2.6 of 640 pixels)."""
+"""Disagreement, over the picture's longer side, above which the worst camera is tested for a rotation (2.6 of 640 pixels)."""
 STANDOUT_FACTOR = 3.0
-"""How many times the median disagreement a camera must have to be named if no rotation explains it."""
+"""Ratio to the median disagreement above which a camera is reported although no rotation explains it."""
 ROTATION_SHARE = 0.5
 """A rotation is reported if it leaves at most this share of the disagreement."""
 
@@ -45,12 +45,12 @@ class RotationFix(NamedTuple):
 
     turn: RotationError
     apart: float
-    """Disagreement with the others that is left, pixels."""
+    """Remaining disagreement with the other cameras, pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationCheck:
-    """What silhouettes say of a calibration; plain values, so that it can be saved."""
+    """Result of testing a calibration against silhouettes; plain values, so that it can be saved."""
 
     recording: str
     """Its path."""
@@ -61,21 +61,21 @@ class CalibrationCheck:
     frame_rate: float
     """Frames/s of the films."""
     agreement: Agreement
-    """Agreement of the cameras, at the times that fit best."""
+    """Agreement of the cameras, with the films shifted by their time offsets if that fits better."""
     lateness: TimeOffsets | None
-    """In frames of the films; None if the cameras disagree too much to tell."""
+    """Time offsets in frames of the films; None if the cameras disagree too much to estimate them."""
     late: tuple[str, ...]
-    """Cameras whose films are late or early for certain."""
+    """Names of cameras whose films are certainly late or early."""
     starts: dict[str, float]
-    """What [start] of recording.toml should say, seconds; empty if no film is late."""
+    """Values for [start] of recording.toml, seconds; empty if no film is late."""
     turns: dict[str, RotationFix]
-    """Rotations that explain why cameras disagree, by camera."""
+    """Rotations that explain the disagreement of cameras, by camera name."""
     doubts: tuple[str, ...] = ()
-    """What is wrong, and the remedy, a sentence each."""
+    """Problems with their remedies, a sentence each."""
 
     @property
     def good(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether there are no problems."""
         return not self.doubts
 
 
@@ -83,9 +83,9 @@ class SilhouetteSets(NamedTuple):
     """Consecutive sets of silhouettes."""
 
     rows: list[Row]
-    """By set and camera."""
+    """Silhouettes by set, then by camera."""
     every: int
-    """Frames of the films from set to set."""
+    """Number of film frames from one set to the next."""
 
 
 def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
@@ -99,7 +99,7 @@ def check_calibration(rig: Rig, options: Options, listener: Listener | None = No
 
 
 def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> SilhouetteSets:
-    """Silhouettes from the first set on in which two cameras see a person."""
+    """Silhouettes of up to `SETS` sets, beginning with the first set in which two cameras see a person."""
     every = max(1, min(round(rig.rate / MAX_SET_RATE), (rig.count or SETS * 9) // MIN_SETS))
     listener.begin("looking")
     with ThreadPoolExecutor(usable_cores(), "check") as pool:
@@ -123,7 +123,7 @@ def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
 
 
 def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:
-    """What silhouettes say of the calibration of `rig`. Raises `RecordingError` if no two cameras see a person at the same time."""
+    """Test the calibration of `rig` against silhouettes. Raises `RecordingError` if no two cameras see a person at the same time."""
     if sum(sum(silhouette is not None for silhouette in row) > 1 for row in sets.rows) < 2:
         raise RecordingError(f"{rig.recording.path}: no two cameras see a person at the same time: do the films belong together?")
     found = _judged(rig, sets.rows)
@@ -140,19 +140,19 @@ class _Judgement(NamedTuple):
     agreement: Agreement
     rotations: dict[str, RotationFix]
     offsets: TimeOffsets | None
-    """In sets."""
+    """Time offsets in sets."""
     shifts: list[float]
-    """Sets by which each film is late for certain."""
+    """Certain time offset of each film, in sets; 0 if it is uncertain."""
 
     def left(self) -> float:
-        """Mean disagreement of the cameras, pixels, once those that were rotated are rotated back."""
+        """Mean disagreement of the cameras, pixels, after the estimated rotations are undone."""
         known = [self.rotations[name].apart if name in self.rotations else apart
                  for name, apart in zip(self.agreement.names, self.agreement.apart) if apart is not None]
         return float(np.mean(known)) if known else np.inf
 
 
 def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
-    """Places, then times, then places again at the times that fit; the second judgement counts if less disagreement is left."""
+    """Compare places, then times, then places again with the films aligned; the aligned result is used if it leaves less disagreement."""
     still = [0.0] * len(rig.cameras)
     chosen = _spread(rows, still)
     found = compare_cameras(rig.cameras, chosen)
@@ -163,11 +163,11 @@ def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
         return first
     aligned = _spread(rows, first.shifts)
     second = _with_times(rig, rows, compare_cameras(rig.cameras, aligned, remedies=False), aligned)
-    return second if second.left() < first.left() else first._replace(shifts=still)  # what differs is not time
+    return second if second.left() < first.left() else first._replace(shifts=still)  # not a time offset
 
 
 def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequence[Row]) -> _Judgement:
-    """Rotations of cameras that disagree in the `chosen` sets, and the time offsets in all once these are rotated back."""
+    """Rotations of cameras that disagree in the `chosen` sets, and time offsets from all sets after these rotations are undone."""
     rotations = _rotations(rig, found, chosen)
     cameras = [rotations[camera.name].turn.of(camera) if camera.name in rotations else camera for camera in rig.cameras]
     offsets = time_offsets(cameras, rows)
@@ -183,14 +183,14 @@ def _spread(rows: Sequence[Row], shifts: Sequence[float]) -> list[Row]:
 
 
 def _certain(offsets: TimeOffsets, found: Agreement) -> list[float]:
-    """Sets by which films are late for certain; 0 for the others."""
+    """Certain time offsets of the films, in sets; 0 for uncertain ones."""
     limits = [max(MIN_OFFSET_MISPLACED if name in found.wrong else MIN_OFFSET, SPREAD_FACTOR * (spread or 0.0))
               for name, spread in zip(offsets.names, offsets.spread)]
     return [late if late is not None and abs(late) > limit else 0.0 for late, limit in zip(offsets.frames, limits)]
 
 
 def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, RotationFix]:
-    """Rotations of the cameras that disagree, or of the one that stands out, if they mend the disagreement."""
+    """Rotations of the cameras that disagree, or else of the outlier, if they remove the disagreement."""
     fixes = {}
     for name in found.wrong or _standing_out(found, 1.0):
         n = rig.names.index(name)
@@ -204,7 +204,7 @@ def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, Rot
 
 
 def _standing_out(found: Agreement, times: float) -> tuple[str, ...]:
-    """The camera that disagrees most, if it does by more than good ones do and by more than `times` the median."""
+    """The camera that disagrees most, if it exceeds both the slight disagreement of good ones and `times` the median; else empty."""
     apart = {name: value for name, value in zip(found.names, found.apart) if value is not None}
     worst = max(apart, key=lambda name: apart[name], default="")
     least = max(SLIGHT_DISAGREEMENT / MAX_DISAGREEMENT * found.limit, times * float(np.median(list(apart.values()))) if apart else 0.0)
@@ -219,7 +219,7 @@ def _in_frames(offsets: TimeOffsets, every: int) -> TimeOffsets:
 
 
 def _starts(rig: Rig, shifts: Sequence[float], every: int) -> dict[str, float]:
-    """[start] of recording.toml that aligns the films: the present values plus the surplus of late films, seconds."""
+    """Values of [start] in recording.toml that align the films, seconds: the present values plus the offsets of late films."""
     if not any(shifts):
         return {}
     least = min(shifts)

@@ -1,4 +1,4 @@
-"""One camera's film, at the size that is worked on, and a sample of it."""
+"""One camera's film, scaled to the working size, and a sample of its frames."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
 
 LOOKED_AT = 1500
-"""Frames of the film that a sample is taken from: a look must not take as long as the work."""
+"""Number of frames, from the film's beginning, that a sample is taken from: examining a film must not take as long as tracking it."""
 RUNS, RUN = 10, 4
-"""A sample's runs, spread over these frames, and the consecutive frames of each."""
+"""Number of a sample's runs, spread over these frames, and of consecutive frames in each."""
 ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
 FIRST_SECONDS, FIRST = 8.0, 16
-"""Length of the film's beginning (s), and how many frames of it a sample keeps."""
+"""Length of the film's beginning (s), and number of its frames that a sample keeps."""
 
 
 class CameraFrame(NamedTuple):
@@ -34,29 +34,29 @@ class CameraFrame(NamedTuple):
     """Seconds of the recording."""
     image: Image
     ready: Image | None
-    """The frame of the recording's ready silhouettes; None without."""
+    """The frame of the recording's ready silhouettes; None without these."""
 
 
 @dataclass(frozen=True, eq=False)
 class Footage:
-    """One view of a recording; all its images have the size of `camera`."""
+    """One camera's view in a recording; all its images have the working size, that of `camera`."""
 
     recording: Recording
     view: View
-    """As it is stored."""
+    """The view as stored, at full size."""
     camera: Camera
-    """For images of the size that is worked on."""
+    """The camera for images of the working size."""
     region: tuple[slice, slice] | None = None
     """Rows and columns where the person may be; None for all."""
 
     def film(self) -> FrameSource:
-        """The film's frames."""
+        """Opens the film; iterating over it gives its frames."""
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
 
     def frames(self, ready: bool, strict: bool = True) -> Iterator[CameraFrame]:
         """The film's frames from the recording's time 0 on; with `ready`, the ready silhouettes too.
 
-        Raises `SilhouetteError` where these end before the film does; if not `strict`, the rest has none.
+        Raises `SilhouetteError` if these end before the film does; if not `strict`, later frames have None instead.
         """
         masks = iter(open_frames(self.view.masks, size=self.camera.size)) if ready and self.view.masks else None
         start, end = self.view.start, self.recording.duration
@@ -71,7 +71,7 @@ class Footage:
 
     @property
     def count(self) -> int | None:
-        """Number of `frames` by the film's header; None where that does not say it."""
+        """Number of `frames`, from the film's header; None if that does not state it."""
         film = self.film()
         if film.count is None or not np.isfinite(film.rate):
             return film.count
@@ -80,7 +80,10 @@ class Footage:
         return max(min(last, film.count) - first, 0)
 
     def pictures(self, source: Path, what: str) -> Iterator[Image]:
-        """Images of the same camera from another file. Raises `RecordingError` if their size is not the film's."""
+        """Images of the same camera from another file, at the working size; `what` names them in messages.
+
+        Raises `RecordingError` if their size is not the film's.
+        """
         frames, (width, height) = open_frames(source), self.view.camera.size
         if frames.size != (width, height):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
@@ -89,7 +92,7 @@ class Footage:
 
 
 def open_footage(path: str | Path, options: Options) -> Footage:
-    """The film of a recording's only camera, or of `options.camera`.
+    """The footage of a recording's only camera, or of `options.camera`.
 
     Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError`.
     """
@@ -103,7 +106,10 @@ def open_footage(path: str | Path, options: Options) -> Footage:
 
 
 def open_recording(path: str | Path, options: Options) -> Recording:
-    """A recording, with the height and distance that the options give. Raises `RecordingError`, `CalibrationError` or `VideoError`."""
+    """Read a recording; height and distance in the options override its own.
+
+    Raises `RecordingError`, `CalibrationError` or `VideoError`.
+    """
     fov = None if options.fov is None else float(np.radians(options.fov))
     recording = read_recording(path, fov=fov, calibration=options.calibration)
     subject = recording.subject
@@ -123,7 +129,7 @@ def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
 
 
 def camera_footage(recording: Recording, view: View, options: Options) -> Footage:
-    """One view of a recording with the options applied. Raises `RecordingError` or `SettingsError` where that is impossible."""
+    """The footage of one view with the options applied. Raises `RecordingError` or `SettingsError` if that is impossible."""
     if camera_number(view.video) is not None:
         raise RecordingError(f"{recording.path}: found a live camera, expected a film or a folder of pictures")
     if options.background is not None:
@@ -142,9 +148,9 @@ def worked_size(size: tuple[int, int], longest: int) -> tuple[int, int]:
 
 
 def region_of(region: tuple[int, int, int, int] | None, full: Camera, camera: Camera) -> tuple[slice, slice] | None:
-    """Rows and columns, in images of the scaled `camera`, of a region x0,y0,x1,y1 in those of the `full` one.
+    """Rows and columns, in images of the scaled `camera`, of a region x0,y0,x1,y1 in images of the `full` camera.
 
-    Raises `SettingsError` where it is not inside them.
+    Raises `SettingsError` if the region is not inside the image.
     """
     if region is None:
         return None
@@ -162,7 +168,7 @@ def region_of(region: tuple[int, int, int, int] | None, full: Camera, camera: Ca
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Some of a film's frames, few enough to be kept in memory."""
+    """A sample of a film's frames, small enough to be kept in memory."""
 
     runs: list[list[CameraFrame]]
     """Runs of consecutive frames, spread over the film."""
@@ -190,7 +196,8 @@ class Sample:
 
 
 def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKED_AT) -> Sample:
-    """Read the film's first `longest` frames once. With `need_masks`, raises `SilhouetteError` if ready silhouettes are missing."""
+    """Sample the film's first `longest` frames, reading them once. With `need_masks`, raises `SilhouetteError` if ready silhouettes are
+    missing."""
     film = footage.film()
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
     wanted = _spread(min(int(length), longest))
@@ -207,7 +214,7 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
 
 
 def _spread(length: int) -> dict[int, int]:
-    """Numbers of the sampled frames, each with that of its run's first."""
+    """Maps the number of each sampled frame to the number of its run's first frame."""
     if length <= RUNS * RUN:
         return dict.fromkeys(range(max(length, 1)), 0)
     starts = np.linspace(0, length - RUN, RUNS).astype(int).tolist()

@@ -1,4 +1,4 @@
-"""Motion priors learnt from files of motion, and that of a run: given, or learnt from its training motion."""
+"""Learns motion priors from motion files, and gets the prior of a run: from a file, or learnt from its training motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.threads import one_blas_thread
 
 CANDIDATES = (5, 10, 15, 20, 30, 40, 60, 80)
-"""Numbers of regions that are tried where one is to be chosen (Ni 2008, Figs. 4 and 8)."""
+"""Numbers of regions tried if the best is to be chosen (Ni 2008, Figs. 4 and 8)."""
 
 
 @one_blas_thread()
@@ -50,22 +50,24 @@ def prior_from_files(motions: Sequence[str | Path], file: str | Path, settings: 
 
 
 class Familiar(NamedTuple):
-    """What is known of how a person moves before a run, and of the person from that."""
+    """Knowledge from training data before a run: a motion prior, the person's sizes, and training poses."""
 
     prior: MotionPrior | None
-    """For the film's rate; None where there is neither a file nor training motion."""
+    """Prior for the film's frame rate; None if there is neither a prior file nor training motion."""
     sizes: BoneSizes | None
-    """Of whoever moved in the training motion."""
+    """Sizes of the person in the training motion; None without training motion."""
     poses: Array
-    """Of the training motion, of shape (T, D), all DOF, in the world: postures that a search for the first may try; none without."""
+    """Poses of the training motion in the world, (T, D), all DOF: candidates for the search for the first pose. T is 0 without training
+    motion."""
 
 
 def familiar(rng: np.random.Generator, options: Options, training: JointTable | None, body: str, rate: float,
              source: str = "training") -> Familiar:
-    """The prior of a run at `rate` frames/s: `options.prior`, else learnt from `training` motion, by `options.training`.
+    """The prior of a run at `rate` frames/s, from the file `options.prior` or else learnt from `training` with `options.training`; and the
+    sizes and poses of the training motion.
 
-    `source`: what messages call that motion. Raises `FormatError` or `ShadowPuppetError` where a file is no prior, or of another body, or
-    the motion cannot be learnt from.
+    `source`: name of the training motion in messages. Raises `FormatError` or `ShadowPuppetError` if the file is not a prior or is for
+    another body, or if nothing can be learnt from the motion.
     """
     skeleton = make_body(body, average_sizes(body, AVERAGE_HEIGHT)).skeleton
     given = None if options.prior is None else _given(options.prior, skeleton, rate)

@@ -1,4 +1,4 @@
-"""What a look at a recording finds before the run, as plain values: one camera's film, or several synchronized ones."""
+"""Result types of examining a recording before the run: plain values for look.json, and the silhouettes that the run uses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shadowpuppet.silhouette.quality import MaskQuality
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """What was found in a recording of one camera; plain values, so that it can be saved."""
+    """Findings about a recording of one camera; plain values, so that it can be saved."""
 
     recording: str
     """Its path."""
@@ -28,9 +28,9 @@ class Look:
     fov: float
     """Horizontal field of view, degrees."""
     calibrated: bool
-    """False where only the field of view is known."""
+    """False if only the field of view is known."""
     frames: int | None
-    """Number of the film's frames, if the film states it."""
+    """Number of the film's frames; None if the film does not state it."""
     looked_at: int
     """Number of frames that were read for this look."""
     rate: float
@@ -38,33 +38,33 @@ class Look:
     jitter: float
     """Standard deviation of the frames' interval, seconds."""
     scale: str
-    """What fixes the scale."""
+    """Known lengths that fix the scale, in words."""
     background: str
     """Where the silhouettes come from."""
     key: str
-    """What is compared with the background, and why."""
+    """Which channels are compared with the background, and why."""
     area: float
     """Mean share of the image that is silhouette."""
     plain_area: float | None
-    """The same by the plain rule of eq. 1; None without a standard deviation of the background."""
+    """The same with the plain rule of eq. 1; None if the background has no standard deviation."""
     exact_overlap: float | None
-    """Overlap (intersection over union) with the recording's ready silhouettes, if there are any."""
+    """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
     exact_overlap_plain: float | None
-    """The same of the plain rule."""
+    """The same with the plain rule of eq. 1."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
     person: dict[str, Any] | None = None
-    """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted in, where these are not the tracked ones;
-    None if it was not fitted."""
+    """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
+    it was not fitted."""
     doubts: tuple[str, ...] = ()
-    """What may harm the run, and the remedy, a sentence each."""
+    """Possible problems of the run with their remedies, a sentence each."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraLook:
-    """What was found of one of several cameras; plain values."""
+    """Findings about one of several cameras; plain values."""
 
     name: str
     size: tuple[int, int]
@@ -76,24 +76,24 @@ class CameraLook:
     place: tuple[float, float, float]
     """Its place in the world, metres."""
     frames: int | None
-    """Number of frames from the recording's time 0 on, if the film states it."""
+    """Number of frames from the recording's time 0 on; None if the film does not state it."""
     rate: float
     """Frames/s."""
     start: float
-    """The recording's time 0 by the film's own clock, seconds."""
+    """The recording's time 0 on the film's own clock, seconds."""
     background: str
     """Where the silhouettes come from."""
     key: str
-    """What is compared with the background, and why."""
+    """Which channels are compared with the background, and why."""
     exact_overlap: float | None
-    """Overlap (intersection over union) with the recording's ready silhouettes, if there are any."""
+    """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RigLook:
-    """What was found in a recording of several cameras; plain values, so that it can be saved."""
+    """Findings about a recording of several cameras; plain values, so that it can be saved."""
 
     recording: str
     """Its path."""
@@ -101,37 +101,37 @@ class RigLook:
     rate: float
     """Frame sets/s."""
     frames: int | None
-    """Number of frame sets, if the films state it."""
+    """Number of frame sets; None if the films do not state it."""
     agreement: Agreement
-    """How far the cameras agree, by the first seconds' silhouettes."""
+    """Agreement of the cameras, from the silhouettes of the first seconds."""
     person: dict[str, Any] | None = None
     """Sizes and how they were found; None if the person was not measured."""
     doubts: tuple[str, ...] = ()
-    """What may harm the run, and the remedy, a sentence each."""
+    """Possible problems of the run with their remedies, a sentence each."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
 
 
 class FirstSeconds(NamedTuple):
-    """Silhouettes from the recording's beginning, in which the person is measured."""
+    """Silhouettes from the recording's beginning, to which the person's sizes are fitted."""
 
     times: list[float]
-    """Seconds, F of them."""
+    """F times, seconds."""
     masks: list[tuple[Mask | None, ...]]
-    """For each time, one for each camera (H, W); None without a frame."""
+    """For each time a mask (H, W) per camera; None for a camera without a frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A recording that was looked at; the same for every seed."""
+    """A recording that was examined, and its silhouettes; does not depend on the seed."""
 
     rig: Rig
     silhouettes: tuple[Silhouettes, ...]
-    """One for each camera, in which the person is tracked."""
+    """For each camera, the silhouettes used for tracking."""
     clean: tuple[Silhouettes, ...]
-    """Those in which the person is measured; the same if these are clean."""
+    """For each camera, the silhouettes used for measuring the person; the same as `silhouettes` if these are clean."""
     first: FirstSeconds
-    """In clean silhouettes."""
+    """Silhouettes of the beginning, made by `clean`."""
     look: Look | RigLook
 
     def check(self) -> None:
@@ -140,5 +140,5 @@ class Survey:
             raise TrackingError(f"{self.look.recording}: {self.look.refusal}")
 
     def look_with(self, person: dict[str, Any], doubts: tuple[str, ...]) -> Look | RigLook:
-        """The look with the fitted person, and the doubts that the fit raises."""
+        """A copy of `look` with the fitted person and the doubts about the fit."""
         return replace(self.look, person=person, doubts=(*self.look.doubts, *doubts))

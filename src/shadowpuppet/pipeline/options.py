@@ -25,9 +25,9 @@ TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
 TRACKERS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
     "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings)}  # fmt: skip
-"""Tables of the trackers' settings, with their presets and what makes them."""
+"""For each tracker's table of settings: its presets, and the function that makes the settings."""
 PATHS = ("calibration", "background", "person", "prior")
-"""Options that are files; relative to the file of settings that names them."""
+"""Options that are file names, relative to the folder of the settings file that contains them."""
 
 
 def _corners(value: object) -> object:
@@ -38,7 +38,7 @@ def _corners(value: object) -> object:
 
 
 def _metres(limits: tuple[float, float]) -> WrapValidator:
-    """A validator whose error names the possible lengths in metres."""
+    """A validator of lengths; its error states the limits in metres."""
 
     def check(value: Any, handler: Callable[[Any], Any]) -> Any:
         try:
@@ -56,7 +56,7 @@ class Options:
     preset: str = "default"
     """Settings to start from: default (best results), liu2011 (the paper's, one camera) or ni2008 (the paper's, several cameras)."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the random numbers: the same seed gives the same run."""
+    """Seed of the random numbers; the same seed gives the same run."""
     height: Annotated[float, Field(ge=HEIGHTS[0], le=HEIGHTS[1]), _metres(HEIGHTS)] | None = None
     """Height of the person with shoes, metres. Overrides recording.toml."""
     distance: Annotated[float, Field(ge=DISTANCES[0], le=DISTANCES[1]), _metres(DISTANCES)] | None = None
@@ -66,8 +66,8 @@ class Options:
     person: Path | None = None
     """Sizes of the person, saved by an earlier run or by `fit-person` (person.toml)."""
     prior: Path | None = None
-    """Motion prior saved by `fit-prior` (.npz), for several cameras. By default it is learnt from the recording's training motion, if it
-    has any."""
+    """Motion prior saved by `fit-prior` (.npz), for several cameras. By default it is learnt from the recording's training motion, if there
+    is any."""
     fov: Annotated[float, Field(gt=0, lt=180)] | None = None
     """Horizontal field of view, degrees, of a camera without calibration."""
     calibration: Path | None = None
@@ -83,7 +83,7 @@ class Options:
     max_size: Annotated[int, Field(ge=64, le=8192)] = 640
     """Longest side of a frame, pixels; larger frames are scaled down."""
     every: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Every Nth frame is tracked; saves time with films of a high frame rate."""
+    """Only every Nth frame is tracked, which saves time with films of a high frame rate."""
     overlay: bool = False
     """Also write overlay.mp4: model, matching result and raw picture, one below the other."""
     tracker: MonocularSettings = MonocularSettings()
@@ -99,7 +99,7 @@ class Options:
 
 
 def make_options(values: Mapping[str, Any] | None = None, source: str = "settings") -> Options:
-    """Options from plain values, as in TOML; tables may be partial and go on top of the preset. Raises `SettingsError`."""
+    """Options from plain values, as in TOML; tables may be partial and override the preset. Raises `SettingsError`."""
     values = dict(values or {})
     for table in TABLES:
         if not isinstance(values.get(table, {}), Mapping):
@@ -134,7 +134,7 @@ def settings_in(data: Mapping[str, Any], path: Path, source: str | None = None) 
 
 
 def plain_options(options: Options) -> dict[str, Any]:
-    """Options as `make_options` and TOML take them, without those that are None and with absolute file names."""
+    """Options as plain values for `make_options` or TOML; those that are None are left out, file names are absolute."""
     values = {key: value for key, value in plain_values(options).items() if value is not None}
     return values | {key: str(Path(values[key]).resolve()) for key in PATHS if key in values}
 

@@ -1,4 +1,4 @@
-"""Overlay of several cameras: a grid of their images with the model and the silhouettes' outlines."""
+"""Draws the overlay of several cameras: a grid of their images with the model and the silhouettes' outlines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHOWN = 0.55
 
 
 def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Picture]) -> Image:
-    """A tile for each camera, with the model in its pose and the silhouette's outline: (H, W, 3), blue green red.
+    """An image (H, W, 3), blue green red, with a tile for each camera that shows the model in its pose and the silhouette's outline.
 
     `pictures`: the body as each camera sees it. A camera without a frame is black; without a pose no model is drawn.
     """
@@ -38,7 +38,8 @@ def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Pictur
 
 
 def grid_of(sizes: Sequence[tuple[int, int]]) -> tuple[int, int, tuple[int, int]]:
-    """Columns, rows and the tiles' size (width, height) for cameras of these sizes; even numbers, as films need."""
+    """Numbers of columns and rows, and the tiles' size (width, height), for cameras of these sizes. Width and height are even, as videos
+    need."""
     wide, high = max(size[0] for size in sizes), max(size[1] for size in sizes)
     columns = min(range(1, len(sizes) + 1), key=lambda n: abs(np.log(n * wide / (-(-len(sizes) // n) * high) / (WIDEST / TALLEST))))
     rows = -(-len(sizes) // columns)

@@ -1,4 +1,4 @@
-"""The person before one camera: sizes and place from a file, from reference pictures, or from the film itself (Liu 2011, Algorithm 1)."""
+"""Fits the person in the film of one camera: sizes and place from a file, reference pictures, or the film (Liu 2011, Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -32,29 +32,30 @@ from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.video import Image
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
-"""Overlap (intersection over union) of the fitted body and a reference's silhouette under which it does not show its posture..."""
+"""Overlap (intersection over union) of the fitted body and a reference's silhouette below which the reference shows another posture."""
 DOUBTFUL = {"front_t_pose": 0.78, "side_arms_hanging": 0.68, "front_arms_t_pose": 0.78}
-"""... or may not. Right ones have 0.85 to 0.94, from the side 0.72 to 0.89."""
+"""Overlap below which the reference may show another posture. Correct ones have 0.85 to 0.94, from the side 0.72 to 0.89."""
 SEEN = 0.6
-"""Share of a level forearm that lies in the silhouette, under which the arms were not level: sizes can hide a wrong posture..."""
+"""Share of the level forearms inside the silhouette below which the arms were not level: fitted sizes can hide a wrong posture."""
 BESIDE = 0.03
-"""... or this far beside it, as a share of the root of its area: in small pictures an arm may lack one side."""
+"""Distance by which the silhouette is dilated for this test, over the square root of its area: in small pictures one side of an arm may
+be missing."""
 DEEP = 1.2
-"""Depth of the fitted trunk over its width from which on it was not seen from the side; right ones have 0.75 to 0.82."""
+"""Ratio of the fitted trunk's depth to its width above which it was not seen from the side; correct ones have 0.75 to 0.82."""
 BROAD = 0.33
-"""Width of the fitted trunk's lower edge over the height from which on it was fitted to more than a person. Right ones have 0.13 to 0.2,
-the broadest of people (ANSUR II; Gordon et al. 2014) 0.27."""
+"""Ratio of the fitted trunk's lower width to the height above which the silhouette contains more than a person. Correct ones have 0.13 to
+0.2, the broadest people (ANSUR II; Gordon et al. 2014) 0.27."""
 POOR = 0.75
-"""Overlap with the film's first silhouette under which the body is in doubt; bodies that fit have 0.85 to 0.95."""
+"""Overlap with the film's first silhouette below which the body is in doubt; bodies that fit have 0.85 to 0.95."""
 LONGEST_REFERENCE = 60
-"""Frames of a reference's film that are looked at."""
+"""Greatest number of frames read from a reference's film."""
 LOOKED_FOR_IN = 12
-"""Masks of the first seconds in which a person without references is looked for."""
+"""Number of masks of the first seconds used to fit a person without references."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MonocularSubject(TrackedSubject):
-    """A person before one camera."""
+    """A fitted person seen by one camera, and the tracker."""
 
     fit: SizeFit
     """Sizes and place, and how they were found."""
@@ -62,7 +63,7 @@ class MonocularSubject(TrackedSubject):
 
     @classmethod
     def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str) -> MonocularSubject:
-        """The person of a fit; `source`: where the sizes come from, in words."""
+        """A subject from a fit; `source`: where the sizes come from, in words."""
         picture = fit.guess.picture(camera, settings.body)
         person = Person(fit.guess.sizes, round(fit.guess.height, 4), source)
         return cls(body=picture.body, person=person, fit=fit, tracker=MonocularTracker(picture, settings), summary={})
@@ -79,7 +80,7 @@ class MonocularSubject(TrackedSubject):
         return mask
 
     def next_state(self, rng: np.random.Generator, state: State | None, observation: Mask) -> State | None:
-        """The state after a mask; None before the first that is not empty."""
+        """The tracker's state after a mask; None before the first mask that is not empty."""
         if state is None:
             return self.tracker.start(rng, observation) if observation.any() else None
         return self.tracker.step(rng, state, observation)
@@ -98,8 +99,8 @@ class MonocularSubject(TrackedSubject):
 
 
 def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) -> MonocularSubject:
-    """The person's sizes and place. Raises `TrackingError` where nobody is found, `RecordingError` where a reference shows another posture,
-    or `FormatError`."""
+    """Fit the person's sizes and place, and make the tracker. Raises `TrackingError` if no person is found, `RecordingError` if a reference
+    shows another posture, or `FormatError`."""
     for_fit, for_start = rng.spawn(2)
     (footage,), (clean,), masks = survey.rig.footage, survey.clean, [mask for (mask,) in survey.first.masks if mask is not None]
     if not masks:
@@ -119,7 +120,7 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
 
 
 def _doubts(fit: SizeFit, source: str, start: float) -> list[str]:
-    """What speaks against a fit; `start`: overlap of the body, in the best pose found, with the film's first silhouette."""
+    """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette."""
     doubts = [f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
               "is the silhouette whole? take it again, or remove it" for name, overlap in fit.overlaps.items()
               if source == "references" and overlap < DOUBTFUL[name]]
@@ -148,12 +149,12 @@ def _fitted(footage: Footage, masks: list[Mask], silhouettes: Silhouettes, optio
 
 
 def _few(masks: list[Mask]) -> list[Mask]:
-    """Some of the masks of the first seconds, spread."""
+    """At most `LOOKED_FOR_IN` of the masks, evenly spread."""
     return [masks[k] for k in np.unique(np.linspace(0, len(masks) - 1, LOOKED_FOR_IN).astype(int))]
 
 
 def _references(footage: Footage, silhouettes: Silhouettes) -> dict[str, Mask]:
-    """Masks of the reference postures; with ready masks those that have one."""
+    """Masks of the reference postures, by name; if ready silhouettes are used, only of references that have a mask."""
     given = [r for r in footage.recording.references if silhouettes.segmenter is not None or r.mask is not None]
     found = {reference.name: _reference(footage, silhouettes, reference) for reference in given}
     return {name: found[name] for name in POSTURES if name in found}
@@ -166,7 +167,7 @@ def _reference(footage: Footage, silhouettes: Silhouettes, reference: Reference)
         masks = [silhouettes(CameraFrame(0.0, image, image)) for image in images]
     except SilhouetteError as error:
         raise RecordingError(f"{path}: {error}") from None
-    middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # in a film of the posture, whoever walks in is in few frames
+    middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # few frames of a film show the person walking in
     if not may_be_person(middle):
         covers = f"the silhouette covers {100 * middle.mean():.0f} % of the picture"
         found = covers if middle.any() else "the silhouette is empty"
@@ -176,7 +177,7 @@ def _reference(footage: Footage, silhouettes: Silhouettes, reference: Reference)
 
 
 def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: SizeFit) -> None:
-    """Raise `RecordingError` where a reference shows another posture than its name says."""
+    """Raise `RecordingError` if a reference shows another posture than its name says."""
     paths = {reference.name: reference.image for reference in footage.recording.references}
     for (name, mask), pose in zip(masks.items(), fit.poses):
         if (wrong := wrong_posture(footage.camera, mask, name, fit, pose)) is not None:
@@ -184,7 +185,7 @@ def _check_postures(footage: Footage, masks: Mapping[str, Mask], fit: SizeFit) -
 
 
 def wrong_posture(camera: Camera, mask: Mask, name: str, fit: SizeFit, pose: Array) -> str | None:
-    """What shows that a reference's mask (H, W) does not have its posture, after the fit with `pose` (D,); None where nothing does."""
+    """Evidence, in words, that a reference's mask (H, W) shows another posture, given the fit with `pose` (D,); None if there is none."""
     sizes = fit.guess.sizes
     assert isinstance(sizes, CardboxSizes)
     if fit.overlaps[name] < WRONG[name]:
@@ -200,8 +201,7 @@ def wrong_posture(camera: Camera, mask: Mask, name: str, fit: SizeFit, pose: Arr
 
 
 def _forearms_seen(camera: Camera, mask: Mask, guess: PersonEstimate, pose: Array) -> float:
-    """Share of the lines from the elbows to the wrists that lies in a mask (H, W), or `BESIDE` it, of what is in the picture; 1 where
-    nothing is."""
+    """Share of the elbow-wrist lines inside a mask (H, W) dilated by `BESIDE`; only points in the picture count, 1 if there are none."""
     import cv2
 
     mask = cv2.dilate(mask.astype(np.uint8), disc(max(1, round(BESIDE * mask.sum() ** 0.5)))) > 0

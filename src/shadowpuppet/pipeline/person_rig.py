@@ -1,5 +1,5 @@
-"""The person before several cameras: sizes from a file, from training motion or from a height, refined on the first seconds; a motion
-prior; the tracker."""
+"""Fits the person in the films of several cameras, and makes the tracker: sizes from a file, training motion or a height, refined on the
+first seconds; a motion prior."""
 
 from __future__ import annotations
 
@@ -34,28 +34,28 @@ from shadowpuppet.video import Image
 
 
 class HullObservation(NamedTuple):
-    """What several cameras show of the person."""
+    """The multiview tracker's observation of one frame set."""
 
     points: SurfacePoints
-    """On the visual hull."""
+    """Surface points of the visual hull."""
     masks: Sequence[Mask | None]
     people: int
-    """Number of cameras whose silhouette may be a person's."""
+    """Number of cameras in which the silhouette may be a person's."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MultiviewSubject(TrackedSubject):
-    """A person before several cameras."""
+    """A fitted person seen by several cameras, and the tracker."""
 
     tracker: MultiviewTracker
     hull: VisualHull
 
     def observe(self, masks: Sequence[Mask | None]) -> HullObservation:
-        """Surface points and the masks that they come from."""
+        """Surface points of the visual hull of the masks, and the masks."""
         return HullObservation(self.hull.points(masks), masks, sum(mask is not None and may_be_person(mask) for mask in masks))
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
-        """Observations of frame sets: the next is made by another thread while one is tracked."""
+        """Observations of frame sets; another thread makes the next one while one is tracked."""
         source = super().observations(frames)
         with ThreadPoolExecutor(1, "hull") as thread:
             coming = thread.submit(next, source, None)
@@ -64,14 +64,17 @@ class MultiviewSubject(TrackedSubject):
                 yield observed
 
     def next_state(self, rng: np.random.Generator, state: MultiviewState | None, observation: HullObservation) -> MultiviewState | None:
-        """The state after an observation; None while nobody is seen, after which the person is searched for again."""
+        """The tracker's state after an observation; None while no person is visible.
+
+        After None the first pose is searched for again, once two cameras see a person.
+        """
         points, masks, people = observation
         if people == 0 or (state is None and people < 2):
             return None
         return self.tracker.start(rng, points, masks) if state is None else self.tracker.step(rng, state, points, masks)
 
     def unfound(self, observation: HullObservation) -> str:
-        """Lost if one camera still shows somebody, else absent."""
+        """`lost` if a camera still sees a person, else `absent`."""
         return "lost" if observation.people else "absent"
 
     def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
@@ -85,8 +88,8 @@ class MultiviewSubject(TrackedSubject):
 
 
 def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) -> MultiviewSubject:
-    """The person's sizes from the first seconds, and the tracker. Raises a `ShadowPuppetError` where nobody is found, or a file does not
-    fit."""
+    """Fit the person's sizes to the first seconds, and make the tracker. Raises a `ShadowPuppetError` if no person is found, or a file is
+    not usable."""
     rig, recording = survey.rig, survey.rig.recording
     check_body(options)
     training = None if recording.training is None else read_motion(recording.training)
@@ -95,7 +98,8 @@ def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) ->
 
 def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], options: Options,
                  rate: float, height: float | None = None, training: JointTable | None = None) -> MultiviewSubject:
-    """The person that the `cameras` show in some `views` (masks by time), tracked at `rate` frames/s. Raises as `fit_multiview`."""
+    """Fit the person to `views`, masks by time and camera, and make the tracker for `rate` frames/s. Raises the errors of
+    `fit_multiview`."""
     settings = options.multiview
     hull = VisualHull(cameras, settings.hull)
     known = familiar(rng, options, training, settings.body, rate)

@@ -1,4 +1,4 @@
-"""What every run reports: progress, the time of each stage, measures at its end."""
+"""Reports of a run: progress, the time of each stage, the metrics at its end."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ Item = TypeVar("Item")
 STAGES = ("decode", "segment", "wait", "hull", "track", "write")
 """Stages of a frame. Several cameras' films are decoded and segmented in parallel: their sum is not what the tracker waits for, `wait`."""
 FALLBACK_RATE = 25.0
-"""Frames/s of an overlay whose film does not state its own."""
+"""Frames/s of an overlay if the film does not state its rate."""
 MANY_LOST = 0.1
-"""Share of lost frames from which on a run is in doubt."""
+"""Share of lost frames above which a warning is given."""
 
 
 class Listener:
-    """Is notified of a run's progress, and does nothing: derive from it."""
+    """Receives a run's progress. Every method does nothing: override those of interest."""
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """A phase begins: `looking` or `tracking`; `total`: its frames, if known."""
+        """A phase begins: `looking` or `tracking`; `total`: its number of frames, if known."""
 
     def advance(self, frames: int) -> None:
         """`frames` frames are tracked."""
 
     def look(self, look: Look | RigLook) -> None:
-        """The look is done; tracking follows."""
+        """The examination of the recording is done; tracking follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +57,18 @@ class Summary:
 
 @dataclass
 class StageTimer:
-    """Seconds by stage."""
+    """Adds up seconds by stage."""
 
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
 
     def add(self, **seconds: float) -> None:
-        """Count times that were measured elsewhere."""
+        """Add seconds that were measured elsewhere."""
         for stage, value in seconds.items():
             self.seconds[stage] += value
 
     @contextlib.contextmanager
     def time(self, stage: str) -> Iterator[None]:
-        """Count the time of a `with` block."""
+        """Add the time of a `with` block to a stage."""
         start = time.perf_counter()
         try:
             yield
@@ -76,7 +76,7 @@ class StageTimer:
             self.seconds[stage] += time.perf_counter() - start
 
     def each(self, stage: str, items: Iterable[Item]) -> Iterator[Item]:
-        """Pass items on, and count the time of making them."""
+        """Pass items on, and add the time of making them to a stage."""
         source = iter(items)
         while True:
             with self.time(stage):
@@ -97,7 +97,7 @@ def generators(options: Options) -> list[np.random.Generator]:
 
 
 def tracked(frames: int | None, every: int) -> int | None:
-    """Number of a film's frames that are tracked; None where it is not known."""
+    """Number of tracked frames of a film with `frames` frames; None if that is unknown."""
     return None if frames is None else -(-frames // every)
 
 
@@ -118,11 +118,11 @@ def warn_of_losses(motion: Motion) -> None:
 
 
 def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
-    """Measures of a motion, against the recording's truth if there is one that fits; depths are those of a single camera."""
+    """Metrics of a motion, with errors if the recording has a matching ground truth; a single camera defines the depth direction."""
     camera, cameras = None if rig.is_multiview else rig.cameras[0], len(rig.cameras)
     try:
         truth = read_truth(rig.recording.truth, motion.joint_names) if rig.recording.truth is not None else None
         return evaluate(motion, truth, camera=camera, cameras=cameras)
-    except ShadowPuppetError as error:  # the run is done: it is not to be lost over this
+    except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
         warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)
         return evaluate(motion, camera=camera, cameras=cameras)

@@ -27,14 +27,14 @@ from shadowpuppet.video.frames import ASSUMED_RATE
 NEAR = 0.55
 """Largest offset of a frame from the time of its set, over the sets' interval: half, and a little for jittering clocks."""
 LATE = 5
-"""Sets without a frame of a camera whose film is over, after which that is said: films rarely end with the same frame."""
+"""Number of sets without a frame of a camera after which the end of its film is reported: films rarely end with the same frame."""
 
 Segment = Callable[[CameraFrame], Mask]
-"""Makes a camera's silhouettes, such as `Silhouettes`."""
+"""Makes the mask (H, W) of a camera's frame, as `Silhouettes` does."""
 
 
 class FrameSet(NamedTuple):
-    """Frames of all cameras at one time, in the rig's order; None for a camera without one."""
+    """Frames of all cameras at one time, in the rig's order; None for a camera without a frame."""
 
     time: float
     """Seconds of the recording."""
@@ -62,7 +62,7 @@ class Rig:
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
-        """For images of the size that is worked on."""
+        """The cameras for images of the working size."""
         return tuple(footage.camera for footage in self.footage)
 
     @property
@@ -83,24 +83,25 @@ class Rig:
 
     @property
     def count(self) -> int | None:
-        """Number of sets; None where the films do not state their lengths."""
+        """Number of sets; None if the films do not state their lengths."""
         counts = [footage.count for footage, rate in zip(self.footage, self.rates) if rate == self.rate]
         return max((count for count in counts if count is not None), default=None)
 
     @cached_property
     def leaders(self) -> tuple[int, ...]:
-        """Cameras whose clock sets the sets' times, the first of them that still has frames: of the middle rate, others after them.
+        """Indices of the cameras, in order of preference for setting the times of the sets; the first that still has frames does. Cameras
+        of the median rate come first.
 
-        At a faster camera's clock the slower ones would be missing from every second set; a slower one's would waste frames.
+        With a faster camera, slower ones would be missing from many sets; with a slower one, frames would be wasted.
         """
         middle = sorted(self.rates)[(len(self.rates) - 1) // 2]
         return tuple(sorted(range(len(self.rates)), key=lambda n: round(abs(self.rates[n] / middle - 1), 1)))
 
 
 def open_rig(path: str | Path, options: Options) -> Rig:
-    """The cameras of a recording: all, or those that `options.camera` names.
+    """Open the cameras of a recording: all, or those that `options.camera` names.
 
-    Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError` where something cannot be used.
+    Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError` if something cannot be used.
     """
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
@@ -112,14 +113,14 @@ def open_rig(path: str | Path, options: Options) -> Rig:
 
 
 def read_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1) -> Generator[FrameSet]:
-    """Every `every`-th frame set with its silhouettes: one camera's frames in turn, several cameras' by `synchronized_frames`."""
+    """Every `every`-th frame set with its silhouettes; frames of several cameras are aligned by `synchronized_frames`."""
     if rig.is_multiview:
         return synchronized_frames(rig, segment, ready=ready, every=every)
     return _single_frames(rig, segment[0], ready, every)
 
 
 def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Generator[FrameSet]:
-    """One camera's frames. Errors of the film are raised: nothing else could go on."""
+    """One camera's frames. Raises the film's errors, as no other camera remains."""
     frames = islice(rig.footage[0].frames(ready), 0, None, every)
     while True:
         start = time.perf_counter()
@@ -132,12 +133,17 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
 
 def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1,
                         threads: int | None = None) -> Generator[FrameSet]:
-    """All cameras' frames, set by set, with their silhouettes by `segment` (one for each camera).
+    """Synchronized frame sets of all cameras with their silhouettes.
 
-    A set has of each camera the frame nearest to its time, within half the sets' interval. A camera whose film breaks off or ends is
-    missing from there on, which is said once. `ready`: read the recording's ready silhouettes, too. `every`: only every `every`-th set
-    is segmented and given. The next set is made by `threads` (default: the processor's cores less one, which tracks) while the last is
-    used; the sets do not depend on their number.
+    Each set contains each camera's frame nearest to its time, within about half the sets' interval (`NEAR`). A camera is missing from the
+    sets after its film breaks off or ends, which is reported once.
+
+    Args:
+        segment: makes the silhouettes, one function for each camera.
+        ready: also read the recording's ready silhouettes.
+        every: segment and return only every `every`-th set.
+        threads: number of threads that make the next set while the last one is used; by default one less than the processor's cores. The
+            sets do not depend on it.
     """
     readers = [CameraReader(footage, one, ready) for footage, one in zip(rig.footage, segment)]
     leaders, step = rig.leaders, 1 / rig.rate
@@ -168,7 +174,7 @@ class _Part(NamedTuple):
 
 
 class CameraReader:
-    """Reads one camera's film; `next` is the frame that was read last and belongs to no set yet. Used by one thread at a time."""
+    """Reads one camera's film; `next` is the frame read last, not yet part of a set. Used by one thread at a time."""
 
     def __init__(self, footage: Footage, segment: Segment, ready: bool) -> None:
         """Nothing is read yet."""
@@ -186,7 +192,7 @@ class CameraReader:
             self.next, self.trouble = None, str(error)
 
     def take(self, moment: float, reach: float, leads: bool, wanted: bool) -> _Part:
-        """The frame nearest to a moment (s), within reach (s), of the leading camera the next; with its silhouette if `wanted`."""
+        """The frame nearest to time `moment` (s), at most `reach` (s) away, or the next if this camera `leads`; its mask if `wanted`."""
         start = time.perf_counter()
         best = self._pop() if leads else self._nearest(moment, reach)
         decoded = time.perf_counter()
@@ -209,17 +215,17 @@ class CameraReader:
             return None
         best = self._pop()
         while best is not None and self.next is not None and abs(self.next.time - moment) < abs(best.time - moment):
-            best = self._pop()  # what is farther waits: it may belong to the next set
+            best = self._pop()  # the frame farther away is kept: it may belong to the next set
         return best
 
 
 def _begin(pool: ThreadPoolExecutor, readers: Sequence[CameraReader], leaders: Sequence[int], step: float, last: float = -math.inf,
            wanted: bool = True):
-    """Start the set after the one at `last` (s): its time and the futures of its parts; None where no camera has a frame left."""
+    """Start the set after the one at `last` (s); returns its time and the futures of its parts, or None if no camera has a frame left."""
     for leader in leaders:
         reader = readers[leader]
         while leader != leaders[0] and reader.next is not None and reader.next.time <= last + NEAR * step:
-            reader.advance()  # between two sets of the leader before it
+            reader.advance()  # frames between two sets of the previous leader
         if reader.next is not None:
             moment = reader.next.time
             return moment, [pool.submit(reader.take, moment, NEAR * step, n == leader, wanted) for n, reader in enumerate(readers)]
@@ -227,7 +233,7 @@ def _begin(pool: ThreadPoolExecutor, readers: Sequence[CameraReader], leaders: S
 
 
 def _warn_of_ends(readers: Sequence[CameraReader], moment: float, step: float) -> None:
-    """Warn, once for each camera, that it has no more frames where others have."""
+    """Warn, once for each camera, that it has no more frames while others have."""
     for reader in readers:
         if reader.next is None and not reader.warned and (reader.trouble or moment > reader.last + LATE * step):
             reader.warned = True

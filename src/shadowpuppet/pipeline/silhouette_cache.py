@@ -1,6 +1,6 @@
-"""Surveys and silhouettes of a recording, kept from one run to the next.
+"""Cache of a recording's survey and silhouettes, kept from one run to the next.
 
-They depend on neither the seed nor the tracker, and are the greater part of the work of runs that are repeated with other seeds.
+They depend on neither the seed nor the tracker, and take most of the time of runs that are repeated with other seeds.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 
 SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "max_size", "every", "silhouette")
-"""Options that survey and silhouettes depend on."""
+"""Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
-"""Bytes of silhouettes that are kept, a bit a pixel: half an hour of one camera's 25 frames/s at 320 x 240."""
+"""Greatest size of the kept silhouettes, bytes, at a bit a pixel: half an hour of one camera's 25 frames/s at 320 x 240."""
 
 
 def film_of(recording: str | Path, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What two runs must have in common to share silhouettes; `settings`: plain values, as of `plain_options`."""
+    """Recording and options that must be equal for two runs to share silhouettes; `settings`: plain values, as from `plain_options`."""
     return {"recording": str(Path(recording).resolve()), **{name: settings.get(name) for name in SHARED}}
 
 
 @dataclass
 class MaskStore:
-    """The silhouettes of a recording's frame sets, in order, packed to bits; none of them once they exceed the limit."""
+    """Masks of a recording's frame sets, in order, packed to bits; emptied once they exceed the limit."""
 
     limit: int = LIMIT
-    """Bytes."""
+    """Greatest size, bytes."""
     size: int = 0
-    """Bytes."""
+    """Size of the stored masks, bytes."""
     complete: bool = False
     """Whether all frame sets of the recording are stored."""
     sets: list[tuple[float, list[tuple[NDArray[np.uint8], tuple[int, ...]] | None]]] = field(default_factory=list)
-    """Times (s), and of each camera bits and shape."""
+    """For each set its time (s) and, for each camera, the packed mask and its shape (H, W); None for a camera without a mask."""
 
     def add(self, time: float, masks: Sequence[Mask | None]) -> None:
         """Store one frame set's masks."""
@@ -70,14 +70,14 @@ class SilhouetteCache:
     """Keeps the survey and the silhouettes of one recording at a time. Not for several threads."""
 
     def __init__(self, limit: int = LIMIT) -> None:
-        """`limit`: bytes of silhouettes that are kept; those of longer films are made again."""
+        """`limit`: greatest size of the kept silhouettes, bytes; those of longer films are not kept."""
         self.limit = limit
         self._film: dict[str, Any] | None = None
         self._survey: Survey | None = None
         self._store = MaskStore(limit)
 
     def survey(self, rig: Rig, options: Options, make: Callable[[Rig, Options], Survey]) -> Survey:
-        """The kept survey, or the one that `make` makes."""
+        """The kept survey, or a new one from `make`."""
         film = film_of(rig.recording.path, plain_options(options))
         if self._survey is None or film != self._film:
             self.forget()
@@ -85,11 +85,11 @@ class SilhouetteCache:
         return self._survey
 
     def is_complete(self, options: Options) -> bool:
-        """Whether the surveyed recording's silhouettes are kept. With an overlay, which shows the images, they are made again."""
+        """Whether all silhouettes of the surveyed recording are kept and can be used; not with an overlay, which needs the images."""
         return self._store.complete and not options.overlay
 
     def frames(self, frames: Generator[FrameSet], options: Options) -> Generator[FrameSet]:
-        """The kept frame sets without images, or `frames`, which are kept."""
+        """The kept frame sets, without images, if they are complete; else `frames`, whose masks are then kept."""
         if self.is_complete(options):
             yield from self._store
         else:
@@ -97,5 +97,5 @@ class SilhouetteCache:
             yield from self._store.stored(frames)
 
     def forget(self) -> None:
-        """Drop what is kept."""
+        """Discard survey and silhouettes."""
         self._film, self._survey, self._store = None, None, MaskStore(self.limit)

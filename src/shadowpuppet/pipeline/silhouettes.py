@@ -23,10 +23,11 @@ class Silhouettes:
     source: str
     """Where the silhouettes come from, in words."""
     segmenter: Segmenter | None
-    """None for ready silhouettes."""
+    """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
+    """Rows and columns outside which masks are empty; None for all."""
     blank: Image | None = None
-    """Image of the empty scene, which replaces what is outside the region."""
+    """Image of the empty scene, which replaces the image outside the region."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
@@ -35,13 +36,13 @@ class Silhouettes:
         return self._within(self.segmenter(self.visible(frame.image)))
 
     def plain(self, frame: CameraFrame) -> Mask | None:
-        """The mask by eq. 1 alone; None where the background has no standard deviation."""
+        """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
         if self.segmenter is None or self.segmenter.background.frames < 2:
             return None
         return self._within(self.segmenter.raw(frame.image))
 
     def visible(self, image: Image) -> Image:
-        """An image with the empty scene outside the region, so that nothing there is taken for the person."""
+        """A copy of an image with the empty scene outside the region, so that nothing there is taken for the person."""
         if self.region is None or self.blank is None:
             return image
         out = self.blank.copy()
@@ -80,7 +81,7 @@ def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
 def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
     """Silhouettes for measuring a person: the `tracked` ones if these are clean, otherwise clean ones.
 
-    A filter finds a body among specks and holes once its sizes are known; sizes and postures cannot be found in them.
+    Once sizes are known, the particle filter tolerates specks and holes; estimating sizes and first poses needs clean masks.
     """
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
@@ -89,7 +90,7 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
 
 
 def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
-    """Settings of silhouettes for measuring a person: those asked for if they make clean ones."""
+    """Silhouette settings for measuring a person: `asked` if these give clean silhouettes, otherwise changed so that they do."""
     if asked.method == "averaging":
         return SilhouetteSettings()
     return asked if asked.cleaned else replace(asked, clean=None)

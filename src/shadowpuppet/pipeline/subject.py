@@ -23,11 +23,11 @@ from shadowpuppet.video import Image
 
 
 class TrackerState(Protocol):
-    """What a run needs of a tracker's state."""
+    """Interface that a run needs of a tracker's state."""
 
     @property
     def pose(self) -> Array:
-        """The estimate, of shape (D,)."""
+        """The estimated pose (D,)."""
         ...
 
     @property
@@ -42,17 +42,17 @@ class TrackerState(Protocol):
 
     @property
     def overlap(self) -> float:
-        """Mean intersection over union of the drawn estimate and the silhouettes; NaN where it was not computed."""
+        """Mean intersection over union of the projected estimate and the silhouettes; NaN if it was not computed."""
         ...
 
 
 class Observed(NamedTuple):
-    """A frame set and what a tracker is given of it."""
+    """A frame set and the tracker's observation of it."""
 
     frames: FrameSet
     observation: Any
     seconds: float = 0.0
-    """What making the observation took."""
+    """Time taken to make the observation."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,11 +61,11 @@ class TrackedSubject(ABC):
 
     body: Body
     person: Person
-    """What can be used again: person.toml."""
+    """Sizes that other runs can use, written to person.toml."""
     summary: dict[str, Any]
-    """How the person was fitted, plain values: `person` of look.json."""
+    """How the person was fitted, as plain values: the entry `person` of look.json."""
     doubts: tuple[str, ...] = ()
-    """What may harm the run, a sentence each."""
+    """Doubts about the fit, a sentence each."""
 
     @abstractmethod
     def observe(self, masks: Sequence[Mask | None]) -> Any:
@@ -73,11 +73,11 @@ class TrackedSubject(ABC):
 
     @abstractmethod
     def next_state(self, rng: np.random.Generator, state: Any, observation: Any) -> Any:
-        """The tracker's state after an observation; None before the person is found."""
+        """The tracker's state after an observation; None while there is no person."""
 
     @abstractmethod
     def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
-        """A frame of overlay.mp4, blue green red."""
+        """A frame of overlay.mp4, (H, W, 3), blue green red."""
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
         """Observations of frame sets, one after another."""
@@ -87,7 +87,7 @@ class TrackedSubject(ABC):
             yield Observed(each, observation, time.perf_counter() - start)
 
     def unfound(self, observation: Any) -> str:
-        """Status of a frame for which there is no state."""
+        """Status of a frame without a state: `lost` or `absent`."""
         return "absent"
 
     def points(self, pose: Array) -> Array:
@@ -96,12 +96,12 @@ class TrackedSubject(ABC):
 
     @cached_property
     def joint_columns(self) -> list[int]:
-        """Indices of the landmarks that a run keeps."""
+        """Indices of the landmarks that a run writes as joints."""
         return [self.body.landmark_names.index(name) for name in joint_names(self.body)]
 
 
 def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | None, observation: Any = None) -> MotionFrame:
-    """A tracker's state as a run keeps it, without a pose if the person is lost or absent."""
+    """The motion of one frame from a tracker's state, without a pose if the person is lost or absent."""
     if state is None:
         return MotionFrame(seconds, subject.unfound(observation))
     if state.status in BLANK:
@@ -111,10 +111,10 @@ def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | 
 
 
 def joint_names(body: Body) -> list[str]:
-    """Names of the landmarks that a run keeps as joints."""
+    """Names of the landmarks that a run writes as joints."""
     return [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
 
 
 def average_body(name: str) -> Body:
-    """A body of average sizes, for its names."""
+    """A body model of average sizes, used before the person's sizes are known."""
     return make_body(name, average_sizes(name, AVERAGE_HEIGHT))

@@ -1,4 +1,4 @@
-"""The look before a run: silhouettes of every camera's film, their quality, and what may harm the run."""
+"""Examines a recording before a run: silhouettes of each camera's film, their quality, and doubts about the run."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
 
 UNEVEN = 0.1
-"""Jitter of the frames' interval, as a share of it, from which on the film's rate varies."""
+"""Jitter over the frame interval above which the film's rate counts as variable."""
 GOOD = 0.9
-"""Overlap with exact silhouettes under which segmentation is in doubt."""
+"""Overlap with ready silhouettes below which the segmentation is in doubt."""
 OPENING, OPENED = 2.0, 40
-"""With several cameras: the first seconds in which the person is measured, and at most how many frame sets of them are kept."""
+"""With several cameras: duration (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
 BRIEFLY = 240
-"""With several cameras: frames of each film that are looked at if its background need not be made from it."""
+"""With several cameras: greatest number of frames read of each film if its background is not made from the film."""
 RATES, LENGTHS = 0.02, 0.1
-"""Relative difference of rates, and difference of lengths (s), from which on films are said to differ."""
+"""Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
 
 
 class FilmSurvey(NamedTuple):
-    """What was found in one camera's film."""
+    """Result of examining one camera's film: its sample, silhouettes and findings."""
 
     sample: Sample
     silhouettes: Silhouettes
     masks: list[Mask]
     """Silhouettes of the sample's frames."""
     exact: list[Mask]
-    """The recording's ready silhouettes of the same frames; empty where these are used, or there are none."""
+    """The recording's ready silhouettes of the same frames; empty if there are none, or if `silhouettes` are these."""
     values: dict[str, Any]
     """The fields that `Look` and `CameraLook` have in common."""
 
 
 def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) -> FilmSurvey:
-    """Look at one camera's first `longest` frames. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Examine one camera's first `longest` frames. Raises a `ShadowPuppetError` if something cannot be used."""
     sample = take_sample(footage, options.masks, longest)
     silhouettes = learn_silhouettes(footage, sample, options)
     runs = [[silhouettes(frame) for frame in run] for run in sample.runs]
@@ -67,7 +67,7 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
 
 
 def brief_length(footage: Footage, options: Options) -> int:
-    """Frames of one of several cameras that are looked at: no more than its background needs."""
+    """Number of frames to read of one of several cameras: more if the background is made from its film."""
     return LOOKED_AT if footage.view.background is None and not options.masks else BRIEFLY
 
 
@@ -75,7 +75,7 @@ def brief_length(footage: Footage, options: Options) -> int:
 
 
 def survey_camera(rig: Rig, options: Options) -> Survey:
-    """Look at a recording of one camera. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Examine a recording of one camera. Raises a `ShadowPuppetError` if something cannot be used."""
     footage = rig.footage[0]
     film = survey_film(footage, options)
     look = _look(footage, film)
@@ -86,7 +86,7 @@ def survey_camera(rig: Rig, options: Options) -> Survey:
 
 
 def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
-    """Silhouettes of the first seconds that may be a person's, followed by those of later frames."""
+    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film."""
     def seen(frame: CameraFrame) -> tuple[float, Mask]:
         return frame.time, clean(frame)
 
@@ -107,7 +107,7 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
 
 
 def known_scale(footage: Footage) -> str:
-    """What fixes the scale, in words."""
+    """Known lengths that fix the scale, in words."""
     subject = footage.recording.subject
     known = [f"{name} {value:.2f} m" for name, value in (("height", subject.height), ("distance", subject.distance)) if value]
     return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
@@ -138,7 +138,7 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
 
 
 def survey_rig(rig: Rig, options: Options) -> Survey:
-    """Look at each camera's film, and at the first seconds of all together. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Examine each camera's film, and the first seconds of all together. Raises a `ShadowPuppetError` if something cannot be used."""
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         films = list(pool.map(lambda footage: survey_film(footage, options, brief_length(footage, options)), rig.footage))
     silhouettes = tuple(film.silhouettes for film in films)
@@ -154,7 +154,7 @@ def survey_rig(rig: Rig, options: Options) -> Survey:
 def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> FirstSeconds:
     every = max(1, round(OPENING * rig.rate / OPENED))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ShadowPuppetWarning)  # what breaks off is said when the run comes to it
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
         frames = synchronized_frames(rig, silhouettes, ready=ready, every=every, threads=usable_cores())
         sets = [(each.time, each.masks) for each in islice(frames, OPENED)]
     sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
@@ -168,7 +168,7 @@ def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
 
 
 def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
-    """Why tracking is hopeless, and the remedy, in a sentence."""
+    """Why tracking is hopeless, and the remedy, in a sentence; None if it is not."""
     bad = [(camera.name, why) for camera in look.cameras if (why := camera.quality.refusal())]
     if len(look.cameras) - len(bad) < 2:
         return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
@@ -207,13 +207,13 @@ def _share(masks: Sequence[Mask]) -> float:
 
 
 def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:
-    """Mean intersection over union of pairs of masks; None where there are none."""
+    """Mean intersection over union of pairs of masks; None if it is not defined for any pair."""
     overlaps = np.array([overlap(mask, right) for mask, right in zip(masks, exact)])
     return float(np.nanmean(overlaps)) if np.isfinite(overlaps).any() else None
 
 
 def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int]) -> MaskQuality:
-    """Quality of masks in several runs that begin at frames `starts`; consecutive frames are compared within a run only."""
+    """Quality of masks in several `runs` of consecutive frames, which begin at frames `starts`; frames are compared within a run only."""
     parts = [mask_quality(run) for run in runs]
     frames = np.array([part.frames for part in parts], float)
 

@@ -1,4 +1,4 @@
-"""A made recording, where it may be made: nothing that is not a made recording is touched unasked."""
+"""Writes synthetic recordings to folders, without overwriting other files unless forced; and makes the demo."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from shadowpuppet.video import open_frames, write_image
 
 
 def make_recording(spec: Spec, folder: str | Path, listener: Listener | None = None, force: bool = False) -> Recording:
-    """Make the recording of `spec`, with its seed, in `folder`, and read it back.
+    """Make the synthetic recording of `spec`, with its seed, in `folder`, and read it back.
 
-    A folder that holds a made recording is made anew; another one that is not empty only with `force`, and then only files of
-    the same names are replaced. Raises `RecordingError` otherwise, or where something cannot be written, and a `ShadowPuppetError`
-    where a file of motion cannot be used.
+    An earlier synthetic recording in `folder` is replaced. Any other non-empty folder is only written to with `force`, which replaces
+    files of the same names and keeps the rest. Raises `RecordingError` otherwise, or if something cannot be written, and a
+    `ShadowPuppetError` if a motion file cannot be used.
     """
     folder, listener = Path(folder), listener or Listener()
     for gesture in (*spec.motion, *(spec.training or ()), *(other.motion for other in spec.scene.bystanders)):
-        if gesture.file is not None:  # one that cannot be used is told before anything is removed
+        if gesture.file is not None:  # raises for a file that cannot be used, before anything is removed
             perform(replace(spec, motion=(gesture,)), np.random.default_rng(0))
     clear(folder, force)
     listener.begin("drawing")
@@ -35,7 +35,10 @@ def make_recording(spec: Spec, folder: str | Path, listener: Listener | None = N
 
 
 def clear(folder: Path, force: bool = False) -> None:
-    """Remove what an earlier made recording wrote into `folder`, and nothing else."""
+    """Remove the files of an earlier synthetic recording from `folder`, and no others.
+
+    Raises `RecordingError` if `folder` is a file, holds files but no synthetic recording (unless `force`), or a file cannot be removed.
+    """
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return
     if not folder.is_dir():
@@ -53,7 +56,7 @@ def clear(folder: Path, force: bool = False) -> None:
 
 
 def files_of(spec: Spec, folder: Path) -> list[Path]:
-    """All files that a recording of `spec` can have in `folder`, its films also as they are while they grow."""
+    """All files that a recording of `spec` can have in `folder`, including partly written films."""
     ends = {"video": "mp4", "background": "mp4", "masks": "mkv", "people": "mkv"}
     films = [folder / kind / f"{view.name}{part}.{end}" for kind, end in ends.items() for view in spec.views() for part in ("", ".part")]
     postures = [folder / "references" / f"{name}{end}" for name in POSTURES for end in (".png", "_mask.png", ".csv", ".trc")]
@@ -62,7 +65,7 @@ def files_of(spec: Spec, folder: Path) -> list[Path]:
 
 
 def _made(path: Path) -> Spec | None:
-    """The spec that a recording was made of; None where it is no made one: a spec that a person wrote has another first line."""
+    """The spec of a synthetic recording; None if it is not one. A spec written by hand has another first line."""
     try:
         with path.open(encoding="utf-8") as file:
             return read_spec(path) if file.readline() == SPEC_HEADER else None
@@ -71,14 +74,14 @@ def _made(path: Path) -> Spec | None:
 
 
 class Drawing:
-    """Tells a listener of pictures that are made."""
+    """Reports rendered pictures to a listener."""
 
     def __init__(self, listener: Listener) -> None:
-        """`listener`: is told what begins, and how far it is."""
+        """`listener`: receives the progress."""
         self.listener, self.total = listener, 0
 
     def __call__(self, done: int, total: int) -> None:
-        """`done` of `total` pictures are made."""
+        """Report that `done` of `total` pictures are rendered."""
         if total != self.total:
             self.total = total
             self.listener.begin("drawing", total)
@@ -86,14 +89,14 @@ class Drawing:
 
 
 SHOWN, SHOWN_SEVERAL = 6, (4, 2)
-"""Frames on the contact sheet of one camera; with several, where each frame is a grid, how many and how many side by side."""
+"""Number of frames on the contact sheet of one camera; numbers of frames and columns with several cameras, where each frame is a grid."""
 
 
 def run_demo(folder: str | Path, options: Options, listener: Listener | None = None) -> tuple[Summary, Summary]:
     """Make two sample recordings and track them: one camera's, `folder`/recording into `folder`/run, and several cameras',
     `folder`/recording-ring into `folder`/run-ring; each run gets overlay.mp4 and overlay.png.
 
-    Raises a `ShadowPuppetError` where something cannot be written.
+    Raises a `ShadowPuppetError` if something cannot be written.
     """
     folder, listener = Path(folder), listener or Listener()
     one = _made_and_tracked(demo_spec(), folder / "recording", folder / "run", options, listener)
@@ -111,7 +114,7 @@ def _made_and_tracked(spec: Spec, recording: Path, run: Path, options: Options, 
 
 
 def contact_sheet(film: str | Path, count: int = SHOWN, columns: int = SHOWN) -> np.ndarray:
-    """Some frames of a film, spread over it, so many side by side: (count / columns H, columns W, 3). Raises `VideoError`."""
+    """`count` frames spread evenly over a film, in `columns` columns: (count / columns H, columns W, 3). Raises `VideoError`."""
     frames = open_frames(film)
     length = frames.count or sum(1 for _ in frames)
     wanted = set(np.linspace(0, length - 1, 2 * count + 1).astype(int)[1::2].tolist())

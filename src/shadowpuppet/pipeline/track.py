@@ -42,19 +42,19 @@ __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_r
 
 
 class Kind(NamedTuple):
-    """How a kind of recording is looked at, fitted and tracked."""
+    """How a recording is surveyed, fitted and tracked: with one camera or with several."""
 
     method: str
-    """In words, with the number of cameras for {}."""
+    """Name of the method; {} stands for the number of cameras."""
     settings: str
-    """The table of `Options` that has the tracker's settings."""
+    """Name of the field of `Options` with the tracker's settings."""
     survey: Callable[[Rig, Options], Survey]
     fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject]
     """Measures the person and makes the tracker."""
     look_fits: bool
-    """Whether a look without a run measures the person too: not with several cameras, where that takes long."""
+    """Whether `look_at` also measures the person; not with several cameras, which takes long."""
     stages: tuple[str, ...]
-    """Stages whose times metrics.json has."""
+    """Stages whose times are written to metrics.json."""
 
 
 MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "write"))
@@ -62,15 +62,15 @@ MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, 
 
 
 class Prepared(NamedTuple):
-    """All that a run begins with."""
+    """The surveyed recording and the fitted person, before tracking."""
 
     survey: Survey
     subject: TrackedSubject | None
-    """The fitted person; None where tracking is hopeless."""
+    """The fitted person; None if tracking is hopeless."""
     look: Look | RigLook
 
     def check(self) -> TrackedSubject:
-        """The fitted person. Raises `TrackingError` where tracking is hopeless."""
+        """The fitted person. Raises `TrackingError` if tracking is hopeless."""
         self.survey.check()
         assert self.subject is not None
         return self.subject
@@ -78,7 +78,7 @@ class Prepared(NamedTuple):
 
 @one_blas_thread()
 def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
-    """What `track_recording` would begin with. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Examine a recording as `track_recording` does before tracking. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
     kind = kind_of(rig)
@@ -87,7 +87,7 @@ def look_at(recording: str | Path, options: Options | None = None) -> Look | Rig
 
 @one_blas_thread()
 def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[TrackedSubject, Look | RigLook]:
-    """Measure a person and save the sizes. Raises a `ShadowPuppetError` where nobody is found or the file cannot be written."""
+    """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
     rig = open_rig(recording, options)
     prepared = prepare(generators(options)[0], rig, options, kind_of(rig))
@@ -101,11 +101,11 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
                     listener: Listener | None = None, cache: SilhouetteCache | None = None) -> Summary:
     """Track a recording (a folder, or a film with `Options.fov`) of one camera or several into a run folder.
 
-    `cache` keeps silhouettes for the next run of the same recording; `kept_silhouettes` of metrics.json marks a run that used them.
+    `cache` keeps silhouettes for the next run of the same recording; a run that used them has `kept_silhouettes` in metrics.json.
 
-    Beside what `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the cameras) and, if asked
-    for, overlay.mp4. An interrupted run keeps what it has. Raises a `ShadowPuppetError` where something cannot be used;
-    the same options, films and machine give the same joints.
+    In addition to the files that `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the cameras)
+    and, if asked for, overlay.mp4. An interrupted run keeps the frames tracked so far. The same options, films and machine give the same
+    joints. Raises a `ShadowPuppetError` if something cannot be used.
     """
     options = options or Options()
     rig = open_rig(recording, options)
@@ -113,12 +113,12 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
 
 
 def kind_of(rig: Rig) -> Kind:
-    """How a recording is tracked."""
+    """`MONOCULAR` or `MULTIVIEW`, by the number of cameras."""
     return MULTIVIEW if rig.is_multiview else MONOCULAR
 
 
 def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None) -> Prepared:
-    """Look at a recording, and fit the person unless the look refuses. Raises a `ShadowPuppetError` where something cannot be used."""
+    """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
     survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
     if survey.look.refusal is not None:
         return Prepared(survey, None, survey.look)
@@ -127,7 +127,7 @@ def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, ca
 
 
 def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None) -> Summary:
-    """Look, fit, track and evaluate, as `track_recording`."""
+    """Survey, fit, track and evaluate; see `track_recording`."""
     for_look, for_track = generators(options)
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
@@ -158,7 +158,7 @@ def _write_beside(folder: Path, prepared: Prepared) -> None:
 
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
            cache: SilhouetteCache | None) -> None:
-    """Frame set by frame set: silhouettes, observation, state, files."""
+    """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
     subject, survey, timer, state, count = prepared.check(), prepared.survey, StageTimer(), None, 0
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))

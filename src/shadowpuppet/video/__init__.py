@@ -1,4 +1,4 @@
-"""Frames read from films, folders of pictures and live cameras, one at a time; films and pictures written."""
+"""Reads frames of films, folders of pictures and live cameras, one at a time; writes films and pictures."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
                 rate: float | None = None) -> FrameSource:
     """Open a film, a picture, a folder of pictures (in natural order), or a live camera (its number or `camera:N`).
 
-    Raises `VideoError` where nothing can be read. A film that breaks off or is damaged gives the frames before the break, then a
+    Raises `VideoError` if nothing can be read. A film that breaks off or is damaged gives the frames before the break, then a
     `ShadowPuppetWarning`.
 
     Args:
         source: the path or number.
-        grey: (H, W) frames; of films the luma scaled to 0..255, without decoding colours.
+        grey: give frames (H, W); for films the luma, scaled to 0..255, without decoding colours.
         size: width and height to which frames are scaled.
-        rate: frames/s, in place of the source's times; a folder has those in `timestamps.txt` or `.csv` (seconds, one a picture).
+        rate: frames/s, replaces the source's times; a folder's times are in `timestamps.txt` or `.csv` (seconds, one per picture).
     """
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise VideoError(f"{source}: rate: found {rate}, expected a positive number of frames/s")

@@ -1,4 +1,4 @@
-"""Live cameras through OpenCV."""
+"""Reads live cameras through OpenCV."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def camera_number(source: str | Path | int) -> int | None:
 
 
 def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
-    """A camera's frames as they come, timed by a monotonic clock; `rate` is requested from the camera. Raises `VideoError`."""
+    """A source of a camera's frames as they come, timed by a monotonic clock; `rate` is requested from the camera. Raises `VideoError`."""
     import cv2
 
     capture, first = open_device(number, rate)
@@ -42,12 +42,12 @@ def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
 
 
 def open_device(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
-    """Open a camera; the capture and its first picture. Raises `VideoError`."""
+    """Open a camera; returns the capture and its first picture. Raises `VideoError`."""
     import cv2
 
     with _quiet():
         capture = cv2.VideoCapture(number)
-    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # buffered pictures would get late times
+    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # buffered pictures would get too late times
     if rate:
         capture.set(cv2.CAP_PROP_FPS, rate)
     good, image = capture.read() if capture.isOpened() else (False, None)
@@ -59,7 +59,7 @@ def open_device(number: int, rate: float | None) -> tuple[VideoCapture, Image]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence OpenCV's messages on a missing camera; the error says it."""
+    """Silence OpenCV's messages on a missing camera, which is raised as an error."""
     import cv2
 
     log: Any = getattr(cv2.utils, "logging", cv2)  # OpenCV 5, and 4

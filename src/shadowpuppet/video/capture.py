@@ -1,4 +1,4 @@
-"""A camera read in a thread: the newest picture is kept, older ones are dropped; a camera that breaks off is opened again."""
+"""Reads a camera in a thread: keeps the newest picture, drops older ones, and reopens a camera that breaks off."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Capture:
             pause = min(2 * pause, LONGEST_WAIT)
 
     def _read_once(self) -> bool:
-        """Read until the feed ends; whether a picture came."""
+        """Read until the feed ends; returns whether a picture came."""
         came = False
         with contextlib.closing(self.feed.read()) as shots:  # type: ignore[type-var]
             for shot in shots:

@@ -1,4 +1,4 @@
-"""Films through PyAV: frames with their exact times; a damaged film's up to the break."""
+"""Reads films through PyAV: frames with their exact times; of a damaged film, the frames before the break."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")
 FULL_RANGE = 2
 """FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
 LONGEST_STUTTER = 1.0
-"""Seconds; times that go back by more are taken for a new start."""
+"""Seconds; times that go back by more are taken for a restart of the clock."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
-"""Lookup table from video's usual luma range, 16..235, to 0..255."""
+"""Lookup table from the limited luma range of video, 16..235, to 0..255."""
 
 
 def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
-    """A film's frames; decodes the first to find the size. Raises `VideoError`."""
+    """A source of a film's frames; decodes the first one to find the size. Raises `VideoError`."""
     with opened(path) as (container, stream):
         try:
             first = next(decoded(container, stream), None)
@@ -80,7 +80,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 longest, n = max(longest, time - before), n + 1
         except Break as cause:
             broken = str(cause)
-    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # false where the duration is unknown
+    if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # False if the duration is unknown
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
         of = f" of {film.count}" if film.count else ""
@@ -93,13 +93,13 @@ def _say(warning: str) -> None:
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
     if container.format.name == "avi" and stream.frames and stream.average_rate:
-        return float(stream.frames / stream.average_rate)  # FFmpeg states the duration of what is left of a cut file
+        return float(stream.frames / stream.average_rate)  # for a cut file FFmpeg states the remaining duration
     if stream.duration is not None and stream.time_base is not None:
         return float(stream.duration * stream.time_base)
-    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska's, per stream
+    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))  # Matroska states it per stream
     if tag:
         return int(tag[1]) * 3600 + int(tag[2]) * 60 + float(tag[3])
-    alone = len(container.streams) == 1  # the container's is that of its longest stream, perhaps audio
+    alone = len(container.streams) == 1  # the container's duration is that of its longest stream, perhaps audio
     return container.duration / 1e6 if alone and container.duration else math.nan
 
 
@@ -112,7 +112,7 @@ class Break(Exception):
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a film; its container and video stream. Raises `VideoError`."""
+    """Open a film; gives its container and video stream. Raises `VideoError`."""
     import av
     import av.error
 
@@ -132,7 +132,7 @@ def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
 
 
 def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
-    """Frames in order of presentation. Raises `Break` after the last whole one of a damaged film."""
+    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film."""
     import av.error
 
     packets, broken, last = container.demux(stream), "", None
@@ -155,7 +155,7 @@ def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFra
 
 
 def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:
-    """Frames that the decoder still holds at a break, as far as they follow the `last` one without a gap."""
+    """Frames still in the decoder at a break, up to the first gap after frame `last`."""
     import av.error
 
     frames: list[VideoFrame] = []
@@ -164,14 +164,14 @@ def _held(stream: VideoStream, last: VideoFrame | None) -> list[VideoFrame]:
             step = frame.pts - last.pts if last and frame.pts is not None and last.pts is not None else 0
             if last and 0 < 1.5 * last.duration < step:
                 break
-            frame.time_base = stream.time_base  # known by packets only
+            frame.time_base = stream.time_base  # only packets state it
             frames.append(frame)
             last = frame
     return frames
 
 
 class _Clock:
-    """Increasing seconds after the first frame: the container's where usable, else filled in, with a warning."""
+    """Gives frames increasing times, seconds after the first frame: the container's if usable, else filled in with a warning."""
 
     def __init__(self, path: Path, step: float, quiet: bool = False) -> None:
         self.path, self.step, self.warned = path, step, quiet
@@ -201,9 +201,9 @@ class _Clock:
             return time
         self.bad_pts += 1
         self._warn(self.last, "is followed by one that is not later; times are moved so that they increase")
-        if self.last - time < LONGEST_STUTTER:  # later times are right again
+        if self.last - time < LONGEST_STUTTER:  # later times are correct again
             return self.last + self.step / 2
-        self.shift += self.last + self.step - time  # a new start
+        self.shift += self.last + self.step - time  # the clock restarted
         return self.last + self.step
 
     def _warn(self, time: float, what: str) -> None:
@@ -230,7 +230,7 @@ def converter(grey: bool) -> Callable[[VideoFrame], Image]:
         else:
             image = reformat(frame, format="bgr24").to_ndarray()
             image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if grey else image
-        quarters = round(frame.rotation / 90) % 4  # counter-clockwise, as the camera was held
+        quarters = round(frame.rotation / 90) % 4  # counter-clockwise; undoes how the camera was held
         return np.ascontiguousarray(np.rot90(image, quarters) if quarters else image, np.uint8)
 
     return convert

@@ -17,7 +17,7 @@ Size = tuple[int, int]
 """Width and height, pixels."""
 
 ASSUMED_RATE = 30.0
-"""Frames/s where neither the source nor the caller states times."""
+"""Frames/s if neither the source nor the caller states times."""
 
 
 class Frame(NamedTuple):
@@ -30,7 +30,7 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class FrameSource:
-    """An iterable of frames in order of time. Each iteration begins at the start; a live camera's, now."""
+    """An iterable of frames in order of time. Each iteration begins at the start, or, for a live camera, at the present."""
 
     name: str
     size: Size
@@ -38,9 +38,9 @@ class FrameSource:
     rate: float
     """Mean frames/s; NaN if unknown."""
     count: int | None
-    """Number of frames, if the container states it."""
+    """Number of frames; None if the container does not state it."""
     duration: float
-    """Seconds, if the container states it, else NaN."""
+    """Seconds; NaN if the container does not state it."""
     read: Callable[[], Iterator[Frame]] = field(repr=False)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -54,7 +54,7 @@ def size_of(image: Image) -> Size:
 
 
 def check_size(name: object, n: int, time: float, image: Image, size: Size) -> None:
-    """Raise `VideoError` where frame `n` differs in size from those before it."""
+    """Raise `VideoError` if frame `n` differs in size from those before it."""
     found = size_of(image)
     if found != size:
         raise VideoError(f"{name}: frame {n} ({time:.3f} s) is {found[0]} x {found[1]} pixels, those before it "

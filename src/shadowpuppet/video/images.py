@@ -1,4 +1,4 @@
-"""Picture files, alone and in folders."""
+"""Reads and writes picture files, and reads folders of pictures."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def write_image(path: str | Path, image: Image) -> None:
 
 
 def check_image(path: Path, image: Image) -> None:
-    """Raise `VideoError` where an array is no (H, W, 3) or (H, W) picture of uint8."""
+    """Raise `VideoError` if an array is not a picture (H, W, 3) or (H, W) of uint8."""
     found = np.asarray(image)
     if found.dtype != np.uint8 or found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] != 3) or not found.size:
         raise VideoError(f"{path}: found a picture of {found.dtype}, shape {found.shape}; expected uint8, (H, W, 3) or (H, W)")
@@ -67,7 +67,7 @@ def open_picture(path: Path, grey: bool) -> FrameSource:
 
 
 def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
-    """A folder's pictures in natural order. Raises `VideoError`."""
+    """A source of a folder's pictures in natural order. Raises `VideoError`."""
     paths, times, assumed = in_folder(folder, rate)
     size, n = size_of(read_image(paths[0], grey)), len(paths)
     mean_rate = float((n - 1) / times[-1]) if n > 1 else math.nan
@@ -101,7 +101,7 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 
 
 def _read_times(path: Path, count: int) -> NDArray[np.float64]:
-    """Read times (count,), seconds after the first: a number a line, or the first column of a table, with or without a header."""
+    """Read times (count,), seconds after the first: one number per line, or the first column of a table, with or without a header."""
     try:
         lines = [line.strip() for line in path.read_text("utf-8-sig").splitlines() if line.strip()]
         cells = [re.split(r"[,;\s]", line)[0] for line in lines]

@@ -46,16 +46,16 @@ class Feed:
     rate: float
     """Stated frames/s; NaN if unknown."""
     live: bool
-    """Whether to reopen it when it ends; False for films."""
+    """Whether the source is live, and reopened if it ends; False for films."""
     read: Callable[[], Iterator[Snapshot]] = field(repr=False)
-    """Pictures as they come, until the source ends. Raises `VideoError` where it cannot be opened or breaks off."""
+    """Pictures as they come, until the source ends. Raises `VideoError` if it cannot be opened or breaks off."""
 
 
 def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0) -> Feed:
     """Open a camera (its number, or `camera:N`), a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures.
 
     A film is played at its own times, `speed` times as fast; `rate` (frames/s) replaces them, and is requested from a camera.
-    Raises `VideoError` where nothing can be read, or a film has no times and no rate is given.
+    Raises `VideoError` if nothing can be read, or a film has no times and no rate is given.
     """
     number = int(source) if str(source).isdecimal() else camera_number(source)
     scheme = ADDRESS.match(str(source))
@@ -84,7 +84,7 @@ def _camera(number: int, rate: float | None) -> Feed:
 
 def _stream(address: str) -> Feed:
     shown, size, rate = open_stream(address)
-    ready = [shown]  # many senders serve one reader only once
+    ready = [shown]  # many senders accept one connection only: the first reader continues with it
 
     def read() -> Iterator[Snapshot]:
         for now, image in ready.pop() if ready else open_stream(address)[0]:
@@ -95,7 +95,7 @@ def _stream(address: str) -> Feed:
 
 def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] = time.monotonic,
               wait: Callable[[float], None] = time.sleep) -> Feed:
-    """A film played as if live: each frame comes when it is due, with that time as its time of capture."""
+    """A feed that plays a film as if live: each frame comes when it is due, and that is its time of capture."""
 
     def read() -> Iterator[Snapshot]:
         start, warned = math.nan, False
@@ -104,7 +104,7 @@ def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] 
             due = start + time_ / speed
             while (ahead := due - clock()) > 0:
                 wait(ahead)
-            if -ahead > MAX_DELAY:  # as a camera would, play it slower
+            if -ahead > MAX_DELAY:  # too slow: set the clock back
                 start, due = start - ahead, due - ahead
                 if not warned:
                     warnings.warn(f"{film.name}: cannot be decoded as fast as it is to be played; it is played slower", ShadowPuppetWarning,
@@ -116,7 +116,7 @@ def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] 
 
 
 def _timed(path: Path, rate: float | None) -> FrameSource:
-    """Open a film. Raises `VideoError` where it has no times and no rate is given."""
+    """Open a film. Raises `VideoError` if it has no times and no rate is given."""
     if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file():
         raise VideoError(f"{path}: found a single picture, expected a film, a folder of pictures, the number of a camera, or a network "
                          "address")

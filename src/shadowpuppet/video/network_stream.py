@@ -1,4 +1,4 @@
-"""Network streams through PyAV: pictures as they arrive, with time-outs."""
+"""Reads network streams through PyAV: pictures as they arrive, with time-outs."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 SCHEMES = ("http", "https", "rtmp", "rtp", "rtsp", "rtsps", "tcp", "udp")
 """Schemes of addresses that can be opened."""
 PROTOCOLS = "crypto,http,https,httpproxy,rtmp,rtp,rtsp,srtp,tcp,tls,udp"
-"""Protocols that FFmpeg may use; not files, so that a stream's play list cannot read this machine's."""
+"""Protocols that FFmpeg may use; `file` is not among them, so that a stream's play list cannot read this machine's files."""
 OPEN_SECONDS, READ_SECONDS = 8.0, 3.0
-"""Time-outs for an address to answer, and for a stream's next data."""
+"""Time-outs, seconds, for an address to answer and for a stream's next data."""
 
 
 def open_stream(address: str) -> tuple[Iterator[tuple[float, Image]], Size, float]:
-    """Open a stream: its pictures (H, W, 3) with seconds of the monotonic clock, their size, and the stated rate (NaN if none).
+    """Open a stream; returns pictures (H, W, 3) with their times, seconds of the monotonic clock, their size, and the stated rate (or NaN).
 
-    A picture's time is when its data had arrived, before decoding. Waits for the first picture. Raises `VideoError` where nothing answers
-    in time or the stream has no pictures; the iterator raises it where the stream breaks off.
+    A picture's time is when its data arrived, before decoding. Waits for the first picture. Raises `VideoError` if nothing answers
+    in time or the stream has no pictures; the iterator raises it if the stream breaks off.
     """
     name = without_secrets(address)
     container, stream = _opened(address, name)
@@ -59,7 +59,7 @@ def _opened(address: str, name: str) -> tuple[InputContainer, VideoStream]:
     import av
     import av.error
 
-    # Buffer little: a picture that waits gets old.
+    # Buffer little, for a low latency.
     options = {"protocol_whitelist": PROTOCOLS, "fflags": "nobuffer", "flags": "low_delay", "analyzeduration": "1000000",
                **({"rtsp_transport": "tcp"} if address.lower().startswith("rtsp") else {})}
     try:

@@ -1,4 +1,4 @@
-"""Random access to a film's frames by time; the film stays open, at most two frames are in memory."""
+"""Random access to a film's frames by time. The film stays open; at most two frames are in memory."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from av import VideoFrame
 
 MAX_DECODED = 1.0
-"""Seconds ahead that are decoded frame by frame; beyond, the container's index is used."""
+"""Largest step ahead, seconds, for which frames are decoded one by one; for larger steps the container's index is used."""
 
 
 class Seeker:
-    """Frames of a film, picture or folder by time: `at(time)` is the nearest frame, None if none is within 1.5 frame intervals.
+    """Frames of a film, picture or folder by time: `at(time)` is the nearest frame, or None if none is within 1.5 frame intervals.
 
     Times are those of `open_frames` if they increase; else frames are counted from the start after each step back. Thread-safe.
     """
 
     def __init__(self, source: Path, size: Size, rate: float | None = None) -> None:
-        """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` where nothing can be read."""
+        """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` if nothing can be read."""
         self.source, self.size, self.rate = source, size, rate
         self._lock, self._stack = threading.Lock(), contextlib.ExitStack()
         if source.is_dir():
@@ -41,7 +41,7 @@ class Seeker:
             self._roll = _Film(source, rate)
 
     def __enter__(self) -> Self:
-        """Return itself; it is open already."""
+        """Return itself; the film is already open."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -66,7 +66,7 @@ class Seeker:
 
 
 class _Still:
-    """A single picture, at every time."""
+    """A single picture, shown at every time."""
 
     def __init__(self, path: Path) -> None:
         self.image = read_image(path)
@@ -118,7 +118,7 @@ class _Film:
             raise VideoError(f"{path}: no frame of it can be decoded ({self.stream.codec_context.name})")
         if self.zero is None:  # frames without times
             self.step = 1 / float(self.stream.guessed_rate or rate or ASSUMED_RATE)
-        self.scale = 1.0 if rate is None else rate * self.step  # from requested times to the film's
+        self.scale = 1.0 if rate is None else rate * self.step  # ratio of the film's times to requested times
 
     def close(self) -> None:
         """Close the file."""
@@ -136,7 +136,7 @@ class _Film:
         return self.convert(min(near, key=lambda frame: abs(frame.time - wanted)).frame) if near else None
 
     def _advance(self) -> None:
-        """Move on by a frame: `held` is the present one, `waiting` the next."""
+        """Decode one more frame: `held` is the present frame, `waiting` the next."""
         self.held, self.waiting = self.waiting, next(self.frames, None)
 
     def _seek(self, wanted: float) -> None:

@@ -1,4 +1,4 @@
-"""Films written; an interrupted one can be played."""
+"""Writes films; an interrupted one can be played."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ BT601, STUDIO_RANGE = 6, 1
 def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False, crf: int = CRF) -> FrameWriter:
     """Write a film of `rate` frames/s: `with write_frames("film.mp4", 25) as film: film.write(image)`.
 
-    H.264 (.mp4, .mov, .mkv; of odd sizes the last row or column is doubled), or FFV1 if `lossless` (.mkv; grey or colour as the first
-    picture). The film is named `<name>.part.<ending>` until it is finished; an interrupted one can be played under that name. Raises
-    `VideoError` where it cannot be written (no such folder, disk full, no frames).
+    The codec is H.264 (.mp4, .mov, .mkv; odd sizes are made even by repeating the last row or column), or FFV1 if `lossless` (.mkv; grey
+    or colour like the first picture). The film is named `<name>.part.<ending>` until it is finished; an interrupted one can be
+    played under that name. Raises `VideoError` if it cannot be written (no such folder, disk full, no frames).
 
     Args:
         path: the film.
@@ -78,9 +78,9 @@ class FrameWriter:
             os.replace(self.partial, self.path)
 
     def write(self, image: Image, time: float | None = None) -> None:
-        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, of the first one's shape.
+        """Add a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit; all pictures have the same shape.
 
-        `time`: its time, seconds, to the millisecond, for pictures at no constant rate; given for all pictures or none.
+        `time`: its time in seconds, stored to the millisecond, if the rate is not constant; give it for all pictures or none.
         """
         check_image(self.path, image)
         image = self._fitted(image)
@@ -150,7 +150,7 @@ class FrameWriter:
 
     @contextlib.contextmanager
     def _system_errors(self) -> Iterator[None]:
-        """Raises errors of the system and FFmpeg as `VideoError`, which says what was saved."""
+        """Convert errors of the system and FFmpeg to `VideoError`, which states what was saved."""
         import av.error
         from av.codec.codec import UnknownCodecError
 

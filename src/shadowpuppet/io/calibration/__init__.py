@@ -1,1 +1,1 @@
-"""Calibrations as other programs write them: one module a format, all to `Draft`s; `io.calibration` makes cameras of these."""
+"""Calibration files of other programs: each module reads one format as `Draft`s; `calibration_files` makes cameras of these."""

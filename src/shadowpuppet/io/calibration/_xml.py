@@ -1,4 +1,4 @@
-"""XML of motion capture systems and OpenCV, read without entities, at limited depth."""
+"""Reads XML of motion capture systems and OpenCV, without entities, with limited depth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.draft import numbers_of, text_of
 
 MAX_DEPTH = 40
-"""Levels of elements; calibrations have seven."""
+"""Greatest depth of nested elements; calibrations have seven levels."""
 
 
 def tree_of(path: Path) -> Element:
@@ -38,21 +38,21 @@ def tree_of(path: Path) -> Element:
 
 
 class Entry:
-    """An element that numbers are read from; what is missing is said with the camera it belongs to."""
+    """An XML element from which numbers are read; errors name its camera."""
 
     def __init__(self, path: Path, camera: str, element: Element) -> None:
-        """`camera`: as messages name it."""
+        """`camera`: its name in messages."""
         self.path, self.camera, self.element = path, camera, element
 
     def child(self, tag: str) -> Entry:
-        """The first element below with this tag, or way of tags."""
+        """The first child with this tag, or path of tags. Raises `CalibrationError` if it is missing."""
         found = self.element.find(tag)
         if found is None:
             raise CalibrationError(f"{self.path}: camera {self.camera!r}: <{tag}>: missing")
         return Entry(self.path, self.camera, found)
 
     def numbers(self, key: str, counts: tuple[int, ...] = (1,), without: str | None = None) -> Array:
-        """Numbers of an attribute; `without`: what is read where it is missing."""
+        """Numbers of attribute `key`, as many as one of `counts`; `without`: text used if it is missing. Raises `CalibrationError`."""
         value = self.element.get(key, without)
         found = numbers_of(value, counts)
         if found is None:
@@ -62,11 +62,11 @@ class Entry:
         return found
 
     def number(self, key: str, without: str | None = None) -> float:
-        """One number."""
+        """The number of attribute `key`; `without`: text used if it is missing. Raises `CalibrationError`."""
         return float(self.numbers(key, (1,), without)[0])
 
 
 def entries(path: Path, root: Element, tag: str, name: str) -> Iterator[Entry]:
-    """Elements of a tag as cameras, named by an attribute."""
+    """Elements with tag `tag`, one per camera, named by their attribute `name`, or numbered."""
     for n, element in enumerate(root.iterfind(tag)):
         yield Entry(path, element.get(name) or str(n + 1), element)

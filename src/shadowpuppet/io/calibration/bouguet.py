@@ -1,4 +1,5 @@
-"""HumanEva's calibrations (.cal): numbers of Bouguet's toolbox, `Xc = R X + T` in millimetres, a camera a file, no picture sizes."""
+"""Reads HumanEva's calibrations (.cal): numbers of Bouguet's toolbox, `Xc = R X + T` in millimetres, one camera per file, no picture
+sizes."""
 
 from __future__ import annotations
 
@@ -13,9 +14,9 @@ from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.draft import Draft, Drafts, text_of
 
 NUMBERS = 22
-"""In a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
+"""Count of numbers in a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
 ROWS = 480
-"""Rows of HumanEva's pictures, for the effect of a skew where the size is unknown."""
+"""Rows of HumanEva's pictures, used for the effect of a skew if the size is unknown."""
 
 
 def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
@@ -29,7 +30,7 @@ def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
 
 
 def read_bouguet(path: Path) -> Drafts:
-    """Read a .cal file, or all in a folder; cameras have the files' names. Raises `CalibrationError`."""
+    """Read a .cal file, or all those in a folder; cameras are named after the files. Raises `CalibrationError`."""
     files = sorted(path.glob("*.cal")) if path.is_dir() else [path]
     return Drafts(tuple(draft_of(file, file.stem) for file in files), "mm")
 

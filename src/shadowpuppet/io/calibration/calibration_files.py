@@ -1,4 +1,4 @@
-"""Calibration files of all formats, read as cameras in metres, Z up, and written."""
+"""Reads calibration files of all formats as cameras in metres, Z up, and writes them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from shadowpuppet.io.files.text import write_whole
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Units of length in metres."""
 UPS = {"z": (0, 0, 1), "y": (0, 1, 0), "x": (1, 0, 0), "-z": (0, 0, -1), "-y": (0, -1, 0), "-x": (-1, 0, 0), "cameras": None}
-"""Directions of a file's world that may be up; `cameras`: the direction that is up in the pictures."""
+"""Possible up directions in a file's world; `cameras`: the up direction in the pictures."""
 MAX_DISTANCE = 100.0
-"""Limit of a camera's distance from the origin, metres; beyond, lengths are probably millimetres."""
+"""Greatest distance of a camera from the origin, metres; if it is greater, lengths are probably millimetres."""
 SIZES = ((640, 480), (848, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024), (1440, 1080), (1600, 1200), (1920, 1080),
          (1920, 1200), (2048, 1536), (2704, 1520), (2560, 1440), (3840, 2160), (4096, 2160))
 """Common picture sizes; a camera without a size gets the one nearest to twice its principal point."""
@@ -34,16 +34,16 @@ SIZE_TOLERANCE = 0.08
 MIN_SPREAD, MIN_AGREEMENT = 0.02, 0.8
 """For `_level`: least second eigenvalue of the directions of rows, and cosine between their normal and the mean up direction."""
 HEAD_BYTES = 4096
-"""Bytes by which a format is recognised."""
+"""Number of bytes from which a format is recognised."""
 
 
 class Format(NamedTuple):
     """A format of calibration files."""
 
     name: str
-    """For messages."""
+    """Name in messages."""
     fits: Callable[[Path, str], bool]
-    """Whether a file has this format, by its path and beginning."""
+    """Whether a file has this format, given its path and the beginning of its text."""
     read: Callable[[Path], Drafts]
 
 
@@ -54,7 +54,7 @@ class Calibration:
     path: Path
     format: str
     cameras: tuple[Camera, ...]
-    """In metres, Z up if known."""
+    """Cameras in metres, Z up if known."""
     unit: str
     """Unit of the file: m, cm or mm."""
     unit_known: bool
@@ -77,7 +77,7 @@ HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), rea
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
 FORMATS = (QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
-"""In the order in which they are tried."""
+"""All formats, in the order in which they are tried."""
 
 
 def read_calibration(path: str | Path, *, unit: str | None = None, up: str | None = None,
@@ -85,7 +85,7 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
     """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
     Formats, recognised by content: TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML,
-    EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field where
+    EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
     something is missing or impossible.
 
     Args:
@@ -99,7 +99,7 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
 
 def examine_calibration(path: str | Path, unit: str | None = None, up: str | None = None,
               sizes: Callable[[str], tuple[int, int] | None] | None = None) -> Calibration:
-    """As `read_calibration`, with remarks."""
+    """As `read_calibration`; also returns format, unit and remarks."""
     path = Path(path)
     for what, value, known in (("unit", unit, UNITS), ("up", up, UPS)):
         if value is not None and value not in known:
@@ -122,7 +122,7 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file or folder. Raises `CalibrationError` where it is none of `FORMATS`."""
+    """The format of a file or folder. Raises `CalibrationError` if it is none of `FORMATS`."""
     if path.is_dir():
         if any(path.glob("*.cal")):
             return HUMANEVA
@@ -175,7 +175,7 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
 
 
 def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
-    """A size for a camera without one, by twice the principal point."""
+    """Guess the size (width, height) of a camera's pictures as twice the principal point, or the nearest of `SIZES`; adds a note."""
     twice = 2 * np.asarray(draft.matrix, float)[:2, 2] + 1
     if not (np.isfinite(twice).all() and (twice >= 2).all() and (twice < 1e5).all()):
         raise CalibrationError(f"found no picture size, and a principal point of {((twice - 1) / 2).tolist()}, expected one in the picture")
@@ -188,7 +188,7 @@ def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
 
 
 def rotated_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
-    """Cameras in the world rotated so that its direction `up` (of `UPS`) is Z."""
+    """The cameras after a rotation of the world that brings its direction `up` (of `UPS`) to Z."""
     direction = UPS[up]
     if direction is None:
         direction = _level(cameras)
@@ -197,9 +197,9 @@ def rotated_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
 
 
 def _level(cameras: tuple[Camera, ...]) -> Array:
-    """The up direction (3,) for cameras without roll: normal to the rows of all pictures, whatever the tilt.
+    """The up direction (3,) for cameras without roll: the normal to the rows of all pictures, which does not depend on the tilt.
 
-    Where rows are parallel, or the normal disagrees with the pictures' mean up direction, that mean.
+    If the rows are parallel, or the normal disagrees with the pictures' mean up direction, the mean is returned.
     """
     mean = -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
     rows = np.array([camera.T_camera_world[0, :3] for camera in cameras])
@@ -223,7 +223,7 @@ def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
     """Write cameras for `read_calibration`, in metres: TOML for Pose2Sim and Anipose; into a folder, or for intri.yml or extri.yml,
     EasyMocap's two files.
 
-    Raises `CalibrationError` where they cannot be written.
+    Raises `CalibrationError` if they cannot be written.
     """
     path, made = Path(path), list(cameras)
     names = [camera.name for camera in made]
@@ -253,9 +253,9 @@ def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
 
 
 def find_calibration(folder: Path) -> Path | None:
-    """The calibration in a recording folder, or in its folder `calibration`; None without one. calibration.toml comes first.
+    """The calibration in a recording folder, or in its folder `calibration`; None if there is none. calibration.toml is preferred.
 
-    Raises `CalibrationError` where there are several.
+    Raises `CalibrationError` if there are several.
     """
     if (folder / "calibration.toml").exists():
         return folder / "calibration.toml"
@@ -276,7 +276,7 @@ def find_calibration(folder: Path) -> Path | None:
 ENDINGS = (".toml", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".pickle", ".pkl")
 """Endings of files that may be calibrations."""
 NO_CALIBRATIONS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml")
-"""Files with such endings that are something else."""
+"""Names of files with such endings that are no calibrations."""
 
 
 def _in_pieces(path: Path, files: list[Path]) -> bool:

@@ -1,4 +1,4 @@
-"""Cameras as a calibration file has them, before unit, up direction and sizes are resolved."""
+"""Cameras as stated in a calibration file, before unit, up direction and sizes are resolved."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from shadowpuppet.io.files.text import TOML_LIMIT, read_limited
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A camera of a file: lengths in the file's unit, all else as in `Camera`."""
+    """A camera in a calibration file: lengths in the file's unit, all else as in `Camera`."""
 
     name: str
     matrix: object
     """Intrinsics, (3, 3), pixels."""
     distortion: object
-    """In OpenCV's order."""
+    """Distortion coefficients in OpenCV's order."""
     T: Array | None
-    """World to camera, (4, 4), translation in the file's unit; None where the file has the lens only."""
+    """World to camera, (4, 4), translation in the file's unit; None if the file has the lens only."""
     size: Sequence[float] | None = None
     """Width and height, pixels; None if not stated."""
     fisheye: bool = False
     oriented: bool = True
     where: str = ""
-    """Beginning of messages about it, such as `[cam1]: `."""
+    """Prefix of messages about it, for example `[cam1]: `."""
 
 
 class Drafts(NamedTuple):
@@ -44,7 +44,7 @@ class Drafts(NamedTuple):
 
 
 def text_of(path: Path) -> str:
-    """The text of a calibration file. Raises `CalibrationError` where it cannot be read, is too long or no text."""
+    """The text of a calibration file. Raises `CalibrationError` if it cannot be read, is too long or no text."""
     text = read_limited(path, TOML_LIMIT, CalibrationError, "a calibration file", "a calibration")
     if "\0" in text:
         raise CalibrationError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
@@ -52,7 +52,7 @@ def text_of(path: Path) -> str:
 
 
 def numbers_of(text: str | None, counts: Sequence[int]) -> Array | None:
-    """Finite numbers separated by blanks or commas; None for anything else, or a number of them not in `counts`."""
+    """Finite numbers (n,) from text separated by blanks or commas; None for other text, or if n is not in `counts`."""
     try:
         values = np.array((text or "").replace(",", " ").split(), float)
     except ValueError:

@@ -1,9 +1,9 @@
-"""Calibrations in OpenCV's YAML or XML: one camera a file, several by numbered or named keys, a stereo pair, EasyMocap's two files.
+"""Reads calibrations in OpenCV's YAML or XML: one camera per file, several by numbered or named keys, a stereo pair, EasyMocap's pair.
 
 Programs use different names; keys are recognised by their beginnings: camera_matrix, K_1, M1, cameraMatrix ... Rotations and
-translations are from the world to the camera. A single pair of these beside two lenses is `stereoCalibrate`'s: from the first camera,
-which is the world, to the second. EasyMocap: intri.yml has `names`, K_<name>, dist_<name> and perhaps H_, W_<name>, extri.yml R_<name>
-(a vector), Rot_<name> (a matrix), T_<name>, usually in metres.
+translations are from the world to the camera. A single rotation and translation with two lenses is `stereoCalibrate`'s: from the first
+camera, which is the world, to the second. EasyMocap: intri.yml has `names`, K_<name>, dist_<name> and perhaps H_, W_<name>, extri.yml
+has R_<name> (a vector), Rot_<name> (a matrix), T_<name>, usually in metres.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SUFFIXES = (".yml", ".yaml", ".xml")
 
 
 def read_opencv(path: Path) -> Drafts:
-    """Cameras of a file, a pair of files, or a folder with a camera a file. Raises `CalibrationError`."""
+    """Cameras of a file, a pair of files, or a folder with one file per camera. Raises `CalibrationError`."""
     if path.is_dir():
         pair = next((pair for pair in map(pair_of, sorted(path.iterdir())) if pair is not None), None)
         return read_opencv(pair[0]) if pair is not None else _one_a_file(path)
@@ -58,7 +58,7 @@ def pair_of(path: Path) -> tuple[Path, Path] | None:
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Files of a folder with an ending of OpenCV's."""
+    """Files of a folder with an ending of `SUFFIXES`."""
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file() and path.name[0] != ".")
 
 
@@ -74,7 +74,7 @@ def _one_a_file(folder: Path) -> Drafts:
 
 
 def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft], list[str]]:
-    """Cameras by the ends of keys; `alone`: name of a camera whose keys have none."""
+    """Cameras, and remarks, from entries whose keys end in the camera's name; `alone`: name of a camera without such endings."""
     cameras = _grouped(values)
     lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
     if not lenses:
@@ -98,7 +98,7 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft]
 
 
 def _grouped(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Each camera's parameters, by the end of their keys."""
+    """The parameters of each camera, by the endings of the keys."""
     cameras: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
         if value is None or (key in ("R1", "R2") and "P1" in values):  # stereoRectify's, which are no extrinsics

@@ -1,6 +1,6 @@
-"""OpenCV's FileStorage, YAML and XML, read as matrices, numbers, words and lists of these.
+"""Reads OpenCV's FileStorage, YAML and XML, as matrices, numbers, words and lists of these.
 
-A reader of our own: damaged files crash OpenCV's parser.
+OpenCV's own parser is not used because damaged files crash it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MATRIX = ("rows", "cols", "data")
 """Keys of a matrix."""
 KEY = re.compile(r"^(\s*)([\w.-]+)\s*:(?:\s+(.*))?$")
 MAX_ELEMENTS = 4096
-"""Larger matrices are skipped: calibrations have 3 x 3 numbers, maps of rectification millions."""
+"""Larger matrices are skipped: matrices of calibrations have 3 x 3 numbers, maps of rectification millions."""
 
 
 def read_storage(path: Path) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def _logical(path: Path, text: str) -> list[str]:
 
 
 def _below(path: Path, key: str, value: str, below: list[str]) -> Any:
-    """The value of a key, on its line or on those below."""
+    """The value of a key, on its own line or the lines below."""
     if value and not value.startswith("!!") and not below:
         return [_word(word) for word in value.strip("[]").split(",") if word.strip()] if value.startswith("[") else _word(value)
     if "!!opencv-matrix" not in value and all(line.startswith("-") for line in below):

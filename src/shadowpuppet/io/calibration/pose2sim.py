@@ -1,7 +1,7 @@
-"""Calibrations in TOML: the schema of Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export, and Caliscope's own.
+"""Reads calibrations in TOML: the schema of Pose2Sim, Anipose (aniposelib), FreeMoCap and Caliscope's export, and Caliscope's own.
 
-A section a camera: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to camera, or a
-3 x 3 matrix), `translation`, `fisheye`. Caliscope's own file (camera_array.toml) has its sections below `cameras`, by number.
+Each camera has a section: `name`, `size` (width, height), `matrix` (3 x 3), `distortions`, `rotation` (Rodrigues vector, world to
+camera, or a 3 x 3 matrix), `translation`, `fisheye`. Caliscope's own file (camera_array.toml) has its sections below `cameras`, by number.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 BARE_KEY = r"[A-Za-z0-9_-]+"
 """Section titles without quotes."""
 SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
-"""Ranges of a board's squares in each unit; FreeMoCap stores the number that its user gave."""
+"""Plausible sizes of a board's squares in each unit; FreeMoCap stores the number that its user entered, without a unit."""
 
 
 def read_tables(path: Path) -> Drafts:
-    """Cameras of a TOML file. Raises `CalibrationError` with the section and field where something is missing or impossible."""
+    """Cameras of a TOML file. Raises `CalibrationError` with the section and field if something is missing or impossible."""
     data = read_toml(path, CalibrationError)
     nested = data.get("cameras")
     if isinstance(nested, dict) and nested and all(isinstance(table, dict) for table in nested.values()):
@@ -60,7 +60,7 @@ def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Drafts:
 
 
 def _freemocap(metadata: object) -> tuple[str | None, tuple[str, ...]]:
-    """The unit, and remarks, by the size of FreeMoCap's board."""
+    """The unit, None if unknown, and remarks, from the size of the squares on FreeMoCap's board."""
     square = metadata.get("charuco_square_size") if isinstance(metadata, dict) else None
     if not isinstance(square, (int, float)) or isinstance(square, bool):
         return None, ()
@@ -88,7 +88,7 @@ def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft
 
 
 def check_name(name: object) -> None:
-    """Raise `CalibrationError` for what cannot be a camera's name, which is also its film's."""
+    """Raise `CalibrationError` if `name` cannot be a camera's name, which is also the name of its film."""
     if not isinstance(name, str) or not name.strip(" .") or not name.isprintable() or "/" in name or "\\" in name:
         raise CalibrationError(f"name: found {_short(repr(name))}, expected a word that can be a file's name")
 
@@ -105,7 +105,7 @@ def _rotation(table: dict[str, Any]) -> Array:
 
 
 def _flat(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
-    """As `_numbers`; accepts also a nested row or column, as OpenCV returns them."""
+    """As `_numbers`, but also accepts a nested row or column, as OpenCV returns them."""
     value = table[key]
     if isinstance(value, list) and len(value) == 1 and isinstance(value[0], list):
         value = value[0]
@@ -145,7 +145,7 @@ def tables_text(cameras: Iterable[Camera]) -> str:
 
 
 def _section(camera: Camera) -> str:
-    """A camera's section, a value a line; JSON's printable words and finite numbers are valid TOML."""
+    """A camera's section, one value per line; JSON's printable strings and finite numbers are valid TOML."""
     distortions = camera.distortion.tolist()
     if not camera.fisheye:  # without trailing zeros
         distortions = distortions[: 8 if any(distortions[5:]) else 5 if distortions[4] else 4]

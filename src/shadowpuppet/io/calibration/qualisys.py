@@ -1,7 +1,7 @@
-"""Qualisys' calibrations (.qca.txt), as QTM exports them: XML.
+"""Reads Qualisys' calibrations (.qca.txt), XML exported by QTM.
 
 Positions are in millimetres. `r11` to `r33` rotate the world to the camera's axes, x right, y up and z backward, so that y and z are
-negated here. Focal lengths and the principal point are in 64ths of a pixel of the whole sensor; `fov_video` is the part that is filmed.
+negated here. Focal lengths and the principal point are in 64ths of a pixel of the whole sensor; `fov_video` is the recorded part.
 Distortion is as OpenCV's. Pose2Sim (0.10) divides it by 64, too, which would leave a Miqus camera none.
 """
 

@@ -1,4 +1,4 @@
-"""Vicon's calibrations (.xcp), of Nexus, Shogun and Blade: XML.
+"""Reads Vicon's calibrations (.xcp), XML of Nexus, Shogun and Blade.
 
 `POSITION` is the camera's in millimetres, `ORIENTATION` the quaternion (x y z w) that rotates the world to the camera's axes, which are
 OpenCV's. Vicon maps distorted pixels to undistorted ones, by 1 + k1 r^2 + k2 r^4 + k3 r^6 with r in pixels from the centre of
@@ -20,9 +20,9 @@ from shadowpuppet.io.calibration.draft import Draft, Drafts, numbers_of
 GRID = 33
 """Grid points along each side at which distortion is compared."""
 MAX_DISPLACEMENT = 5.0
-"""Relative displacement k1 r^2 at the picture's corner, r in pixels; beyond, r is in focal lengths."""
+"""Greatest relative displacement k1 r^2 at the picture's corner with r in pixels; if it is greater, r is taken to be in focal lengths."""
 MAX_MISFIT = 0.5
-"""Pixels by which the fitted distortion may be off without a remark."""
+"""Greatest misfit of the fitted distortion, pixels, without a remark."""
 
 
 class ViconDistortion(NamedTuple):
@@ -31,7 +31,7 @@ class ViconDistortion(NamedTuple):
     centre: Array
     """Pixels (2,)."""
     k: Array
-    """Of r^2, r^4, r^6 (3,), r in pixels."""
+    """Coefficients (3,) of r^2, r^4, r^6, with r in pixels."""
 
 
 def read_vicon(path: Path) -> Drafts:

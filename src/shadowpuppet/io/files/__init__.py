@@ -1,1 +1,1 @@
-"""Files of text, TOML, tables and arrays, read and written safely."""
+"""Reads and writes files of text, TOML, tables and arrays safely."""

@@ -1,4 +1,4 @@
-"""Archives of arrays (.npz), without pickled objects: nothing in them is executed."""
+"""Reads and writes archives of arrays (.npz) without pickled objects, so that nothing in them is executed."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from shadowpuppet.errors import ShadowPuppetError, reason
 
 BROKEN = (EOFError, ValueError, TypeError, KeyError, AttributeError, OverflowError, MemoryError, RuntimeError, SyntaxError,
           tokenize.TokenError, struct.error, zlib.error, lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
-"""What NumPy raises, beside `OSError`, for a file that is damaged, encrypted or no archive."""
+"""Exceptions, other than `OSError`, that NumPy raises for a file that is damaged, encrypted or no archive."""
 
 
 class BrokenArchive(ShadowPuppetError):
-    """A file that is no whole archive of arrays."""
+    """A file is not a complete archive of arrays."""
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
-    """Those arrays of an archive that are among `names`. Raises `ShadowPuppetError` with the reason alone, `BrokenArchive` if damaged."""
+    """The arrays of an archive that are in `names`. Raises `ShadowPuppetError` with only the reason, `BrokenArchive` for a damaged file."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             return {name: np.asarray(data[name]) for name in names if name in data}
@@ -37,7 +37,7 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
 
 
 def read_all_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
-    """The arrays `names` of an archive. Raises as `read_arrays`, also where one is missing."""
+    """The arrays `names` of an archive. Raises the errors of `read_arrays`, and `ShadowPuppetError` if an array is missing."""
     arrays = read_arrays(path, names)
     missing = [name for name in names if name not in arrays]
     if missing:
@@ -46,7 +46,7 @@ def read_all_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
 
 
 def archive_bytes(**arrays: ArrayLike) -> bytes:
-    """An archive's content."""
+    """The bytes of an archive of arrays."""
     out = io.BytesIO()
     np.savez_compressed(out, allow_pickle=False, **{name: np.asarray(values) for name, values in arrays.items()})
     return out.getvalue()

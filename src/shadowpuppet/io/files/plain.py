@@ -1,4 +1,4 @@
-"""Conversion of values to what TOML and JSON can hold."""
+"""Converts values to the types of TOML and JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables with named columns and a row a frame (CSV), and the checks of their cells."""
+"""Reads tables with named columns and one row per frame (CSV), and checks their cells."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from shadowpuppet.io.files.text import read_text
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as text. Columns are parsed on access, so that unused ones may hold anything."""
+    """A table as text. Columns are parsed on access; unused ones may contain anything."""
 
     path: Path
     columns: tuple[str, ...]
     rows: list[list[str]]
     lines: list[int]
-    """Line of the file of each row."""
+    """Line number in the file of each row."""
 
     def numbers(self, names: Sequence[str]) -> Array:
         """Columns as an array (T, len(names)), NaN in empty cells. Raises `FormatError` naming line and column."""
@@ -32,12 +32,12 @@ class Table:
         return np.array(rows, float).reshape(len(rows), len(places))
 
     def texts(self, name: str) -> list[str]:
-        """A column's text. Raises `FormatError` where it is missing."""
+        """A column's text. Raises `FormatError` if it is missing."""
         place = self._place(name)
         return [row[place].strip() for row in self.rows]
 
     def times(self) -> Array:
-        """The column `time` (T,), seconds. Raises `FormatError` where a time is missing or does not increase."""
+        """The column `time` (T,), seconds. Raises `FormatError` if a time is missing or does not increase."""
         times = self.numbers(["time"])[:, 0]
         check_times(self.path, times, self.lines)
         return times
@@ -63,7 +63,7 @@ def number(path: Path, line: int, column: str, cell: str) -> float:
 
 
 def check_times(path: Path, times: Array, lines: Sequence[int]) -> None:
-    """Raise `FormatError`, naming the line, where times (T,) are missing or do not increase."""
+    """Raise `FormatError`, naming the line, if times (T,) are missing or do not increase."""
     bad = np.flatnonzero(~np.isfinite(times) | (np.diff(times, prepend=-np.inf) <= 0))
     if len(bad):
         i = int(bad[0])
@@ -75,7 +75,7 @@ def check_times(path: Path, times: Array, lines: Sequence[int]) -> None:
 def read_table(path: Path, cut: bool = False) -> Table:
     """Read a CSV table with a header line. Raises `FormatError`, naming file and line.
 
-    `cut`: the writer may have been killed: ignore a last line without a line end.
+    `cut`: ignore a last line without a line end, as the writer may have been killed.
     """
     text = read_text(path)
     if cut:
@@ -110,7 +110,7 @@ def cells(values: Iterable[float], decimals: int = 6) -> list[str]:
 
 
 def shorten(words: Iterable[str], limit: int = 120) -> str:
-    """Words with commas, cut to at most `limit` letters for messages."""
+    """Words joined by commas, cut to at most `limit` characters, for messages."""
     text = ", ".join(words)
     return text if len(text) <= limit else text[: limit - 3] + "..."
 

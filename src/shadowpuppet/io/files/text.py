@@ -1,4 +1,4 @@
-"""Text and TOML files read, and files written whole."""
+"""Reads text and TOML files; writes files completely or not at all."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from typing import Any
 from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 
 TEXT_LIMIT = 1_000_000_000
-"""Bytes of a table or motion; a longer one would not fit into memory as numbers."""
+"""Greatest size of a table or motion, bytes; a longer one would not fit into memory as numbers."""
 TOML_LIMIT = 10_000_000
-"""Bytes of a calibration or settings; a film given by mistake is not read."""
+"""Greatest size of a calibration or settings file, bytes, so that a film given by mistake is not read."""
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file. Raises `FormatError` where it cannot be read, is empty, too long or no text."""
+    """The text of a UTF-8 file. Raises `FormatError` if it cannot be read, is empty, too long or no text."""
     text = read_limited(path, TEXT_LIMIT, FormatError, "a text file")
     if "\0" in text:
         raise FormatError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
@@ -28,7 +28,7 @@ def read_text(path: Path) -> str:
 
 
 def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any]:
-    """The tables of a TOML file. Raises `error` where it is missing, too long or not TOML."""
+    """The tables of a TOML file. Raises `error` if it is missing, too long or not TOML."""
     text = read_limited(Path(path), TOML_LIMIT, error, "a TOML file")
     try:
         return tomllib.loads(text)
@@ -50,7 +50,7 @@ def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: s
 
 @contextlib.contextmanager
 def errors_named(where: object) -> Iterator[None]:
-    """Raises `ShadowPuppetError` as `FormatError` that begins with the file."""
+    """Convert `ShadowPuppetError` to `FormatError`, whose message begins with the file."""
     try:
         yield
     except FormatError:
@@ -60,7 +60,7 @@ def errors_named(where: object) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file completely or not at all. Raises `ShadowPuppetError` where it cannot be written."""
+    """Write a file completely or not at all. Raises `ShadowPuppetError` if it cannot be written."""
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_bytes(content.encode("utf-8", "replace") if isinstance(content, str) else content)

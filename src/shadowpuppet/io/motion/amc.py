@@ -1,6 +1,6 @@
-"""AMC files (Acclaim): motion over an ASF skeleton (`asf.py`), as joints in metres.
+"""Reads AMC files (Acclaim): motion of an ASF skeleton (`asf.py`), as joints in metres.
 
-The format of the CMU graphics lab's motion capture database; joints by our names need that database's names of bones.
+This is the format of the CMU graphics lab's motion capture database; our joint names need that database's bone names.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ ENDS = {
                             ("hip", "hipjoint"), ("knee", "femur"), ("ankle", "tibia"), ("ball", "foot"), ("toes", "toes"))
     },
 }  # fmt: skip
-"""The bone at whose far end each joint lies; joints beside ours tell the rotation of segments. `pelvis` lies between the hips, `face`
-before the crown."""
+"""For each joint, the bone whose far end it is; joints that are not ours show the rotation of segments. In addition, `pelvis` lies between
+the hips, `face` in front of the crown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Capture:
     root: Array
     """Position of the root (T, 3), metres, in the file's world."""
     root_rotation: Array
-    """(T, 3, 3)."""
+    """Rotation of the root (T, 3, 3), in the file's world."""
     angles: Array
     """Angles of the bones about x, y and z of their axes (T, B, 3), rad; 0 for axes without a degree of freedom."""
 
@@ -69,7 +69,7 @@ class Capture:
     def joints(self, rate: float = 120.0) -> JointTable:
         """Joints of `ENDS`, `pelvis` and `face` at `rate` frames/s from 0 s, metres, z up.
 
-        Raises `FormatError` where the skeleton lacks a bone.
+        Raises `FormatError` if the skeleton lacks a bone.
         """
         places = {name: self.ends[:, self.skeleton.index(bone)] for name, bone in ENDS.items()}
         places["pelvis"] = (places["left_hip"] + places["right_hip"]) / 2
@@ -85,7 +85,7 @@ class Capture:
 
 
 def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
-    """Read an AMC file. Raises `FormatError`, naming the line, where it is malformed or of another skeleton."""
+    """Read an AMC file. Raises `FormatError`, naming the line, if it is malformed or of another skeleton."""
     path = Path(path)
     lines = read_text(path).splitlines()
     first, degrees = _header(path, lines, skeleton)
@@ -111,7 +111,7 @@ def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
 
 
 def read_mocap(path: str | Path, skeleton: str | Path | None = None) -> Capture:
-    """Read an AMC file with its skeleton: an ASF file, or the one beside it.
+    """Read an AMC file with its skeleton: an ASF file, by default the one in the same folder.
 
     For `02_10.amc` that is `02_10.asf`, `02.asf`, or the only .asf file in the folder. Raises `FormatError`.
     """

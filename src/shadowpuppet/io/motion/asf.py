@@ -1,4 +1,4 @@
-"""ASF files (Acclaim): the skeleton of a motion capture."""
+"""Reads ASF files (Acclaim): the skeleton of a motion capture."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Skeleton:
 def read_asf(path: str | Path) -> Skeleton:
     """Read an ASF file. Lengths are in units of 1/length inches, as the CMU graphics lab's.
 
-    Raises `FormatError`, naming line and key, where the file is malformed.
+    Raises `FormatError`, naming line and key, if the file is malformed.
     """
     path = Path(path)
     sections = _sections(path)
@@ -170,7 +170,7 @@ def _limits(path: Path, rows: Rows, dofs: Sequence[str], angle: float) -> Array 
 
 
 def _ordered(path: Path, bones: list[Bone], rows: Rows) -> tuple[Bone, ...]:
-    """The bones with their parents, parents first. Raises `FormatError` where the hierarchy is not one tree."""
+    """The bones with their parents, parents first. Raises `FormatError` if the hierarchy is not one tree."""
     from dataclasses import replace
 
     named = {bone.name: bone for bone in bones}

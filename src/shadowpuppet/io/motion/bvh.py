@@ -1,4 +1,4 @@
-"""BVH files (Biovision) read: a skeleton and its motion, as joints by forward kinematics."""
+"""Reads BVH files (Biovision): a skeleton and its motion, as joints by forward kinematics."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Bvh:
         return self._local(self.values, [self._is_added(n) for n in range(len(self.nodes))])
 
     def _local(self, values: Array, added: list[bool]) -> tuple[Array, Array]:
-        """The same for channel values (T, C); `added`: as `_is_added`, by node."""
+        """As `local_transforms`, for channel values (T, C); `added`: `_is_added` of each node."""
         turns, shifts = np.empty((len(values), len(self.nodes), 3, 3)), np.empty((len(values), len(self.nodes), 3))
         for n, (node, columns) in enumerate(zip(self.nodes, self._columns)):
             own, shifts[:, n] = np.eye(3), node.offset
@@ -92,8 +92,8 @@ class Bvh:
     def _is_added(self, n: int) -> bool:
         """Whether a node's position channels are added to its offset, rather than replace it.
 
-        For the root they are, by the format's first description. For other joints programs differ: most write the whole position, which
-        shows by values near the offset.
+        They are for the root, by the format's first description. For other joints programs differ: most write the whole position, which is
+        recognised by values near the offset.
         """
         node, columns = self.nodes[n], self._columns[n]
         shifts = [(node.offset[channel], self.values[:, column]) for channel, column in zip(node.channels, columns) if channel < 3]
@@ -104,7 +104,7 @@ class Bvh:
 
 
 def read_bvh(path: str | Path) -> Bvh:
-    """Read a BVH file. Raises `FormatError`, naming the line, where it is malformed; warns where it breaks off."""
+    """Read a BVH file. Raises `FormatError`, naming the line, if it is malformed; warns if it breaks off."""
     path = Path(path)
     lines = read_text(path).splitlines()
     motion = next((n for n, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
@@ -215,7 +215,7 @@ def _header(path: Path, lines: list[str], motion: int) -> tuple[float, int]:
 
 
 def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
-    """Channel values (T, width) of the lines from index `first` on, a frame a line, without a last line that breaks off."""
+    """Channel values (T, width) of the lines from index `first` on, one frame per line; an incomplete last line is left out."""
     rows = [(n, line.split()) for n, line in enumerate(lines[first:], first + 1) if line.strip()]
     if len(rows) > 1 and len(rows[-1][1]) < width:
         warn(f"{path}: line {rows[-1][0]}: the file breaks off within a frame; the {len(rows) - 1} before it are used",
@@ -234,7 +234,7 @@ def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
 
 
 def _numbers(words: list[str]) -> Array | None:
-    """Words as finite numbers; None where one is not."""
+    """Words as finite numbers; None if one is not."""
     try:
         values = np.array(words, float)
     except ValueError:

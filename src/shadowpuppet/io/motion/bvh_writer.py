@@ -1,4 +1,4 @@
-"""BVH files written (read by `bvh.py`): Y up, as Blender's importer expects."""
+"""Writes BVH files (read by `bvh.py`): Y up, as Blender's importer expects."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from shadowpuppet.motion.interpolation import uniform_sampling
 
 POSITIONS = "Xposition Yposition Zposition"
 UNKNOWN_END = (0.0, 0.0, 0.0)
-"""End site of a leaf whose end is unknown."""
+"""End site of a leaf joint if its end is unknown."""
 
 
 def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     """Write an animated skeleton: constant offsets, Euler angles in degrees, Y up.
 
-    The format has neither gaps nor times: unknown frames are interpolated, and frames at no constant rate are resampled, each with a
+    The format has neither gaps nor times: unknown frames are interpolated, and frames at a varying rate are resampled, each with a
     warning. A joint rotates about Z, X, Y if these stay away from their singularity, else in another order; it has position channels only
-    if its position changes. `unit`: m (as Blender expects), cm or mm. Raises `ShadowPuppetError` where no frame is known or the file cannot
+    if its position changes. `unit`: m (as Blender expects), cm or mm. Raises `ShadowPuppetError` if no frame is known or the file cannot
     be written.
     """
     path = Path(path)
@@ -47,7 +47,7 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
 
 
 def at_constant_rate(path: Path, animation: Animation) -> tuple[float, Animation]:
-    """Frames/s, and the animation at that constant rate with all frames known. Warns of what was interpolated."""
+    """Frames/s, and the animation resampled at that constant rate, without unknown frames. Warns of interpolated frames."""
     try:
         grid = uniform_sampling(animation.times)
         made = animation.at(grid.times if grid.frames is None else _own_times(animation, grid.times, grid.frames))
@@ -64,7 +64,7 @@ def at_constant_rate(path: Path, animation: Animation) -> tuple[float, Animation
 
 
 def _own_times(animation: Animation, times: Array, frames: NDArray[np.int64]) -> Array:
-    """Times of the grid, those of frames where there is one, so that known frames are not interpolated."""
+    """Times of the grid, replaced by the exact times of existing frames, so that these are not interpolated."""
     return np.where(frames >= 0, animation.times[np.maximum(frames, 0)], times)
 
 

@@ -1,6 +1,6 @@
-"""C3D files (c3d.org) read: markers over time in blocks of 512 bytes, as integers or floats of three kinds of processors.
+"""Reads C3D files (c3d.org): markers over time in blocks of 512 bytes, as integers or floats of three kinds of processors.
 
-A reader of our own: damaged files crash ezc3d.
+The library ezc3d is not used because damaged files crash it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ KEY = 0x50
 INTEL, DEC, MIPS = 84, 85, 86
 """Kinds of processors in the parameter section."""
 MAX_COORDINATE = 1e6
-"""Metres; larger coordinates are unknown."""
+"""Largest coordinate, metres; larger ones count as unknown."""
 CHAR, BYTE, INT, FLOAT = -1, 1, 2, 4
 """Types of parameters, by their bytes."""
 
@@ -40,13 +40,13 @@ class C3d:
 
     path: Path
     parameters: dict[str, Any]
-    """By GROUP:NAME: a list of words, or an array of numbers."""
+    """Parameters by GROUP:NAME, each a list of words or an array of numbers."""
     points: int
-    """Markers, N."""
+    """Number of markers, N."""
     analog: int
-    """Analog values a frame."""
+    """Number of analog values per frame."""
     frames: int
-    """Frames that are both stated and present."""
+    """Number of frames that are both stated and present."""
     start: int
     """First byte of the data."""
     scale: float
@@ -74,10 +74,10 @@ class C3d:
 
 
 def read_c3d(path: str | Path) -> JointTable:
-    """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN where not measured.
+    """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN if not measured.
 
-    Not measured: a negative residual, a position that is exactly the origin, as some programs write it, or no finite one. Raises
-    `FormatError` where the file is malformed; warns where it breaks off or has no unit.
+    A point is not measured if its residual is negative, or its position is not finite or exactly the origin, as some programs write it.
+    Raises `FormatError` if the file is malformed; warns if it breaks off or has no unit.
     """
     path = Path(path)
     header = read_header(path)
@@ -182,7 +182,7 @@ def _metres(header: C3d) -> float:
 
 
 def _parameters(section: bytes, processor: int) -> dict[str, Any]:
-    """Values by GROUP:NAME. Raises `struct.error`, `IndexError` or `ValueError` where the section is damaged."""
+    """Values by GROUP:NAME. Raises `struct.error`, `IndexError` or `ValueError` if the section is damaged."""
     groups, found = dict[int, str](), list[tuple[int, str, Any]]()
     at, order = 4, ">" if processor == MIPS else "<"
     while at + 2 <= len(section):

@@ -1,4 +1,4 @@
-"""C3D files written (read by `c3d.py`): points as floats with residuals, and angles as analog channels."""
+"""Writes C3D files (read by `c3d.py`): points as floats with residuals, and angles as analog channels."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ Angles = Mapping[str, tuple[str, Array]]
 
 
 def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None) -> None:
-    """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, a value a frame.
+    """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, one value per frame.
 
-    Frames get one rate: missing ones are unknown; frames at no constant rate are resampled, with a warning. Raises `ShadowPuppetError`
-    where there is no frame, a name is too long, or the file cannot be written.
+    The file has a constant rate: missing frames become unknown; frames at a varying rate are resampled, with a warning. Raises
+    `ShadowPuppetError` if there is no frame, a name is too long, or the file cannot be written.
 
     Args:
         path: the file.
         table: the joints; an unknown one gets the residual -1.
-        spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 where None or NaN.
-        angles: NaN where unknown.
+        spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 for None or NaN.
+        angles: unit and values (T,) of each angle; NaN if unknown.
     """
     path, angles = Path(path), angles or {}
     bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= MAX_LETTERS]
@@ -120,7 +120,7 @@ def _word(name: str, word: str) -> Parameter:
 
 
 def _words(name: str, words: Sequence[str]) -> list[Parameter]:
-    """A list of words, continued in NAME2, NAME3, ... where it is too long."""
+    """A list of words, continued in NAME2, NAME3, ... if it is too long."""
     parts = [[word.encode() for word in words[n : n + MAX_NAMES]] for n in range(0, len(words), MAX_NAMES)]
     widths = [max(map(len, part)) for part in parts]
     return [(f"{name}{n if n > 1 else ''}", CHAR, (width, len(part)), b"".join(word.ljust(width) for word in part))

@@ -1,4 +1,4 @@
-"""glTF 2.0 animations written as a binary file (GLB): a skinned puppet for Blender, game engines and browsers."""
+"""Writes glTF 2.0 animations as a binary file (GLB): a skinned puppet for Blender, game engines and browsers."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ POINTS, INDICES = 34962, 34963
 """Targets of buffers: vertices, and indices of triangles."""
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MIN_ROTATION = 1e-7
-"""A joint whose rotation matrices differ less from the identity is not animated."""
+"""Difference of rotation matrices from the identity below which a joint is not animated."""
 
 
 def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
     """Write a skinned mesh and its animation: metres, Y up, times from 0.
 
     Unknown frames have no keys: the puppet's scale is 0 there, which hides it, and `extras.unknown` of the animation lists them as pairs
-    of seconds, from and to; a warning says so. Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
+    of seconds, from and to; a warning says so. Raises `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
     path, known = Path(path), np.flatnonzero(animation.known)
     if not len(known):
@@ -68,7 +68,7 @@ class _Buffer:
         self.data, self.views, self.accessors = bytearray(), list[dict[str, Any]](), list[dict[str, Any]]()
 
     def add(self, values: NDArray, kind: str, number: int, bounds: bool = False, target: int | None = None) -> int:
-        """Append values (N, width of `kind`); the index of their accessor. `bounds`: state minimum and maximum."""
+        """Append values (N, width of `kind`); returns the index of their accessor. `bounds`: store minimum and maximum."""
         dtype = {FLOAT: "<f4", BYTE: "u1", SHORT: "<u2", INT: "<u4"}[number]
         flat = np.ascontiguousarray(values).astype(dtype).reshape(-1, WIDTHS[kind])
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": flat.nbytes}
@@ -103,7 +103,7 @@ def _inverse_bind(animation: Animation) -> Array:
 
 
 def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
-    """A node a joint, posed as in `frame` for viewers without animation."""
+    """A node for each joint, posed as in `frame` for viewers without animation."""
     shifts = _shifts(animation)
     nodes = []
     for j, name in enumerate(animation.names):
@@ -115,7 +115,7 @@ def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
 
 
 def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> dict[str, Any]:
-    """Samplers and channels: rotations and positions of joints where they change, and scale 0 in unknown frames."""
+    """Samplers and channels: rotations and positions of joints if they change, and scale 0 in unknown frames."""
     times = animation.times - animation.times[0]
     keys, shifts = buffer.add(times[known], "SCALAR", FLOAT, bounds=True), _shifts(animation)[known]
     samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()

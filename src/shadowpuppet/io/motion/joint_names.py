@@ -1,4 +1,4 @@
-"""Our joint names, and those of other programs."""
+"""Our joint names, and their names in other programs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SIDED = {
     "knee": ("kjc", "knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo", "lowerlegproximal"),
     "ankle": ("ajc", "ankle", "foot", "tio", "lowerlegdistal"),
 }
-"""The same for joints with a side. `hand` is the wrist where no other name is; `hjc`, ... are OpenSim's joint centres."""
+"""The same for joints with a side. `hand` is the wrist if there is no other name for it; `hjc`, ... are OpenSim's joint centres."""
 EITHER_SIDE = {
     "elbow": (("lelbow", "melbow"), ("elbowlat", "elbowmed"), ("lel", "mel")),
     "wrist": (("lwrist", "mwrist"), ("wristlat", "wristmed"), ("faradius", "faulna")),
@@ -51,15 +51,15 @@ HUMANEVA = re.compile(r"^(upper|lower)([LR])(Arm|Leg)(Proximal|Distal)$")
 PREFIXES = re.compile(r"^(?:.*[:|]|mixamorig\d*_|bip0*1[ _]|character1_)", re.IGNORECASE)
 """Prefixes of joint names: of the person, or the program."""
 WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-"""The words of a name such as LeftUpLeg, left_up_leg, L UpLeg."""
+"""Matches the words of a name like LeftUpLeg, left_up_leg, L UpLeg."""
 LETTERS = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
 def renamed(table: JointTable) -> JointTable:
-    """The joints of a table that are ours, by our names and in our order.
+    """Our joints in a table, by our names and in our order.
 
-    A joint between a pair of markers is their middle. A missing `pelvis` is the middle of the hips. A head beside a nose is the crown, as
-    in 2D detectors, and left out. Raises `FormatError` where no joint is known.
+    A joint with a pair of markers is their midpoint. A missing `pelvis` is the midpoint of the hips. If there is also a nose, the head is
+    taken for the crown, as in 2D detectors, and left out. Raises `FormatError` if no joint is known.
     """
     columns, pairs = columns_of(table.names), pairs_of(table.names)
     if not columns and not pairs:
@@ -74,7 +74,7 @@ def renamed(table: JointTable) -> JointTable:
 
 
 def columns_of(names: Sequence[str]) -> dict[str, int]:
-    """Index into `names` of each of our joints that is among them."""
+    """For each of our joints that is in `names`, its index there."""
     found = {name.lower(): n for n, name in enumerate(names) if name.lower() in JOINTS}
     stems: dict[tuple[str, str], int] = {stem: n for n, stem in reversed([*enumerate(map(side_and_stem, names))])}
     taken = set(found.values())
@@ -91,7 +91,7 @@ def columns_of(names: Sequence[str]) -> dict[str, int]:
 
 
 def pairs_of(names: Sequence[str]) -> dict[str, list[int]]:
-    """Indices of the pair of markers of each of our joints that has one, and is not among `names` by our name."""
+    """For each of our joints that is not in `names` but has a pair of markers there, the indices of the pair."""
     stems = {stem: n for n, stem in reversed([*enumerate(map(side_and_stem, names))])}
     ours = {name.lower() for name in names}
     found = {}

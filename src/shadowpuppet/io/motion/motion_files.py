@@ -1,4 +1,4 @@
-"""Joints from motion files of any format, by our names, in metres, Z up; and the truth that a run is compared with."""
+"""Reads motion files of any format: joints by our names, in metres, Z up; and the ground truth with which a run is compared."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ AMC_RATE = 120.0
 """Default frames/s of .amc files, which do not state it: the CMU laboratory's."""
 LEG_LENGTHS = {"metres": (0.35, 1.1, 1.0), "centimetres": (42.0, 110.0, 0.01), "millimetres": (350.0, 1100.0, 0.001),
                "inches": (21.0, 42.0, 0.0254), "units of the CMU database": (7.0, 21.0, 0.0254 / 0.45)}
-"""Range of a leg's length, hip to ankle, in each unit, and the unit in metres. Ranges do not overlap for legs of 0.4 to 1.1 m, if
-nobody measures a small child in inches."""
+"""Range of a leg's length, hip to ankle, in each unit, and the unit in metres. Ranges do not overlap for legs of 0.4 to 1.1 m,
+assuming that small children are not measured in inches."""
 ARM_TO_LEG = 1.48
 """Ratio of a leg's length to an arm's, shoulder to wrist (Drillis and Contini, in Winter 2009: 0.491 and 0.332 of the stature)."""
 MIN_COSINE = 0.7
-"""Least cosine between an axis and the mean direction from legs to head for the axis to be up."""
+"""Least cosine between an axis and the mean direction from legs to head for the axis to count as up."""
 TO_Z_UP = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)), "+y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
          "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)), "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1))}
 """Rotations from worlds in which another axis is up."""
 
 
 def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None) -> JointTable:
-    """Joints from a motion file, an ending of `READABLE` (.amc: with its .asf beside it), in metres, Z up.
+    """Read joints from a motion file (ending in `READABLE`; .amc needs its .asf in the same folder), in metres, Z up.
 
-    What the file does not state, the unit (BVH) or the axis that is up, is estimated from the person's legs and posture, with a warning.
+    If the file does not state the unit (BVH) or the up axis, they are estimated from the person's legs and posture, with a warning.
     Raises `FormatError`, naming the file.
 
     Args:
         path: the file.
         rate: frames/s of an .amc file (default 120).
-        own_names: keep all joints under the file's names; else our joints only, by our names.
+        own_names: keep all joints under the file's names; else keep only our joints, by our names.
         unit: metres of a BVH file's unit, if known.
     """
     path = Path(path)
@@ -66,10 +66,10 @@ READERS = {".c3d": read_c3d, ".csv": read_joints, ".npz": read_npz, ".parquet": 
 
 
 def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
-    """True joints to compare a run with, by our names, metres; joints named in `known` (the run's) are kept, too.
+    """Read the ground truth of a run: joints by our names, metres; joints named in `known` (the run's) are kept, too.
 
-    The axes of the file stay, as a truth must be in the cameras' world; BVH and AMC, which have worlds of their own, are read by
-    `read_motion`. Raises `FormatError`, naming the file and what is in it.
+    The file's axes are kept, as the truth must be in the cameras' world; BVH and AMC files, which have their own worlds, are read by
+    `read_motion`. Raises `FormatError`, naming the file and its content.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -108,7 +108,7 @@ def _ours(path: Path, table: JointTable) -> JointTable:
 
 
 def _known(table: JointTable) -> JointTable:
-    """The joints that are ours, by our names; may be empty."""
+    """Our joints in a table, by our names; may be empty."""
     try:
         return renamed(table)
     except ShadowPuppetError:
@@ -116,7 +116,7 @@ def _known(table: JointTable) -> JointTable:
 
 
 def unit_of(path: Path, table: JointTable) -> float:
-    """A table's unit in metres, by the length of legs or arms. Warns of it. Raises `FormatError` where none fits."""
+    """A table's unit in metres, estimated from the length of legs or arms, with a warning. Raises `FormatError` if no unit fits."""
     length = leg_length(_known(table))
     for unit, (low, high, metres) in LEG_LENGTHS.items():
         if low <= length < high:
@@ -128,7 +128,7 @@ def unit_of(path: Path, table: JointTable) -> float:
 
 
 def leg_length(table: JointTable) -> float:
-    """Median length of the legs, or of the arms in proportion, in the table's unit; NaN where unknown."""
+    """Median length of the legs, or of the arms in proportion, in the table's unit; NaN if unknown."""
     p = dict(zip(table.names, np.moveaxis(table.positions, 1, 0)))
     for chain, factor in ((("hip", "knee", "ankle"), 1.0), (("shoulder", "elbow", "wrist"), ARM_TO_LEG)):
         sides = [[p.get(f"{side}_{joint}") for joint in chain] for side in ("left", "right")]
@@ -142,7 +142,7 @@ def leg_length(table: JointTable) -> float:
 
 
 def rotation_to_z_up(path: Path, table: JointTable) -> Array:
-    """The rotation (3, 3) after which Z is up, by where the head is over the legs on average. Warns of one."""
+    """The rotation (3, 3) to Z up, estimated from the mean direction from legs to head. Warns unless it is the identity."""
     axis = up_axis(_known(table))
     if axis not in TO_Z_UP:
         return np.eye(3)
@@ -151,7 +151,7 @@ def rotation_to_z_up(path: Path, table: JointTable) -> Array:
 
 
 def up_axis(table: JointTable) -> str:
-    """The axis along which a person stands, such as `+y`; `+z` where none is clear."""
+    """The axis along which a person stands, for example `+y`; `+z` if none is clear."""
     low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip", "pelvis"), ("neck", "head", "shoulder")))
     up = high - low
     lengths = np.linalg.norm(up, axis=1, keepdims=True)
@@ -164,7 +164,7 @@ def up_axis(table: JointTable) -> str:
 
 
 def _middle(table: JointTable, joints: tuple[str, ...]) -> Array:
-    """The middle (T, 3) of the first of `joints` that the table has, both sides; NaN where it has none."""
+    """The middle (T, 3) of the first of `joints` that the table has, both sides; NaN if it has none."""
     for joint in joints:
         columns = [n for n, name in enumerate(table.names) if name in (joint, f"left_{joint}", f"right_{joint}")]
         if columns:

@@ -1,4 +1,4 @@
-"""Joints, and whole motions of runs, as archives of arrays (NPZ)."""
+"""Reads and writes joints, and whole motions of runs, as archives of arrays (NPZ)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.motion import JointTable, Motion
 
 JOINT_ARRAYS = ("times", "joint_names", "joints")
-"""Seconds (T,), names (J,), and positions (T, J, 3) in the world, metres, NaN where unknown. A run's motion.npz has them, too."""
+"""Seconds (T,), names (J,), and positions (T, J, 3) in the world, metres, NaN if unknown. A run's motion.npz has these arrays, too."""
 MOTION_ARRAYS = tuple(field.name for field in fields(Motion))
 
 
@@ -29,12 +29,12 @@ def read_npz(path: str | Path) -> JointTable:
 
 
 def write_npz(path: str | Path, table: JointTable) -> None:
-    """Write joints as `JOINT_ARRAYS`. Raises `ShadowPuppetError` where that fails."""
+    """Write joints as `JOINT_ARRAYS`. Raises `ShadowPuppetError` if that fails."""
     write_whole(Path(path), archive_bytes(times=table.times, joint_names=np.array(table.names), joints=table.positions))
 
 
 def read_motion_npz(path: Path) -> Motion:
-    """A run's motion. Raises `FormatError`."""
+    """Read a run's motion. Raises `FormatError`."""
     try:
         arrays: dict[str, Any] = read_all_arrays(path, MOTION_ARRAYS)
         arrays["body_name"] = str(arrays["body_name"])
@@ -44,5 +44,5 @@ def read_motion_npz(path: Path) -> Motion:
 
 
 def write_motion_npz(path: str | Path, motion: Motion) -> None:
-    """Write all fields of a motion. Raises `ShadowPuppetError` where that fails."""
+    """Write all fields of a motion. Raises `ShadowPuppetError` if that fails."""
     write_whole(Path(path), archive_bytes(**{name: getattr(motion, name) for name in MOTION_ARRAYS}))

@@ -1,8 +1,8 @@
-"""OpenSim: names of markers, a skeleton's motion as coordinates of a full-body model, and MOT files, which hold coordinates.
+"""OpenSim formats: marker names, a skeleton's motion as coordinates of a full-body model, and MOT files, which contain coordinates.
 
 Markers are named as in Pose2Sim's marker sets; coordinates are those of the full-body model of Rajagopal et al. (2016). Its world and
-bodies have X forward, Y up, Z to the right, and ball joints rotate about Z, then X, then Y. A MOT file is a table behind a short header,
-angles in degrees, lengths in metres.
+bodies have X forward, Y up, Z to the right, and ball joints rotate about Z, then X, then Y. A MOT file is a table after a short header,
+with angles in degrees and lengths in metres.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Ball(NamedTuple):
     """Joint of the skeleton."""
     names: tuple[str, str, str]
     limits: tuple[Pair, Pair, Pair]
-    """Usual ranges, degrees; of the equivalent triples of angles the one least outside is taken."""
+    """Usual ranges, degrees; of equivalent triples of angles, the one least outside these is used."""
     signs: tuple[int, int, int] = (1, 1, 1)
 
 
@@ -56,7 +56,7 @@ class Hinge(NamedTuple):
     name: str
     sign: int
     first: bool = False
-    """Whether it comes before the joint's other rotation (an ankle's inversion); else after it (an elbow's about the upper arm)."""
+    """Whether this rotation precedes the joint's other one (an ankle's inversion); else it follows it (an elbow's about the upper arm)."""
 
 
 COORDINATES: tuple[Ball | Hinge, ...] = (
@@ -72,8 +72,8 @@ COORDINATES: tuple[Ball | Hinge, ...] = (
         Hinge(f"{side}_elbow", f"elbow_flex_{s}", -1),
     )),
 )  # fmt: skip
-"""In the order of the file. Positive: a knee bends, an ankle bends up; hips and arms move forward, inward, and rotate inward. The upper
-body's `torso` is the chest. Not included: the head's rotation, and an ankle's inversion, whose axis is not the model's."""
+"""Coordinates in the order of the file. Positive: a knee bends, an ankle bends up; hips and arms move forward, inward, and rotate inward.
+The upper body's `torso` is the chest. Not included: the head's rotation, and an ankle's inversion, whose axis is not the model's."""
 PELVIS_POSITION = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 TO_MODEL = np.array([[0.0, 0, 1], [0, 1.0, 0], [-1.0, 0, 0]])
 """From a skeleton's axes at rest (left, up, forward) to the model's (forward, up, right)."""
@@ -88,7 +88,7 @@ def coordinates(animation: Animation) -> dict[str, Array]:
     """`COORDINATES` and `PELVIS_POSITION` over time, each (T,), rad or metres, of a skeleton whose joints have our names.
 
     Angles are continuous over the known frames, NaN in others. An elbow's rotation about the upper arm is added to the shoulder's.
-    Raises `ShadowPuppetError` where the root is not the pelvis, or no frame is known.
+    Raises `ShadowPuppetError` if the root is not the pelvis, or no frame is known.
     """
     known = np.flatnonzero(animation.known)
     if animation.names[0] != "pelvis" or not len(known):
@@ -156,7 +156,7 @@ class Coordinates(NamedTuple):
 def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> None:
     """Write coordinates (T,), rad or metres, as a MOT file. Frames with an unknown coordinate are left out: OpenSim has no gaps.
 
-    Raises `ShadowPuppetError` where no frame is known or the file cannot be written.
+    Raises `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
     path = Path(path)
     table = np.stack([times, *(values[name] if name.endswith(TRANSLATIONS) else np.degrees(values[name]) for name in values)], 1)
@@ -170,7 +170,7 @@ def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> No
 
 
 def read_mot(path: str | Path) -> Coordinates:
-    """Read a MOT file. Raises `FormatError`, naming line and column, where it is malformed; warns of a wrong number of rows."""
+    """Read a MOT file. Raises `FormatError`, naming line and column, if it is malformed; warns of a wrong number of rows."""
     path = Path(path)
     lines = read_text(path).splitlines()
     end = next((n for n, line in enumerate(lines[:MAX_HEADER]) if line.strip().lower() == "endheader"), None)

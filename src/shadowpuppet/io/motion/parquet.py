@@ -1,4 +1,4 @@
-"""Parquet files (Apache): tables of columns; needs the extra `formats` (pyarrow)."""
+"""Reads and writes Parquet files (Apache): tables of columns; needs the extra `formats` (pyarrow)."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ METADATA = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z
 
 
 def write_parquet(path: str | Path, columns: Columns) -> None:
-    """Write columns; null for NaN. Raises `ShadowPuppetError` where pyarrow is missing or the file cannot be written."""
+    """Write columns; null for NaN. Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
     write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
 
 
 def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns of values of one kind each, or None. Raises as `write_parquet`."""
+    """Write columns, each with values of one type or None. Raises the errors of `write_parquet`."""
     arrow, parquet = _arrow(path)
     arrays = {name: arrow.array(column, from_pandas=True) for name, column in columns.items()}
     out = io.BytesIO()
@@ -35,9 +35,9 @@ def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
 
 
 def read_parquet(path: str | Path) -> JointTable:
-    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; ignores other columns; null where unknown.
+    """Joints of a table with `time`, `<joint>_x`, `_y`, `_z`, ...; ignores other columns; null if unknown.
 
-    Raises `FormatError` where the file is malformed; `ShadowPuppetError` where pyarrow is missing.
+    Raises `FormatError` if the file is malformed; `ShadowPuppetError` if pyarrow is missing.
     """
     path = Path(path)
     arrow, parquet = _arrow(path)

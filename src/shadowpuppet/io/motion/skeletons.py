@@ -1,4 +1,4 @@
-"""Animated skeletons from BVH and ASF/AMC files, with the files' joint names, bones and rotations."""
+"""Reads animated skeletons from BVH and ASF/AMC files, with the files' joint names, bones and rotations."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CMU = {"root": "Hips", "lowerback": "LowerBack", "upperback": "Spine", "thorax":
 
 
 def read_animation(path: str | Path, rate: float | None = None, unit: float | None = None) -> Animation:
-    """The animated skeleton of a .bvh file, or of an .amc file with its .asf beside it, in metres, Z up.
+    """The animated skeleton of a .bvh file, or of an .amc file with its .asf in the same folder, in metres, Z up.
 
     `rate`, `unit` and warnings are as in `read_motion`. Raises `FormatError`.
     """
@@ -68,7 +68,7 @@ def _is_z_up(bvh: Bvh) -> bool:
 
 
 def _of_capture(capture: Capture, rate: float) -> Animation:
-    """A joint at the beginning of each bone, which is its parent's end."""
+    """An animation with a joint at the beginning of each bone, which is its parent's end."""
     bones = capture.skeleton.bones
     along = np.array([bone.direction * bone.length for bone in bones])
     parents = (-1, *(bone.parent + 1 for bone in bones))

@@ -1,4 +1,4 @@
-"""Tables of ours: joints over time (CSV), a run's joints.csv and angles.csv, and a whole motion as columns.
+"""Our own tables: joints over time (CSV), a run's joints.csv and angles.csv, and a whole motion as columns.
 
 The names of all columns are made here. `MotionFrame` and `Motion` (motion.motion) hold what stands in them.
 """
@@ -21,7 +21,7 @@ from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
 
 AXES = ("_x", "_y", "_z")
 SD = "_sd"
-"""Ending of standard deviations; no joint or degree of freedom may end in it."""
+"""Suffix of columns of standard deviations; no name of a joint or degree of freedom may end in it."""
 TRANSLATIONS = ("torso_y", "root_x", "root_y", "root_z")
 """Degrees of freedom in metres; all others are angles."""
 Columns = dict[str, Array | NDArray[np.str_]]
@@ -34,7 +34,7 @@ def joint_columns(names: Sequence[str], suffix: str = "") -> list[str]:
 
 
 def column_joints(path: Path, columns: Sequence[str]) -> tuple[str, ...]:
-    """The joints to which columns belong, in order. Raises `FormatError` where there is none, or one lacks a column."""
+    """The joints to which columns belong, in order. Raises `FormatError` if there is none, or one lacks a column."""
     stems = list(dict.fromkeys(column[:-2] for column in columns if column.endswith(AXES)))
     names = tuple(stem for stem in stems if not stem.endswith(SD))
     missing = [column for column in joint_columns(names) if column not in columns]
@@ -133,7 +133,7 @@ def _statuses(table: Table) -> np.ndarray:
 def motion_columns(motion: Motion) -> Columns:
     """A whole motion: `time`, joints (world, metres), their deviations, `status`, `cost`, `overlap`, then degrees of freedom.
 
-    The latter have their unit in the name, `chest_x [rad]`, so that none is taken for a joint's. Columns without a known value are
+    Names of degrees of freedom end in their unit, `chest_x [rad]`, so that none is taken for a joint's. Columns without a known value are
     left out.
     """
     found: Columns = table_columns(motion.table)
@@ -153,11 +153,11 @@ def table_columns(table: JointTable) -> Columns:
 
 
 def dof_unit(name: str) -> str:
-    """The unit of a degree of freedom: m or rad."""
+    """The unit of a degree of freedom by its name: m or rad."""
     return "m" if name in TRANSLATIONS else "rad"
 
 
 def write_columns(path: Path, columns: Columns) -> None:
-    """Write columns as CSV, to the micrometre; empty cells for NaN. Raises `ShadowPuppetError` where that fails."""
+    """Write columns as CSV, to the micrometre; empty cells for NaN. Raises `ShadowPuppetError` if that fails."""
     texts = [column.tolist() if column.dtype.kind == "U" else cells(column.tolist()) for column in columns.values()]
     write_whole(path, "".join([csv_line(columns), *map(csv_line, zip(*texts))]))

@@ -1,4 +1,4 @@
-"""TRC files (Motion Analysis; OpenSim, Pose2Sim): markers over time, separated by tabs, usually in millimetres."""
+"""Reads and writes TRC files (Motion Analysis; OpenSim, Pose2Sim): markers over time, separated by tabs, usually in millimetres."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KEYS = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataR
 def read_trc(path: str | Path) -> JointTable:
     """Read a TRC file: markers in metres, in the file's axes; an empty cell is unknown.
 
-    Raises `FormatError`, naming line and column, where the file is malformed; warns of a wrong number of frames.
+    Raises `FormatError`, naming line and column, if the file is malformed; warns of a wrong number of frames.
     """
     path = Path(path)
     lines = [re.split("\t", line) for line in read_text(path).splitlines()]
@@ -40,7 +40,7 @@ def read_trc(path: str | Path) -> JointTable:
 
 
 def write_trc(path: str | Path, table: JointTable, unit: str = "mm") -> None:
-    """Write joints as markers without changing axes; empty where unknown. Raises `ShadowPuppetError` where that fails."""
+    """Write joints as markers without changing axes; cells are empty if unknown. Raises `ShadowPuppetError` if that fails."""
     path = Path(path)
     if unit not in METRES:
         raise ShadowPuppetError(f"unit: found {unit!r}, expected one of {choices(METRES)}")

@@ -1,1 +1,1 @@
-"""What a live session shows: a page for a browser, or nothing."""
+"""Displays of a live session: a page for a browser, or none."""

@@ -1,4 +1,4 @@
-"""The display that `--show` asks for."""
+"""Opens the display selected by `--show`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FOOTERS = {
 def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, record: bool = False) -> Display:
     """The display for `auto`, `browser` or `none`; `auto` also opens the page in a browser if there is a screen.
 
-    Raises `SettingsError` where it cannot be served.
+    Raises `SettingsError` if it cannot be served.
     """
     if show == "none":
         return Display()

@@ -1,4 +1,4 @@
-"""The picture of a live session: the camera's, with the silhouette's outline, the body and the skeleton drawn on it."""
+"""Draws the silhouette's outline, the body and the skeleton on the camera's picture for a live display."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from shadowpuppet.video import Image, Size
 
 MIN_SIDE, MAX_SIDE = 640, 960
-"""Limits of the longer side, pixels; lines on smaller pictures are coarse."""
+"""Limits of the picture's longer side, pixels; lines on smaller pictures would look coarse."""
 BODY_COLOUR = (0, 159, 230)
 """Blue green red."""
 DIM, TINT = 0.45, 0.15
@@ -24,7 +24,7 @@ DIM, TINT = 0.45, 0.15
 
 
 def drawn(view: View) -> Image | None:
-    """The view's picture (H, W, 3), blue green red, with outline, body and skeleton drawn where known; None without a picture."""
+    """The view's picture (H, W, 3), blue green red, with outline, body and skeleton drawn if known; None without a picture."""
     import cv2
 
     if view.image is None:

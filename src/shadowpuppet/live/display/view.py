@@ -24,7 +24,7 @@ class Angle(NamedTuple):
 
     name: str
     value: float
-    """NaN where unknown."""
+    """NaN if unknown."""
     low: float
     high: float
 
@@ -69,7 +69,7 @@ class View:
         return "paused" if self.trouble else self.status if self.phase == "tracking" and self.status else self.phase
 
     def figures(self) -> dict[str, Any]:
-        """Everything but the arrays, for JSON: milliseconds and degrees, None where unknown."""
+        """Everything but the arrays, for JSON: milliseconds and degrees, None if unknown."""
         return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": _number(self.countdown, 1),
                 "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1),
                 "interval": _number(1000 * self.interval, 1), "rate": _number(self.rate, 1), "dropped": self.dropped,

@@ -34,7 +34,7 @@ class WebDisplay(Display):
     def __init__(self, listen: str = "127.0.0.1", port: int | None = None, footer: str = "", opening: bool = False) -> None:
         """Listen at an address and port (None: `PORT`, or any that is free).
 
-        `footer`: the page's last line; `opening`: open the page in this machine's browser. Raises `SettingsError` where the address
+        `footer`: the page's last line; `opening`: open the page in this machine's browser. Raises `SettingsError` if the address
         or port is not available.
         """
         self.footer, self.opening = footer, opening

@@ -60,7 +60,7 @@ class Bone(NamedTuple):
 
 
 class Avatar:
-    """The bones of `LINKS` that a subject's body has. A bone whose parent is missing hangs on the hips."""
+    """The bones of `LINKS` that a subject's body has. If a bone's parent is missing, its parent is the hips."""
 
     def __init__(self, subject: Subject) -> None:
         """Place the avatar: the floor is Y = 0; in the zero pose it stands upright at the origin, looking along Z."""

@@ -1,4 +1,4 @@
-"""The outlets that settings select."""
+"""Opens the outlets selected by the settings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shadowpuppet.network import host_and_port, is_loopback
 
 
 def open_outlets(settings: OutletSettings) -> Outlets:
-    """All outlets that are set. Warns of data that leave this machine. Raises `SettingsError` where one cannot be opened."""
+    """Open all outlets that are set. Warns if data leave this machine. Raises `SettingsError` if one cannot be opened."""
     with ExitStack() as opened:
         outlets = [opened.push(open_one(settings)) for field, open_one in OPENERS.items() if getattr(settings, field) is not None]
         opened.pop_all()

@@ -27,7 +27,7 @@ def beginning(subject: Subject) -> str:
 
 
 def framed(frame: StreamFrame) -> str:
-    """One frame; null where unknown."""
+    """The message of one frame; unknown values are null."""
     rotations = None if frame.rotations is None else Rotation.from_matrix(frame.rotations).as_quat(canonical=True)
     return _text({
         "type": "frame", "time": _number(frame.time, 6), "status": frame.status, "overlap": _number(frame.overlap, 4),

@@ -12,7 +12,7 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
 
 CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
-"""Configuration of liblsl: how far the stream is announced, no log."""
+"""Configuration of liblsl: scope of the stream's announcement; no log."""
 KINDS = (*(f"Position{axis}" for axis in "XYZ"), *(f"Orientation{axis}" for axis in "XYZW"))
 """Channels of a joint, named as in XDF's meta-data for motion capture."""
 MAX_BUFFERED = 1
@@ -20,7 +20,7 @@ MAX_BUFFERED = 1
 
 
 class LslOutlet(Outlet):
-    """A stream of type MoCap: seven channels a joint, position (metres) and quaternion, NaN where unknown.
+    """A stream of type MoCap: seven channels a joint, position (metres) and quaternion, NaN if unknown.
 
     A sample's time stamp is when its picture was captured.
     """
@@ -30,7 +30,7 @@ class LslOutlet(Outlet):
     def __init__(self, stream: str, scope: str = "machine") -> None:
         """`stream`: its name; `scope`: how far it is announced (machine, link or site).
 
-        Raises `SettingsError` where pylsl or liblsl is missing.
+        Raises `SettingsError` if pylsl or liblsl is missing.
         """
         try:
             import pylsl  # pyright: ignore[reportMissingImports]

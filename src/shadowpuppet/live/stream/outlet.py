@@ -46,7 +46,7 @@ class Subject:
     T_world_base: Array
     """From the body's frame (in the zero pose X forward, Y left, Z up) to the world, (4, 4)."""
     height: float | None = None
-    """Metres, shoes on."""
+    """Height with shoes, metres; None if unknown."""
     floor: float | None = None
     """Z of the floor in the world, metres; None if unknown, as with one camera that was not calibrated."""
 
@@ -106,7 +106,7 @@ class Outlet:
         """Close it."""
 
     def begin(self, subject: Subject) -> None:
-        """Start with a newly measured person, to whom the next frames belong."""
+        """Start with a newly measured person; the next frames are theirs."""
 
     def send(self, frame: StreamFrame) -> None:
         """Send a frame."""
@@ -121,10 +121,10 @@ class Outlet:
 
 
 class Outlets(Outlet):
-    """Several outlets as one. An outlet that raises is dropped; the session and the others go on."""
+    """Several outlets as one. An outlet that raises is dropped; the session and the other outlets continue."""
 
     def __init__(self, outlets: Iterable[Outlet] = ()) -> None:
-        """Any number of outlets."""
+        """`outlets`: any number of outlets."""
         self._all = self._working = list(outlets)
         self._problems = list[str]()
         self._open = ExitStack()
@@ -132,11 +132,11 @@ class Outlets(Outlet):
 
     @property
     def where(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Where all of them send to."""
+        """The destinations of all outlets."""
         return "; ".join(outlet.where for outlet in self._all if outlet.where)
 
     def __enter__(self) -> Self:
-        """Open all."""
+        """Open all outlets."""
         with ExitStack() as opened:
             for outlet in self._all:
                 opened.enter_context(outlet)
@@ -144,11 +144,11 @@ class Outlets(Outlet):
         return self
 
     def __exit__(self, *error: Any) -> None:
-        """Close all."""
+        """Close all outlets."""
         self._open.__exit__(*error)
 
     def begin(self, subject: Subject) -> None:
-        """Start a newly measured person on all."""
+        """Start all outlets with a newly measured person."""
         self._subject = subject
         self._each(lambda outlet: outlet.begin(subject))
 
@@ -158,22 +158,22 @@ class Outlets(Outlet):
             self.send(self._subject.stream_frame(frame, age))
 
     def send(self, frame: StreamFrame) -> None:
-        """Send a frame to all."""
+        """Send a frame to all outlets."""
         self._each(lambda outlet: outlet.send(frame))
 
     def trouble(self) -> str:
-        """The next problem of any."""
+        """The next problem of any outlet; empty if there is none."""
         self._problems += [problem for outlet in self._working if (problem := outlet.trouble())]
         return self._problems.pop(0) if self._problems else ""
 
     def counts(self) -> dict[str, Any]:
-        """Numbers of each outlet by its name."""
+        """Numbers for metrics.json of each outlet, by its name."""
         return {outlet.name: counts for outlet in self._all if (counts := outlet.counts())}
 
     def _each(self, call: Callable[[Outlet], None]) -> None:
         for outlet in self._working:
             try:
                 call(outlet)
-            except Exception as error:  # whatever it is, tracking goes on
+            except Exception as error:  # any error of an outlet: tracking continues
                 self._problems.append(f"{outlet.name}: {type(error).__name__}: {error}; nothing more is given to it")
                 self._working = [other for other in self._working if other is not outlet]

@@ -18,8 +18,8 @@ class OutletSettings:
     websocket: str | None = None
     """Serve JSON by WebSocket at [HOST:]PORT, by default to programs on this machine only; 0.0.0.0 lets others in."""
     origin: str | None = None
-    """Origins of web pages that may use the WebSocket, with commas, such as https://example.org; this machine's pages always may."""
+    """Origins of web pages that may use the WebSocket, separated by commas (https://example.org); pages of this machine always may."""
     lsl: str | None = None
-    """Name of a stream of the lab streaming layer."""
+    """Name of the stream of the lab streaming layer (LSL)."""
     lsl_scope: Literal["machine", "link", "site"] = "machine"
     """How far the stream is announced: this machine, the local network (link), or beyond (site)."""

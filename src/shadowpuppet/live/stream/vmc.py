@@ -28,7 +28,7 @@ BUNDLE_HEAD, LENGTH_FIELD = 16, 4
 
 
 def messages(avatar: Avatar, frame: StreamFrame) -> list[OscMessage]:
-    """The protocol's messages of a frame: root and bones where there is a pose; OK and T, which end every frame."""
+    """The protocol's messages of a frame: root and bones if there is a pose; then OK and T, which end every frame."""
     bones = avatar.bones(frame)
     made = [build_msg("/VMC/Ext/Root/Pos", ROOT)] if bones else []
     made += [build_msg("/VMC/Ext/Bone/Pos", (bone.name, *bone.position, *bone.rotation)) for bone in bones]
@@ -50,7 +50,8 @@ def bundles(messages: Iterable[OscMessage], largest: int = DATAGRAM_BYTES) -> It
 
 
 class VmcOutlet(Outlet):
-    """Sends each frame in bundles by UDP to one address. Never waits: what cannot be sent is counted, and the reason said once."""
+    """Sends each frame in bundles by UDP to one address. Never waits: failed datagrams are counted, and the reason is reported
+    once."""
 
     name = "osc"
 
@@ -85,7 +86,7 @@ class VmcOutlet(Outlet):
                 self._send(bundle)
 
     def trouble(self) -> str:
-        """That datagrams cannot be sent, once."""
+        """A sentence that datagrams cannot be sent, once; else empty."""
         if self._reported or not self.failed:
             return ""
         self._reported = True

@@ -22,14 +22,14 @@ CLOSE_SECONDS = 1.0
 
 
 class WebSocketOutlet(Outlet):
-    """Serves within its `with` block, in a thread of its own: a client that is slow or hangs delays nothing."""
+    """Serves frames within its `with` block, in its own thread, so that slow clients delay nothing."""
 
     name = "websocket"
 
     def __init__(self, host: str, port: int, origins: Sequence[str] = ()) -> None:
-        """`origins`: web pages that may connect, such as https://example.org, * for all; programs and this machine's pages always may.
+        """`origins`: origins of web pages that may connect (https://example.org), * for all; programs and local pages always may.
 
-        Raises `SettingsError` where the address or port is not available, or the library is missing.
+        Raises `SettingsError` if the address or port is not available, or the library is missing.
         """
         try:
             import websockets.asyncio.server  # noqa: F401
@@ -106,7 +106,7 @@ class WebSocketOutlet(Outlet):
         self._changed.set()
         closing = asyncio.ensure_future(self._closed(server))
         await asyncio.wait([closing], timeout=CLOSE_SECONDS)
-        for connection in list(server.connections):  # clients that do not answer
+        for connection in list(server.connections):  # connections of clients that do not answer
             connection.transport.abort()
         await closing
 

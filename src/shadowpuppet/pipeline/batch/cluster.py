@@ -1,4 +1,4 @@
-"""Tasks on other machines, by the workers of a Dask cluster; needs the extra `batch`."""
+"""Runs tasks on the workers of a Dask cluster, also on other machines; needs the extra `batch`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 PATIENCE = 20
 """Seconds that a scheduler may take to answer."""
 _kept = threading.local()
-"""Silhouettes that a worker's thread keeps from task to task, and the batch they are of."""
+"""Silhouette cache that a worker's thread keeps between tasks, and the start of the batch that it belongs to."""
 
 
 def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome:
@@ -32,10 +32,10 @@ def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome
 
 
 class Cluster(WorkerPool):
-    """The workers of a Dask cluster, which must have this package and see the same files under the same names."""
+    """Runs tasks on the workers of a Dask cluster, which must have this package and see the same files at the same paths."""
 
     def __init__(self, address: str, out: Path, start: str, reuse: bool, listener: BatchListener) -> None:
-        """`address`: of the scheduler, or a scheduler file; `out`: the batch's folder; `start` as in `do_there`."""
+        """`address`: the scheduler's address or a scheduler file; `out`: the batch's folder; `start` as in `do_there`."""
         self._address, self._out, self._start, self._reuse, self._listener = address, out, start, reuse, listener
         self._tasks: dict[Future, Task] = {}
         self._tries: dict[str, int] = {}
@@ -60,7 +60,7 @@ class Cluster(WorkerPool):
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Cancel what is not done. A run that a worker has begun goes on to its end, and the next start finds it."""
+        """Cancel tasks that are not done. A run that a worker has begun continues to its end, and the next start finds it."""
         if self._client.status == "running":
             self._client.cancel(list(self._tasks), force=True)
         self._client.close()

@@ -27,7 +27,7 @@ from shadowpuppet.pipeline.options import PATHS, make_options, settings_in
 from shadowpuppet.settings import merged
 
 MAX_RUNS = 100_000
-"""Combinations, or seeds, beyond which a grid is taken for a mistake."""
+"""Greatest number of combinations, and of seeds; more are taken for a mistake."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}")
 """Name of a case; it becomes part of a folder's name."""
 DEFAULT_CASE = "default"
@@ -35,11 +35,11 @@ DEFAULT_CASE = "default"
 
 
 class Case(NamedTuple):
-    """One choice of settings."""
+    """One combination of settings."""
 
     name: str
     values: dict[str, Any]
-    """Plain values, as `make_options` takes them."""
+    """Plain values for `make_options`."""
     varied: dict[str, Any]
     """Settings of the case or the grid, by dotted name."""
     tried: tuple[str, ...] = ()
@@ -47,13 +47,13 @@ class Case(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The case's name, where it has one, and the grid's values."""
+        """The case's name, if it has one, and the grid's values."""
         values = (f"{name.rpartition('.')[2]} {short(self.varied[name])}" for name in self.tried)
         return ", ".join([*([self.name] if self.name != DEFAULT_CASE else []), *values])
 
 
 class Grid(NamedTuple):
-    """All choices of settings, and the file's seeds; None where it has none."""
+    """All combinations of settings, and the file's seeds; None if it has none."""
 
     cases: tuple[Case, ...]
     seeds: tuple[int, ...] | None = None
@@ -75,7 +75,8 @@ def make_grid(settings: Mapping[str, Any] | None = None, *, cases: Mapping[str, 
               seeds: object = None, flags: Mapping[str, Any] | None = None, source: str = "grid") -> Grid:
     """A grid from plain values: settings of all runs, named `cases` of settings, and `grid`, lists of values by dotted name.
 
-    The grid's values replace a case's, and these the settings. `flags` replace the settings and may not be varied. Raises `SettingsError`.
+    Values of the grid override those of a case, which override the settings. `flags` override the settings and may not be varied.
+    Raises `SettingsError`.
     """
     make_options(dict(settings or {}), source)
     common = merged(settings or {}, flags or {})
@@ -154,19 +155,19 @@ def _case(source: str, name: str, table: object, common: Mapping[str, Any], chos
 
 
 def short(value: Any) -> str:
-    """A value for a label; paths by the file's name."""
+    """A value as text for a label; only the file name of a path."""
     return Path(value).name if isinstance(value, str) else "-".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _check_flags(flags: Mapping[str, Any], cases: Sequence[Case]) -> None:
-    """Raises `SettingsError` where a flag sets what the grid varies."""
+    """Raises `SettingsError` if a flag sets what the grid varies."""
     for case in cases:
         for name in set(flags) & set(case.varied):
             raise SettingsError(f"flags: {name}: found {shown(flags[name])}, but the grid varies it; expected one of them")
 
 
 def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted names as tables."""
+    """Convert dotted names to nested tables."""
     made: dict[str, Any] = {}
     for name, value in flat.items():
         *outer, last = name.split(".")
@@ -176,7 +177,7 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Tables as dotted names."""
+    """Convert nested tables to pairs of dotted names and values."""
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{before}{name}.")

@@ -16,7 +16,7 @@ MEASURES = ((("errors", "mean_mm"), "mean joint error, mm"), (("overlap", "mean"
 """Measures that are drawn: keys in metrics.json, and labels."""
 COLOURS = ("#1b6ca8", "#d1495b", "#3a7d44", "#b07d12", "#6a4c93", "#4d4d4d")
 MAX_ROWS = 60
-"""Rows of a plot that can be read; further ones are left out, and the title says so."""
+"""Greatest number of rows in a plot; further ones are left out, and the title says so."""
 
 
 def can_plot() -> bool:
@@ -25,7 +25,7 @@ def can_plot() -> bool:
 
 
 def rows_of(runs: Sequence[BatchRun]) -> dict[tuple[str, str], list[BatchRun]]:
-    """Runs by recording and choice of settings; those of a row differ in their seed."""
+    """Runs grouped by recording and settings; those of a group differ in their seed."""
     rows: dict[tuple[str, str], list[BatchRun]] = {}
     for run in runs:
         rows.setdefault((run.task.name, run.task.choice), []).append(run)
@@ -33,7 +33,7 @@ def rows_of(runs: Sequence[BatchRun]) -> dict[tuple[str, str], list[BatchRun]]:
 
 
 def measured(run: BatchRun, place: Sequence[str]) -> float:
-    """A number of a run's metrics, by its keys; NaN where there is none."""
+    """The number at keys `place` of a run's metrics; NaN if there is none."""
     value: Any = run.metrics
     for key in place:
         value = value.get(key) if isinstance(value, Mapping) else None
@@ -41,9 +41,9 @@ def measured(run: BatchRun, place: Sequence[str]) -> float:
 
 
 def plot_batch(runs: Sequence[BatchRun], path: Path) -> None:
-    """Draw error and overlap: a row for each recording and choice of settings, a point for each run, median, quartiles; .png, .pdf or .svg.
+    """Plot error and overlap to a .png, .pdf or .svg file: a row for each recording and settings, a point per run, median and quartiles.
 
-    Raises `ShadowPuppetError` where it cannot be written.
+    Raises `ShadowPuppetError` if it cannot be written.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""A batch from beginning to end: runs what is missing, tries again what failed, and summarises all runs."""
+"""Runs a batch: runs missing tasks, repeats failed ones, and writes a summary of all runs."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from shadowpuppet.pipeline.batch.workers import BatchListener, InProcess, LocalP
 from shadowpuppet.threads import usable_cores
 
 LOCK, FAILURES = ".lock", "failed"
-"""The file that is locked while a batch works; the folder of tracebacks of runs that failed of a bug."""
+"""File that is locked while a batch works; folder of tracebacks of runs that failed because of a bug."""
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """A batch that has ended."""
+    """Result of a batch."""
 
     folder: Path
     runs: tuple[BatchRun, ...]
-    """In the order of recordings, cases and seeds."""
+    """All runs, in the order of recordings, cases and seeds."""
 
     @property
     def failed(self) -> list[BatchRun]:
@@ -41,7 +41,7 @@ class Batch:
         return [run for run in self.runs if run.status != "done"]
 
     def of(self, recording: str | None = None, case: str | None = None, **varied: Any) -> list[BatchRun]:
-        """Runs that are done, of a recording's name, a case, and values of settings (`particles=200`: by the last part of their name)."""
+        """Finished runs of a recording's name, a case, and values of settings by the last part of their names (`particles=200`)."""
         return [run for run in self.runs if run.status == "done" and recording in (None, run.task.name) and case in (None, run.task.case)
                 and varied.items() <= {name.rpartition(".")[2]: value for name, value in run.task.varied.items()}.items()]
 
@@ -49,19 +49,20 @@ class Batch:
 def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | None = None, seeds: Sequence[int] | None = None, *,
               workers: int | None = None, retries: int = 1, threads: int = 1, scheduler: str | None = None, reuse: bool = True,
               table: str = "csv", listener: BatchListener | None = None, track: Track | None = None) -> Batch:
-    """Track recordings with all settings of a grid (`make_grid`, `read_grid`) and all seeds; a run folder each in `out`/runs.
+    """Track recordings with all settings of a grid (`make_grid`, `read_grid`) and all seeds; writes run folders in `out`/runs.
 
     Args:
-        seeds: in place of the grid's; without either, 0.
-        workers: processes, by default one a core; 0 runs all in this process. `threads`: of each.
+        seeds: override the grid's seeds; without either, the seed is 0.
+        workers: number of processes, by default one per core; 0 runs all tasks in this process.
+        threads: number of threads of each process.
         retries: further tries of a run that failed because of its machine (a killed worker, a full disk).
-        scheduler: address of a Dask cluster, whose workers then run the tasks.
-        reuse: keep a film's survey and silhouettes for its next run, with the same result; off to measure speed.
+        scheduler: address of a Dask cluster; its workers then run the tasks.
+        reuse: keep a film's survey and silhouettes for its next run; the result is the same. Off to measure speed.
         table: csv or parquet.
-        track: a function in place of `track_recording`, called like it, of a module that the workers can import.
+        track: replaces `track_recording`; takes the same arguments, and is in a module that the workers can import.
 
     Complete runs in `out` with the same recording, settings and seed are kept. A run that fails does not stop the others. Raises
-    `ShadowPuppetError` where nothing can be begun; `KeyboardInterrupt` passes through after the summary was written.
+    `ShadowPuppetError` if the batch cannot begin, and `KeyboardInterrupt` on Ctrl-C after the summary is written.
     """
     listener, out = listener or BatchListener(), Path(out).resolve()
     check_table(table)
@@ -90,7 +91,7 @@ def run_batch(recordings: Sequence[str | Path], out: str | Path, grid: Grid | No
 
 
 def _summarised(work: _Work, table: str) -> Batch:
-    """The runs as they are now; writes the summary."""
+    """The batch's present state; writes the summary."""
     _clean(work.out)
     batch = Batch(work.out, work.runs())
     write_summary(batch.runs, work.out / f"summary.{table}")
@@ -139,12 +140,12 @@ class _Work:
     def _fail(self, task: Task, outcome: Outcome) -> None:
         self.failed[task.id] = outcome
         if outcome.get("trace"):
-            with contextlib.suppress(ShadowPuppetError, OSError):  # a full disk is no reason to stop
+            with contextlib.suppress(ShadowPuppetError, OSError):  # a full disk does not stop the batch
                 (self.out / FAILURES).mkdir(exist_ok=True)
                 write_whole(self.out / FAILURES / f"{task.folder}.txt", outcome["trace"])
 
     def runs(self) -> tuple[BatchRun, ...]:
-        """The run of each task, as far as there is one."""
+        """The run of each task; its status is `missing` if there is none."""
         found = found_runs(self.out)
         return tuple(self._run(task, found) for task in self.tasks)
 
@@ -168,7 +169,7 @@ def _pool(out: Path, scheduler: str | None, workers: int, threads: int, reuse: b
 
 @contextlib.contextmanager
 def _claimed(out: Path) -> Iterator[None]:
-    """Lock the folder for this batch. Raises `ShadowPuppetError` where other files are in it, or another batch works there."""
+    """Lock the folder for this batch. Raises `ShadowPuppetError` if it contains other files, or another batch works there."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         names = sorted({path.name for path in out.iterdir()} - {RUNS, LOCK})
@@ -186,7 +187,7 @@ def _claimed(out: Path) -> Iterator[None]:
 
 
 def _lock(file: int, out: Path) -> None:
-    """Lock a file as long as it is open, where the system can."""
+    """Lock a file as long as it is open, if the system supports that."""
     try:
         import fcntl
     except ImportError:
@@ -214,7 +215,7 @@ def _forget_failures(out: Path) -> None:
 
 
 def _write_plan(out: Path, tasks: Sequence[Task], seeds: Sequence[int]) -> None:
-    """Write what this start was asked for, for people."""
+    """Write the batch's recordings, settings and seeds to the file `PLAN`, for people to read."""
     import tomli_w
 
     cases = {(task.case, str(task.varied)): {"case": task.case, "settings": for_toml(task.varied)} for task in tasks}

@@ -28,13 +28,13 @@ class BatchRun:
     status: str
     """done, failed or missing."""
     folder: Path | None = None
-    """The run folder; None where there is none."""
+    """The run folder; None if there is none."""
     seconds: float | None = None
     """Duration."""
     tries: int | None = None
-    """Tries in this start; None for a run of an earlier start."""
+    """Number of tries in this start of the batch; None for a run of an earlier start."""
     message: str = ""
-    """Why it failed."""
+    """Why the run failed; empty if it did not."""
     warnings: tuple[str, ...] = ()
     metrics: dict[str, Any] = field(default_factory=dict)
     """Its metrics.json."""
@@ -56,14 +56,14 @@ def found_runs(out: Path) -> dict[str, tuple[Path, dict[str, Any]]]:
 
 
 def done_run(task: Task, folder: Path, mark: Mapping[str, Any], tries: int | None) -> BatchRun:
-    """The run of a complete folder."""
+    """The finished run in a complete run folder."""
     seconds, said = mark.get("seconds"), mark.get("warnings")
     return BatchRun(task, "done", folder, seconds if isinstance(seconds, (int, float)) else None, tries,
                     warnings=tuple(map(str, said)) if isinstance(said, list) else (), metrics=_metrics(folder))
 
 
 def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
-    """Write the rows as .csv or .parquet. Raises `ShadowPuppetError` where that fails."""
+    """Write the rows as .csv or .parquet. Raises `ShadowPuppetError` if that fails."""
     rows = [run.row() for run in runs]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     if path.suffix == ".parquet":
@@ -73,7 +73,7 @@ def write_summary(runs: Sequence[BatchRun], path: Path) -> None:
 
 
 def check_table(table: str) -> None:
-    """Raise `ShadowPuppetError` where a summary cannot have this format: before hours of work."""
+    """Raise `ShadowPuppetError` if a summary cannot have this format; called before hours of work."""
     if table not in TABLES:
         raise ShadowPuppetError(f"table: found {table!r}, expected one of {', '.join(TABLES)}")
     if table == "parquet" and find_spec("pyarrow") is None:

@@ -1,4 +1,4 @@
-"""One run of a batch: its folder is complete or does not exist."""
+"""Performs one task of a batch; its run folder is either complete or does not exist."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 
 MARK, PART, PLAN, RUNS = "task.json", ".part", "batch.toml", "runs"
-"""In a run folder: the file with its task's id, written last. In a batch's folder: the ending of unfinished run folders, the file that
-every batch has, and the folder of the runs."""
+"""File with the task's id in a run folder, written last; ending of unfinished run folders; file with the settings of a batch, which every
+batch's folder contains; folder of the runs in it."""
 PERMANENT = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EEXIST, errno.EINVAL, errno.ENAMETOOLONG}
-"""Errors of the system that another try would meet again."""
+"""System errors that another try would meet again."""
 
 
 def do(task: Mapping[str, Any], out: str | Path, repeats: SilhouetteCache | None = None,
        listener: Listener | None = None) -> dict[str, Any]:
     """Run a task (`Task.wire`) into its folder in `out`, unless that is complete. Returns the outcome as plain values.
 
-    `status`: done or failed; `seconds`; of a failure `message`, a sentence, `again`, whether a further try may succeed, `trace`, of a bug.
-    Nothing is left of a failed run. `KeyboardInterrupt` passes through.
+    Keys: `status`, done or failed; `seconds`; for a failure also `message`, a sentence, `again`, whether a further try may succeed, and,
+    for a bug, `trace`. A failed run leaves no folder. `KeyboardInterrupt` is not caught.
     """
     began = time.perf_counter()
     try:
@@ -69,17 +69,17 @@ def _run(task: Mapping[str, Any], out: Path, repeats: SilhouetteCache | None, li
 
 
 def _put(part: Path, folder: Path) -> None:
-    """Give a complete run its name; where another machine was first, its run, which is the same, stays."""
+    """Rename a complete run to its final name. If another machine was first, its run, which is equal, is kept."""
     with contextlib.suppress(OSError):
         os.rename(part, folder)
         return
-    if read_mark(folder) is None:  # somebody took the mark away
+    if read_mark(folder) is None:  # a folder without its mark
         shutil.rmtree(folder, ignore_errors=True)
         os.rename(part, folder)
 
 
 def read_mark(folder: Path) -> dict[str, Any] | None:
-    """The file `MARK` of a run folder; None where the run is not complete."""
+    """The contents of the file `MARK` in a run folder; None if the run is not complete."""
     try:
         mark = json.loads(read_text(folder / MARK)) if (folder / MARK).exists() else None
     except (FormatError, ValueError, RecursionError):
@@ -99,7 +99,7 @@ def _failure(error: Exception) -> dict[str, Any]:
 
 
 def _system(error: BaseException | None) -> OSError | None:
-    """The `OSError` that caused an error; None where there is none."""
+    """The `OSError` that caused an error; None if there is none."""
     while error is not None and not isinstance(error, OSError):
         error = error.__cause__ or error.__context__
     return error

@@ -1,4 +1,4 @@
-"""Tasks of a batch: one for every recording, choice of settings and seed, identified by a hash of all that it depends on."""
+"""Tasks of a batch: one for every recording, combination of settings, and seed, identified by a hash of all that it depends on."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
 from shadowpuppet.pipeline.silhouette_cache import film_of
 
 Track = Callable[..., Any]
-"""Makes a run folder, as `pipeline.track_recording` does: of a recording, a folder, `Options`, a `Listener` and a `SilhouetteCache`
-or None."""
+"""A function that makes a run folder, as `track_recording` does. Arguments: recording, folder, `Options`, `Listener` and `SilhouetteCache`;
+the last two may be None."""
 TRACK = "shadowpuppet.pipeline.track:track_recording"
 """The default `Track`, by name."""
 RUN_INPUTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
@@ -38,7 +38,7 @@ class Task:
     recording: str
     """Its absolute path."""
     name: str
-    """Name of the recording's folder, with folders above it where two have the same name."""
+    """Name of the recording's folder, with names of parent folders if two have the same name."""
     case: str
     seed: int
     settings: dict[str, Any]
@@ -46,10 +46,10 @@ class Task:
     varied: dict[str, Any]
     """Settings that differ between tasks, by dotted name."""
     film: str
-    """Hash that tasks with the same silhouettes share."""
+    """Hash of recording and options that determine the silhouettes; tasks with the same hash can share these."""
 
     choice: str
-    """Label of case and grid values; empty where nothing varies."""
+    """Label of case and grid values; empty if nothing varies."""
     label: str
     """Recording, case, grid values and seed, for people."""
     folder: str
@@ -63,7 +63,7 @@ class Task:
 
 
 def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: Sequence[int], track: Track | None = None) -> list[Task]:
-    """A task for each recording, case and seed, in this order. Raises `SettingsError` where two would be the same run, or where workers
+    """A task for each recording, case and seed, in this order. Raises `SettingsError` if two would be the same run, or if workers
     cannot import `track`."""
     if not recordings:
         raise SettingsError("recordings: found none, expected one or more")
@@ -84,7 +84,7 @@ def make_tasks(recordings: Sequence[str | Path], cases: Sequence[Case], seeds: S
 
 
 def name_of(track: Track | None) -> str:
-    """The `module:function` by which workers import a function; `TRACK` for None. Raises `SettingsError` where they cannot."""
+    """The `module:function` by which workers import a function; `TRACK` for None. Raises `SettingsError` if they cannot."""
     if track is None:
         return TRACK
     module, name = getattr(track, "__module__", "__main__"), getattr(track, "__qualname__", "")
@@ -94,7 +94,7 @@ def name_of(track: Track | None) -> str:
 
 
 def named(name: str) -> Track:
-    """The function of a name (`name_of`). Raises `SettingsError` where there is none."""
+    """The function of a name `module:function`. Raises `SettingsError` if there is none."""
     module, _, function = name.partition(":")
     try:
         return getattr(import_module(module), function)
@@ -134,7 +134,7 @@ def _check_different(chosen: Sequence[_Chosen]) -> None:
 def fingerprint(path: Path) -> str:
     """A hash of a file, or of the parts of a folder that a run depends on: names, sizes, and each file's first and last bytes.
 
-    It is the same after a recording was moved or copied; a missing one has the hash of nothing.
+    It does not change if a recording is moved or copied; that of a missing path is the hash of no data.
     """
     digest = hashlib.sha256()
     for name, file in sorted(set(_files(path))):
@@ -165,22 +165,22 @@ def _elsewhere(folder: Path) -> Iterator[Path]:
     try:
         said = read_toml(folder / "recording.toml", ShadowPuppetError) if (folder / "recording.toml").exists() else {}
     except ShadowPuppetError:
-        return  # the run says what is wrong with it
+        return  # the run reports the error
     texts = [value for of in (said, *(t for t in said.values() if isinstance(t, dict))) for value in of.values() if isinstance(value, str)]
     yield from (path for text in texts if text and "\0" not in text and (path := folder / text).exists() and path != folder)
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Short names of recordings, with folders above them as far as needed to tell them apart."""
+    """Short unique names of recordings, with as many parent folders as that needs."""
     for depth in range(1, max(len(path.parts) for path in paths) + 1):
         names = ["-".join(path.parts[-depth:]) for path in paths]
         if len(set(names)) == len(names):
             return names
-    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # a-b/c and a/b-c
+    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # such as a-b/c and a/b-c
 
 
 def _found(settings: Mapping[str, Any], name: str) -> Any:
-    """A setting by its dotted name; None where it is not set."""
+    """A setting by its dotted name; None if it is not set."""
     value: Any = settings
     for part in name.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None

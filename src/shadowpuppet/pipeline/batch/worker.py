@@ -21,7 +21,7 @@ PACE = 0.25
 
 
 class _Pipe(Listener):
-    """Writes messages to the pool, the progress of runs among them; ends this process where nobody reads them any more."""
+    """Writes messages, including the progress of runs, to the pool; ends this process if the pool no longer reads them."""
 
     def __init__(self) -> None:
         self.out, self.total, self.last = os.fdopen(os.dup(1), "w", encoding="utf-8"), None, 0.0

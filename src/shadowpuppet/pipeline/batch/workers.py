@@ -1,4 +1,4 @@
-"""What runs the tasks of a batch on this machine: worker processes that stay for the next task, or this process itself."""
+"""Pools that run the tasks of a batch on this machine: worker processes, each for many tasks, or this process itself."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.threads import THREAD_VARIABLES, child_environment
 
 Outcome = dict[str, Any]
-"""What `batch.task.do` returned for a task."""
+"""Result of `batch.task.do` for a task."""
 GRACE = 2.0
-"""Seconds that a terminated worker may take to end."""
+"""Seconds after which a terminated worker that has not ended is killed."""
 
 
 class BatchListener:
@@ -50,11 +50,11 @@ class WorkerPool(ABC):
     """Runs tasks: `with pool: pool.put(task); task, outcome = pool.next()`."""
 
     def __enter__(self) -> Self:
-        """Make ready. Raises `ShadowPuppetError` where that fails."""
+        """Prepare the pool. Raises `ShadowPuppetError` if that fails."""
         return self
 
     def __exit__(self, *_: object) -> None:  # noqa: B027 - there may be nothing to do
-        """Stop at once, also in the middle of tasks."""
+        """Stop at once, even during tasks."""
 
     @abstractmethod
     def put(self, task: Task) -> None:
@@ -100,7 +100,7 @@ class _TaskListener(Listener):
 
 
 class _Worker:
-    """A worker process (`batch.worker`) and the task that it has. A thread reads its messages into the pool's queue, None at its end."""
+    """A worker process (`batch.worker`) and its current task. A thread puts its messages into the pool's queue, and None when it ends."""
 
     def __init__(self, number: int, out: Path, threads: int, messages: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]]) -> None:
         self.number, self.film = number, ""
@@ -112,7 +112,7 @@ class _Worker:
         threading.Thread(target=self._listen, args=(messages,), daemon=True).start()
 
     def give(self, task: Task, reuse: bool) -> None:
-        """Send a task; where the process has ended, its end arrives as a message."""
+        """Send a task. If the process has ended, the queue gets None from it."""
         self.task, self.film = task, task.film
         assert self.process.stdin is not None
         with contextlib.suppress(OSError):
@@ -120,7 +120,7 @@ class _Worker:
             self.process.stdin.flush()
 
     def stop(self) -> str:
-        """Wait for the end of a process that was terminated, or has ended, and release what is open; the reason in words."""
+        """Wait for a process that was terminated or has ended, and close its files. Returns why it ended, in words."""
         assert self.process.stdin is not None
         with contextlib.suppress(OSError):
             self.process.stdin.close()
@@ -141,25 +141,25 @@ class _Worker:
         assert self.process.stdout is not None
         with self.process.stdout as lines:
             for line in lines:
-                with contextlib.suppress(ValueError):  # half a line of one that was killed
+                with contextlib.suppress(ValueError):  # an incomplete line of a killed process
                     messages.put((self, json.loads(line)))
         messages.put((self, None))
 
 
 class LocalProcesses(WorkerPool):
-    """Worker processes on this machine. A worker gets tasks of the film whose silhouettes it has, as long as there are any.
+    """Worker processes on this machine. A worker preferably gets tasks of the film for which it keeps silhouettes.
 
-    No library's pool: loky's, which needs no extra, starts helper processes that import modules from the user's current folder, loses what
-    a process wrote before it failed to start, and ends all workers with the one that was killed, unless each worker is a pool.
+    No library's pool is used. That of loky, which needs no extra, starts helper processes that import modules from the user's current
+    folder, loses the output of a process that failed to start, and ends all workers if one is killed, unless each worker is a pool.
     """
 
     def __init__(self, out: Path, workers: int, threads: int, reuse: bool, listener: BatchListener) -> None:
-        """`workers`: processes at most; `threads`: of each; the others as in `InProcess`."""
+        """`workers`: greatest number of processes; `threads`: number of threads of each; the others as in `InProcess`."""
         self._count, self._out, self._threads, self._reuse, self._listener = workers, out, threads, reuse, listener
         self._messages: queue.SimpleQueue[tuple[_Worker, dict[str, Any] | None]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
         self._waiting: dict[str, deque[Task]] = {}
-        """By film."""
+        """Tasks not yet given to a worker, by film."""
         self._ready = False
         """Whether any worker has begun."""
 
@@ -179,7 +179,7 @@ class LocalProcesses(WorkerPool):
         while True:
             self._hand_out()
             try:
-                worker, message = self._messages.get(timeout=1.0)  # a wait without end cannot be interrupted everywhere
+                worker, message = self._messages.get(timeout=1.0)  # on some systems a wait without timeout cannot be interrupted
             except queue.Empty:
                 continue
             task = worker.task
@@ -211,7 +211,7 @@ class LocalProcesses(WorkerPool):
             worker.give(self._choose(worker.film), self._reuse)
 
     def _choose(self, film: str) -> Task:
-        """The next task of `film`; else of a film that no worker has; else of the film with most tasks left."""
+        """The next task: of `film`, else of a film that no worker is working on, else of the film with the most tasks left."""
         self._waiting = {name: tasks for name, tasks in self._waiting.items() if tasks}
         taken = {worker.film for worker in self._workers if worker.task is not None}
         free = [name for name in self._waiting if name not in taken]
