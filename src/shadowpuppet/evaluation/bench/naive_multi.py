@@ -185,14 +185,14 @@ def move_by_forces(
     for d, dof in enumerate(body.skeleton.dofs):
         felt = motions.moved[d, owner]  # eqs. 38-40: the joint and all below it
         if motions.shifts[d]:
-            step[d] = settings.translation * (forces[felt] @ motions.axes[d]).sum() / (weights[felt].sum() + 1e-9)  # eq. 36
+            step[d] = settings.translation * (forces[felt] @ motions.axes[d]).sum() / (weights[felt].sum() + 1e-9)  # eq. 34
             continue
         if not settings.hierarchical:
             felt = owner == body.skeleton.joint_index(dof.joint)
         lever = found.feet[felt] - motions.centres[d]
         moment = np.cross(lever, forces[felt]).sum(0)  # eq. 33
         inertia = (weights[felt] * (np.cross(motions.axes[d], lever) ** 2).sum(1)).sum()
-        step[d] = settings.rotation * (moment @ motions.axes[d]) / (inertia + 1e-4 * weights[felt].sum() + 1e-13)  # eq. 37
+        step[d] = settings.rotation * (moment @ motions.axes[d]) / (inertia + 1e-4 * weights[felt].sum() + 1e-13)  # eq. 35
     return body.skeleton.clamp((pose + np.clip(step, -0.5, 0.5))[None])[0]  # eq. 41
 
 
