@@ -69,7 +69,7 @@ def _measured(runs: Mapping[tuple[str, str, int], Contender], rounds: int, scale
 
 
 def _some_cards(number: int) -> Callable[[], Array]:
-    """Costs of a cardbox of which `number` cards are drawn, evenly spread over its parts."""
+    """Costs of a cardbox with `number` cards drawn, evenly spread over its parts."""
     case = MonoCase()
     drawn = np.unique(np.linspace(0, len(case.picture.body.parts) - 1, number).round().astype(np.int64))
     silhouette, empty = pack(case.mask), case.picture.empty()

@@ -13,7 +13,7 @@ LATE = (0.0, 4.0, -2.0, 1.0)
 
 
 def pairs(**wrong: float) -> list[_Pair]:
-    """All pairs of four films that are `LATE`; some, such as p01, are off by so many sets."""
+    """All pairs of four films that are `LATE`; `p01` and other arguments give a pair's error in sets."""
     return [_Pair(i, j, LATE[j] - LATE[i] + wrong.get(f"p{i}{j}", 0.0), 10.0) for i, j in combinations(range(4), 2)]
 
 

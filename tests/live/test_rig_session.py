@@ -102,7 +102,7 @@ def test_several_cameras_need_a_calibration_of_as_many(recording, films):
 
 
 class Source:
-    """A capture that is told what came."""
+    """A capture that returns given frames."""
 
     def __init__(self) -> None:
         self.newest, self.ended = Newest(), False

@@ -119,7 +119,7 @@ class _Live:
         return session, sources.capture, sources.rate, sources.live
 
     def run(self) -> None:
-        """Process all pictures. Raises `_Nobody` if nobody was tracked."""
+        """Process all pictures. Raises `_Nobody` if no person was tracked."""
         try:
             with ExitStack() as stack:
                 stack.enter_context(self.stop)

@@ -145,7 +145,7 @@ def test_what_the_prior_cannot_hold_may_stay():
 
 
 def two_regions(names) -> MotionPrior:
-    """Two regions, at 0.2 and 0.8, of which each is followed by the other."""
+    """Two regions, at 0.2 and 0.8; each is followed by the other."""
     one = prior_of(names)
     centres = np.stack([np.full(len(names), 0.2), np.full(len(names), 0.8)])
     regions = Subspaces(centres, np.repeat(one.subspaces.bases, 2, 0), np.repeat(one.subspaces.variances, 2, 0), np.full(2, 1e-8))

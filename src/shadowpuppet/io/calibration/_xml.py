@@ -52,7 +52,7 @@ class Entry:
         return Entry(self.path, self.camera, found)
 
     def numbers(self, key: str, counts: tuple[int, ...] = (1,), without: str | None = None) -> Array:
-        """Numbers of attribute `key`, as many as one of `counts`; `without`: text used if it is missing. Raises `CalibrationError`."""
+        """Numbers of attribute `key`, one of `counts` in number; `without`: text used if it is missing. Raises `CalibrationError`."""
         value = self.element.get(key, without)
         found = numbers_of(value, counts)
         if found is None:

@@ -27,8 +27,8 @@ def do_there(task: dict[str, Any], out: str, start: str, reuse: bool) -> Outcome
 
     limit_threads()
     if getattr(_kept, "start", None) != start:
-        _kept.start, _kept.repeats = start, SilhouetteCache()
-    return do(task, out, _kept.repeats if reuse else None)
+        _kept.start, _kept.cache = start, SilhouetteCache()
+    return do(task, out, _kept.cache if reuse else None)
 
 
 class Cluster(WorkerPool):

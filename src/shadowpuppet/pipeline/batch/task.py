@@ -30,7 +30,7 @@ PERMANENT = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPER
 """System errors that another try would meet again."""
 
 
-def do(task: Mapping[str, Any], out: str | Path, repeats: SilhouetteCache | None = None,
+def do(task: Mapping[str, Any], out: str | Path, cache: SilhouetteCache | None = None,
        listener: Listener | None = None) -> dict[str, Any]:
     """Run a task (`Task.wire`) into its folder in `out`, unless that is complete. Returns the outcome as plain values.
 
@@ -39,15 +39,15 @@ def do(task: Mapping[str, Any], out: str | Path, repeats: SilhouetteCache | None
     """
     began = time.perf_counter()
     try:
-        _run(task, Path(out), repeats, listener)
+        _run(task, Path(out), cache, listener)
     except Exception as error:
-        if repeats is not None:
-            repeats.forget()
+        if cache is not None:
+            cache.forget()
         return {"status": "failed", "seconds": round(time.perf_counter() - began, 3), **_failure(error)}
     return {"status": "done", "seconds": round(time.perf_counter() - began, 3)}
 
 
-def _run(task: Mapping[str, Any], out: Path, repeats: SilhouetteCache | None, listener: Listener | None) -> None:
+def _run(task: Mapping[str, Any], out: Path, cache: SilhouetteCache | None, listener: Listener | None) -> None:
     folder = out / RUNS / task["folder"]
     if not (out / PLAN).exists():
         raise ShadowPuppetError(f"{out}: found no {PLAN} in it, expected the batch's folder, which all machines that work on it must see")
@@ -58,7 +58,7 @@ def _run(task: Mapping[str, Any], out: Path, repeats: SilhouetteCache | None, li
     try:
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", ShadowPuppetWarning)
-            named(task["track"])(task["recording"], part, make_options(task["settings"]), listener, repeats)
+            named(task["track"])(task["recording"], part, make_options(task["settings"]), listener, cache)
         mark = {key: task[key] for key in ("id", "recording", "name", "case", "seed")}
         mark |= {"seconds": round(time.perf_counter() - began, 3), "version": versions().get("shadowpuppet"),
                  "warnings": list(dict.fromkeys(" ".join(str(w.message).split()) for w in said))}

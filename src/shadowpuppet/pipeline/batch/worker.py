@@ -54,13 +54,13 @@ def _read(tasks: queue.SimpleQueue[dict[str, Any]]) -> None:
 def main() -> None:
     """Run tasks until standard input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all processes; the pool ends this one
-    pipe, tasks, repeats = _Pipe(), queue.SimpleQueue[dict[str, Any]](), SilhouetteCache()
+    pipe, tasks, cache = _Pipe(), queue.SimpleQueue[dict[str, Any]](), SilhouetteCache()
     threading.Thread(target=_read, args=(tasks,), daemon=True).start()
     limit_threads()
     pipe.send(ready=True)
     while True:
         task = tasks.get()
-        pipe.send(outcome=do(task, sys.argv[1], repeats if task["reuse"] else None, pipe))
+        pipe.send(outcome=do(task, sys.argv[1], cache if task["reuse"] else None, pipe))
 
 
 if __name__ == "__main__":

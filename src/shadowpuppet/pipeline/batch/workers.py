@@ -70,7 +70,7 @@ class InProcess(WorkerPool):
 
     def __init__(self, out: Path, reuse: bool, listener: BatchListener) -> None:
         """`out`: the batch's folder; `reuse`: keep a film's silhouettes for the next task."""
-        self._out, self._repeats, self._listener = out, SilhouetteCache() if reuse else None, listener
+        self._out, self._cache, self._listener = out, SilhouetteCache() if reuse else None, listener
         self._waiting: deque[Task] = deque()
 
     def put(self, task: Task) -> None:
@@ -82,7 +82,7 @@ class InProcess(WorkerPool):
         from shadowpuppet.pipeline.batch.task import do
 
         task = self._waiting.popleft()
-        return task, do(task.wire(), self._out, self._repeats, _TaskListener(self._listener, task))
+        return task, do(task.wire(), self._out, self._cache, _TaskListener(self._listener, task))
 
 
 class _TaskListener(Listener):

@@ -69,7 +69,7 @@ def spheres_in(limbs: Limbs) -> Spheres:
 
 
 def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
-    """Distances for cameras and their masks (H, W), each of which shows a person."""
+    """Distances for cameras and their masks (H, W); every mask shows a person."""
     fields, windows, start = [np.zeros(0, np.float32)], [], 0
     for camera, mask in views:
         field, left, top = _distances(mask)
