@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.silhouette.cleanup import Window, bounding_window
 
 THIN, LONG = 0.06, 0.45
@@ -84,7 +83,7 @@ class Clutter:
     things: Bits
     """Pixels (H, W) of things."""
     width: int
-    """Radius of the disc that closes the gaps that lines leave in the person, pixels."""
+    """Least width of the gaps that lines leave in the person and that are not closed, pixels; odd."""
     parts: tuple[Part, ...] = field(default=())
 
     def removed(self, mask: Mask) -> Mask:
@@ -98,7 +97,7 @@ class Clutter:
 
     @cached_property
     def _window(self) -> Window:
-        return bounding_window(self.lines, 2 * self.width)
+        return bounding_window(self.lines, self.width)
 
     def _remove_lines(self, bits: Bits) -> None:
         """Remove lines in place, except where silhouette lies on both of their sides."""
@@ -107,8 +106,9 @@ class Clutter:
         window = self._window
         before, lines = bits[window].copy(), self.lines[window]
         bits[window][lines > 0] = 0
-        closed = cv2.morphologyEx(np.ascontiguousarray(bits[window]), cv2.MORPH_CLOSE, disc(self.width))
-        bits[window] |= np.asarray(closed, np.uint8) & lines & before
+        rest = np.ascontiguousarray(bits[window])
+        for element in _directions(self.width):
+            bits[window] |= np.asarray(cv2.morphologyEx(rest, cv2.MORPH_CLOSE, element), np.uint8) & lines & before
 
     def _remove_things(self, bits: Bits) -> None:
         """Remove in place the connected parts that are nothing but a thing."""
@@ -120,6 +120,12 @@ class Clutter:
         alone = inside > 0.5 * sizes
         alone[0] = False
         bits[alone[parts]] = 0
+
+
+def _directions(length: int) -> list[Bits]:
+    """Lines of odd length, level, upright and both ways aslant, as structuring elements."""
+    aslant = np.eye(length, dtype=np.uint8)
+    return [np.ones((1, length), np.uint8), np.ones((length, 1), np.uint8), aslant, np.ascontiguousarray(aslant[::-1])]
 
 
 def find_clutter(masks: Sequence[Mask]) -> Clutter | None:
@@ -141,7 +147,7 @@ def find_clutter(masks: Sequence[Mask]) -> Clutter | None:
     if not found and not more:
         return None
     parts = tuple(part.moved(*corner) for part in (*found, *more))
-    return Clutter(_embedded(lines, window, masks[0].shape), _embedded(things, window, masks[0].shape), size // 2 + 2, parts)
+    return Clutter(_embedded(lines, window, masks[0].shape), _embedded(things, window, masks[0].shape), 2 * (size // 2) + 5, parts)
 
 
 def _embedded(bits: Bits, window: Window, shape: tuple[int, ...]) -> Bits:
