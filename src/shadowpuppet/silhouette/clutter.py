@@ -31,7 +31,7 @@ MIN_SEEN = 0.3
 """Least share of masks in which the clutter is seen free of the person."""
 MIN_SEEN_ON = 0.05
 """The same where a line goes on."""
-ASIDE = 0.3
+ASIDE = 0.1
 """Distance across the picture from which on the person stands aside of a thing, over the person's height."""
 MIN_THING = 0.01
 """Least area of a thing, over the person's."""
