@@ -109,6 +109,31 @@ def test_a_thing_that_the_person_walks_away_from_is_removed_while_they_do_not_to
     np.testing.assert_array_equal(clutter.removed(masks[-1]), masks[-1])  # a leg touches it
 
 
+def test_a_strip_of_the_person_that_a_gap_cuts_off_is_no_line():
+    def gap(bits):
+        bits[30:70, 63:66] = 0  # in the colour of the background: the strip right of it is 2 pixels wide
+
+    masks = drawn(standing(), gap)
+    for mask in masks:
+        mask[30:70, 66:68] = True
+    assert find_clutter(masks) is None
+
+
+def test_an_outline_aslant_that_stays_is_no_line():
+    def lying(bits):
+        cv2.line(bits, (20, 90), (70, 50), 1, 12)
+
+    assert find_clutter(drawn(standing(), lying)) is None
+
+
+def test_a_short_line_may_be_a_finger_and_a_long_one_may_not():
+    def finger(bits, length=14):
+        cv2.line(bits, (60, 22 - length), (60, 22), 1, 1)
+
+    assert find_clutter(drawn(standing(), finger)) is None
+    assert find_clutter(drawn(standing(), lambda bits: finger(bits, 22))) is not None
+
+
 def test_feet_that_stay_when_legs_are_lost_are_no_thing():
     def feet(bits):
         cv2.rectangle(bits, (54, 78), (66, 84), 1, -1)
