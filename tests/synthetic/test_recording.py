@@ -459,7 +459,7 @@ def test_spec_of_plain_values():
 
 
 @pytest.mark.parametrize(("values", "told"), [
-    ({"bodi": {}}, r"spec: bodi: no such setting; possible are begin, body, cameras, frames, motion, name, rate"),
+    ({"bodi": {}}, r"spec: bodi: no such setting; possible are begin, body, cameras, faults, frames, motion, name, rate"),
     ({"body": {"size": 1}}, r"body\.size: no such setting; possible are arm_length, build, girth"),
     ({"body": {"stature": 3.1}}, r"body\.stature: .*less than or equal to 2.2, found 3.1"),
     ({"body": {"stature": float("nan")}}, r"body\.stature: .*found nan"),

@@ -139,7 +139,7 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "told"), [
-    ("fog = 1", r"spec\.toml: fog: no such setting; possible are begin, body, cameras, frames, motion"),
+    ("fog = 1", r"spec\.toml: fog: no such setting; possible are begin, body, cameras, faults, frames, motion"),
     ("[scene]\nfog = 1", r"scene\.fog: no such setting; possible are background, bystanders"),
     ("[ring]\nnumber = 3", r"ring\.number: no such setting; possible are count, distortion"),
     ("[[scene.obstacles]]\nkind = 'sofa'", r"scene\.obstacles\.0\.kind: .*'table', 'chair', 'pillar' or 'cabinet', found 'sofa'"),

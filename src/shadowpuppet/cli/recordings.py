@@ -44,7 +44,7 @@ else:
         **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
         **dict.fromkeys(("cameras", "ring_radius", "distance", "camera_height", "fov", "fisheye"), CAMERAS),
         **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
-        **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
+        **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf", "faults"), PICTURES),
     }
     SpecFlags = unpacked(flags_of(SpecChanges, groups=SPEC_GROUPS))
 

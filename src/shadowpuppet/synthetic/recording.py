@@ -14,6 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import joint_columns
+from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
@@ -32,22 +33,25 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
 
     rng: by default a generator of the spec's seed. tell: called after each frame with the numbers of frames done and in all. The same
     spec and seed give the same frames, masks and truth, whatever the number of threads; `spec.toml` keeps both. After Ctrl-C the frames
-    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written; warns if obstacles hide nothing, and if a
+    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written, `SettingsError` if
+    the motion is too short or a fault is impossible; warns if obstacles hide nothing, and if a
     camera never sees the person.
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
     _folders(folder, "video", "background", "masks", *["people"][: len(spec.scene.bystanders)])
     seed = seed_of(rng)
-    for_motion, for_noise, for_training, for_others = rng.spawn(4)
+    for_motion, for_noise, for_training, for_others, for_faults = rng.spawn(5)
     write_spec(folder / SPEC_FILE, spec, seed)
     times, figure = perform(spec, for_motion)
     company = spec.scene.bystanders
     others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
     _write_given(folder, spec, cameras, times, figure, for_training)
+    wrong = [CameraFaults(spec.faults, camera, len(times), spec.rate, own, spec.scene.flicker_hz)
+             for camera, own in zip(cameras, for_faults.spawn(len(cameras)))]
     hidden = 0
-    for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
-        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others))
+    for n, (camera, noise, faults) in enumerate(zip(cameras, for_noise.spawn(len(cameras)), wrong)):
+        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others), faults)
         hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         hidden += hides
         if not seen:
@@ -103,14 +107,14 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     """
     from shadowpuppet.video import write_frames
 
-    name, crf, hidden, seen = studio.room.camera.name, spec.scene.crf, 0, 0
-    with write_frames(folder / "background" / f"{name}.mp4", spec.rate, crf=crf) as film:
+    name, crf, hidden, seen = studio.room.camera.name, studio.faults.crf, 0, 0
+    with write_frames(folder / "background" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=True)) as film:
         count = max(1, round(spec.scene.empty_seconds * spec.rate))
         for index in range(count):
             film.write(studio.empty(index, count))
     interrupted = False
     with contextlib.ExitStack() as stack:
-        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf))
+        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=False)))
         kinds = ["masks", *["people"][: len(spec.scene.bystanders)]]
         exact = [stack.enter_context(write_frames(folder / kind / f"{name}.mkv", spec.rate, lossless=True)) for kind in kinds]
         try:

@@ -126,15 +126,13 @@ def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
     return float((1 + drift) * (1 + scene.flicker * np.sin(2 * np.pi * scene.flicker_hz * seconds)))
 
 
-def expose(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
+def expose(picture: Array, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The sensor's picture, RGB uint8, of light (H, W, 3), 0 to 1: slight blur of the lens and noise.
 
     noise: standard deviation in grey levels at middle grey; it grows with brightness like photon noise.
     """
     import cv2
 
-    if brightness != 1:
-        picture = brightness * picture
     blurred = cv2.GaussianBlur(picture, (0, 0), 0.4)
     level = 255 * np.clip(blurred, 0, 1)
     if noise > 0:

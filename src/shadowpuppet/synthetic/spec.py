@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.faults.fault import Fault
 from shadowpuppet.synthetic.furniture import Coordinate, Furniture, Obstacle
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
@@ -106,6 +107,8 @@ class Spec:
     """Cameras around the person, in place of `cameras`."""
     scene: Scene = Scene()
     """Clothes, room and noise."""
+    faults: tuple[Fault, ...] = ()
+    """What is wrong with the films' pictures."""
     rate: Annotated[float, Field(ge=1, le=240)] = 15.0
     """Frames per second."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
@@ -118,7 +121,7 @@ class Spec:
     """Seed of motion and noise if no generator is given: a whole number, or several."""
 
     def __post_init__(self) -> None:
-        """Check that camera names differ, and that no camera is inside an obstacle or a bystander."""
+        """Check that camera names differ, that no camera is inside an obstacle or a bystander, and that faults name cameras."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")
@@ -132,6 +135,11 @@ class Spec:
         for view, other in itertools.product(self.views() if self.scene.bystanders else (), self.scene.bystanders):
             if np.hypot(*(view.camera().centre[:2] - (other.left, -other.ahead))) < 0.4:
                 raise ValueError(f"scene.bystanders: found somebody where the camera {view.name!r} stands")
+
+        for n, fault in enumerate(self.faults):
+            known = [view.name for view in self.views()]
+            if (unknown := next((name for name in fault.cameras if name not in known), None)) is not None:
+                raise ValueError(f"faults.{n}: cameras: found {unknown!r}, there are: {', '.join(known)}")
 
     def views(self) -> tuple[Viewpoint, ...]:
         """The cameras: those of `cameras`, or the ring's."""
@@ -169,7 +177,7 @@ def spec_values(spec: Spec) -> dict[str, Any]:
 
 
 TABLES: dict[str, Any] = {"body": Mannequin, "motion": Gesture, "cameras": Viewpoint, "ring": Ring, "scene": Scene, "obstacles": Obstacle,
-                          "bystanders": Bystander}
+                          "bystanders": Bystander, "faults": Fault}
 """The tables of a spec, by name."""
 
 

@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.faults.fault import faults_from_text
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
@@ -79,6 +80,9 @@ class SpecChanges:
     """Obstacle between the person and the first camera: table, chair, pillar or cabinet."""
     second_person: Literal["behind", "aside", "passing"] | None = None
     """A second person: standing behind or aside, or passing to and fro behind."""
+    faults: str | None = None
+    """Faults of the pictures: kind, amount, @begin-end in seconds, drift, cameras, such as "gain 1.3 @3-6, nudge 20 @4 cam2, black @5"; all
+    but the kind may be left out."""
 
 
 SCENE_CHANGES = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
@@ -102,6 +106,8 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
         kind = None if said["body"] == "random" else said["body"]
         values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))
     _place_cameras(values, said, source)
+    if "faults" in said:
+        values["faults"] = faults_from_text(said["faults"], f"{source}: faults")
     if "occluder" in said:
         values["scene"]["obstacles"] = [{"kind": said["occluder"], **OCCLUDERS[said["occluder"]]}]
     if "second_person" in said:
