@@ -26,6 +26,8 @@ Progress = Callable[[int, int], None]
 
 REFERENCES = {"front_t_pose": LEVEL, "side_arms_hanging": HANGING_ARMS | trunk(turn=90), "front_arms_t_pose": LEVEL}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
+FAR_BELOW = 1e5
+"""Place of an absent person, metres below the floor: less than a pixel, and no shadow."""
 
 
 def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Progress | None = None) -> Path:
@@ -46,9 +48,10 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     times, figure = perform(spec, for_motion)
     company = spec.scene.bystanders
     others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
-    _write_given(folder, spec, cameras, times, figure, for_training)
     wrong = [CameraFaults(spec.faults, camera, len(times), spec.rate, own, spec.scene.flicker_hz)
              for camera, own in zip(cameras, for_faults.spawn(len(cameras)))]
+    figure = _away(figure, wrong[0].absent())
+    _write_given(folder, spec, cameras, times, figure, for_training)
     hidden = 0
     for n, (camera, noise, faults) in enumerate(zip(cameras, for_noise.spawn(len(cameras)), wrong)):
         studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others), faults)
@@ -87,6 +90,14 @@ def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Genera
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
+
+
+def _away(figure: Figure, absent: np.ndarray) -> Figure:
+    """The figure out of all cameras' sight in the frames, of shape (T,), in which it is `absent`."""
+    if not absent.any():
+        return figure
+    place = np.where(absent, FAR_BELOW, 0.0)[:, None, None] * np.array([0.0, 0, -1])
+    return figure._replace(joints=figure.joints + place, origin=figure.origin + place)
 
 
 def _wall(figure: Figure, others: list[Figure]) -> float:
@@ -142,7 +153,8 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
-    write_truth(folder / "truth", times, figure.joints, spec.rate)
+    known = np.where(figure.joints[..., 2:] > -FAR_BELOW / 2, figure.joints, np.nan)
+    write_truth(folder / "truth", times, known, spec.rate)
     own = spec.motion if spec.training is None else spec.training
     if len(cameras) > 1 and own and not (own == spec.motion and any(gesture.file for gesture in own)):  # a file plays the same every time
         again, rehearsal = perform(replace(spec, motion=own, frames=spec.training_frames), rng)
@@ -150,7 +162,7 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
 
 def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
-    """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds."""
+    """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds; "nan" for unknown ones."""
     rows = joints.reshape(len(joints), -1)
     lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
     _write(path.with_suffix(".csv"), [",".join(["time", *joint_columns(JOINTS)]), *lines])

@@ -220,6 +220,7 @@ def test_faults_come_back_from_a_specs_text(some):
     ({"kind": "gain", "roll_deg": 2}, r"faults\.0: roll_deg: found 2\.0 for gain; only these have it: nudge, shake$"),
     ({"kind": "shake", "direction_deg": 2}, r"faults\.0: direction_deg: found 2\.0 for shake; only these have it: nudge$"),
     ({"kind": "gain", "cameras": ["cam2"]}, r"faults\.0: cameras: found 'cam2', there are: cam$"),
+    ({"kind": "absent", "cameras": ["cam"]}, r"faults\.0: cameras: found cam, expected none for absent, which all cameras see"),
     ({"kind": "gain", "from": 2}, r"faults\.0\.from: no such setting; possible are amount, begin, cameras, direction_deg, drift"),
 ])  # fmt: skip
 def test_an_impossible_fault_is_refused(values, message):
@@ -233,7 +234,7 @@ def test_faults_from_a_flag():
                            Fault(kind="nudge", amount=20, begin=4, cameras=("cam2", "cam3")), Fault(kind="black"),
                            Fault(kind="noise", amount=4))
     assert apply_changes(SpecChanges(faults="black"), spec).faults == (Fault(kind="black"),)
-    with pytest.raises(SettingsError, match="faults: found 'dim 3', which names no kind of fault; there are: black, "):
+    with pytest.raises(SettingsError, match="faults: found 'dim 3', which names no kind of fault; there are: absent, "):
         faults_from_text("gain 2, dim 3")
     with pytest.raises(SettingsError, match=r"faults: found '@x' in 'gain 2 @x', expected an amount, @begin-end"):
         faults_from_text("gain 2 @x")
@@ -284,6 +285,16 @@ def test_masks_are_those_of_the_picture_shown(clean, tmp_path):
     assert np.array_equal(film(fewer, "masks"), np.delete(exact, range(5, 10), axis=0))
     assert len(film(fewer)) == len(exact) - 5
     assert len(read_joints(fewer / "truth.csv").times) == len(exact)
+
+
+def test_an_absent_person_leaves_the_empty_scene(clean, tmp_path):
+    out = spoiled(tmp_path / "out", "absent @1-2")
+    assert not film(out, "masks")[5:10].any()
+    assert np.array_equal(film(out)[[4, 10]], film(clean)[[4, 10]])
+    assert np.abs(film(out)[5:10] - film(clean, "background")[0]).max() <= 3
+    truth = read_joints(out / "truth.csv").positions
+    assert np.isnan(truth[5:10]).all()
+    assert np.array_equal(np.delete(truth, range(5, 10), 0), np.delete(read_joints(clean / "truth.csv").positions, range(5, 10), 0))
 
 
 def test_the_same_seed_makes_the_same_faulty_film_and_only_in_its_camera(tmp_path):

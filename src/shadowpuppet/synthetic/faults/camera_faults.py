@@ -147,6 +147,10 @@ class CameraFaults:
         """Whether nothing can be seen in a frame."""
         return any(self._share_at(fault, index) for fault, *_ in self._of("black"))
 
+    def absent(self) -> np.ndarray:
+        """Whether the person is away, by frame of the world, of shape (T,), true or false."""
+        return np.any([np.zeros(self.count), *(self._shares(fault) for fault, *_ in self._of("absent"))], axis=0)
+
     def crf(self, own: int, empty: bool) -> int:
         """Constant rate factor of the film, or of the empty scene's, in place of the scene's `own`."""
         given = [round(fault.strength) for fault, *_ in self._of("crf") if fault.empty or not empty]

@@ -45,6 +45,8 @@ class Fault:
         self._check_amount(known)
         if self.end is not None and self.end <= self.begin:
             raise ValueError(f"end: found {self.end:g}, expected more than begin, {self.begin:g}")
+        if known.everywhere and self.cameras:
+            raise ValueError(f"cameras: found {', '.join(self.cameras)}, expected none for {self.kind}, which all cameras see")
         if self.kind == "crf" and (self.begin, self.end) != (0, None):
             raise ValueError(f"begin, end: found {self.begin:g} and {self.end}, expected none for crf, which is a whole film's")
         refused = {"drift": self.drift and not known.gradual, "empty": self.empty and not known.in_empty_scene,

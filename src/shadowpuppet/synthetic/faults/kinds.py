@@ -11,7 +11,7 @@ from shadowpuppet.geometry import Array
 
 FaultName = Literal[
     "gain", "white_balance", "flicker", "lamp", "vignetting", "defocus", "black", "motion_blur", "noise", "crf",
-    "nudge", "shake", "frozen", "dropped", "repeated", "late",
+    "nudge", "shake", "frozen", "dropped", "repeated", "late", "absent",
 ]  # fmt: skip
 LAMP_REACH = 0.35
 """Radius of the patch that a switched lamp lights, a Gaussian's standard deviation, over the picture's width."""
@@ -138,6 +138,8 @@ class Kind(NamedTuple):
     timing: Timing | None = None
     whole: bool = False
     """Whether the amount is a whole number."""
+    everywhere: bool = False
+    """Whether all cameras have it."""
 
     @property
     def gradual(self) -> bool:
@@ -168,5 +170,7 @@ KINDS: dict[str, Kind] = {
     "dropped": Kind("share of frames missing", 0.1, 0, 1, timing=dropped),
     "repeated": Kind("times that each picture is shown", 2, 2, 1000, timing=repeated, whole=True),
     "late": Kind("frames", 5, 1, 1000, timing=late, whole=True),
+    "absent": Kind("", everywhere=True),
 }
-"""All kinds by name. Those without a function are `camera_faults.CameraFaults`' own: they change how pictures become a film."""
+"""All kinds by name. Those without a function are `camera_faults.CameraFaults`' own: they change how pictures become a film, or who is in
+them."""
