@@ -115,7 +115,7 @@ SEVERAL: tuple[Row, ...] = (
 
 
 def films_of_one() -> tuple[Spec, ...]:
-    """Films of one camera, some 7 s each: a plain one, and one with clothes of the wall's colour in front of shelves."""
+    """Films of one camera, some 7 s each: a plain one, and one with clothes near the wall's colour in front of bricks."""
     scene: dict[str, Any] = {"empty_seconds": 2.0}
     man, woman = (Mannequin.draw(np.random.default_rng(seed), kind) for seed, kind in ((61, "man"), (62, "woman")))
     return (
@@ -123,7 +123,7 @@ def films_of_one() -> tuple[Spec, ...]:
              cameras=(Viewpoint(height=0.9 * man.stature, distance=2.1),), scene=Scene(clothing=61, room=61, **scene)),
         Spec(name="woman_bends", body=woman, motion=parse_gestures("bend_aside 2.7, overhead 2.7"), seed=(15, 2),
              cameras=(Viewpoint(height=0.9 * woman.stature, distance=2.3, fov_deg=56),),
-             scene=Scene(clothing=62, room=64, background="cluttered", camouflage=0.5, **scene)),
+             scene=Scene(clothing=62, room=64, background="textured", camouflage=0.3, **scene)),
     )
 
 
