@@ -255,6 +255,18 @@ def test_flags_make_a_recording_and_say_how_to_track_it(shell, tmp_path):
     assert len(frames(tmp_path / "made" / "video" / "cam.mp4")) == len(read_joints(tmp_path / "made" / "truth.csv").times) == 15
 
 
+def test_a_flag_makes_faults_and_the_table_names_them(shell, tmp_path):
+    code, out, err = shell("-o", "made", "--faults", "gain 1.3 @1, frozen @2-3, gain 0.9 @3", *TINY)
+    assert (code, err) == (0, "")
+    assert "faults     gain, frozen\n" in out
+    masks = frames(tmp_path / "made" / "masks" / "cam.mkv")
+    assert all(np.array_equal(masks[8], mask) for mask in masks[9:12])
+    assert not np.array_equal(masks[8], masks[12])
+    code, _, err = shell("-o", "other", "--faults", "gain 1.3 @1, freeze", *TINY)
+    assert code != 0
+    assert "faults: found 'freeze', which names no kind of fault; there are: absent, black" in " ".join(err.split())
+
+
 def test_made_recordings_can_be_looked_at_and_tracked(shell):
     assert shell("-o", "made", "--motion", "wave_hands", "--size", "160x120", "--rate", "8", "--seconds", "2", "--quiet") == (0, "", "")
     code, out, _ = shell("made", command="info")

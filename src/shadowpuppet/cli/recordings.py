@@ -162,6 +162,7 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
         ("recording", str(path)),
         ("person", f"{spec.body.stature:.2f} m: {_gestures(spec)}" + (f"; in the scene: {', '.join(extras)}" if extras else "")),
         ("films", f"{cameras}, {first.size[0]} x {first.size[1]} pixels, {spec.rate:g} frames/s, {seconds:g} s of motion"),
+        *([("faults", ", ".join(dict.fromkeys(fault.kind for fault in spec.faults)))] if spec.faults else []),
         ("truth", ", ".join(["truth.csv, truth.trc, masks/", *(name for name, there in also.items() if there)])),
         ("again", f"shadowpuppet synthesize {path}/spec.toml -o FOLDER"),
         ("look", f"shadowpuppet info {path}{one_camera}"),
