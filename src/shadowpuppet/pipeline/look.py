@@ -53,6 +53,8 @@ class Look:
     """The same with the plain rule of eq. 1."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
     person: dict[str, Any] | None = None
     """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
     it was not fitted."""
@@ -89,6 +91,8 @@ class CameraLook:
     """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -13,6 +13,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
+from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.video import Image
 
 
@@ -28,12 +29,22 @@ class Silhouettes:
     """Rows and columns outside which masks are empty; None for all."""
     blank: Image | None = None
     """Image of the empty scene, which replaces the image outside the region."""
+    clutter: Clutter | None = None
+    """What is left out of every mask, because it is not the person."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:
-            return self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
-        return self._within(self.segmenter(self.visible(frame.image)))
+            mask = self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
+        else:
+            mask = self._within(self.segmenter(self.visible(frame.image)))
+        return mask if self.clutter is None else self.clutter.removed(mask)
+
+    def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
+        """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
+        none."""
+        clutter = find_clutter(masks)
+        return self if clutter is None else replace(self, clutter=clutter)
 
     def plain(self, frame: CameraFrame) -> Mask | None:
         """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
@@ -75,7 +86,13 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options) -> Sil
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
-    return map(learn_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+    return map(uncluttered_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+
+
+def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
+    """`learn_silhouettes` without the clutter in the sample's frames."""
+    silhouettes = learn_silhouettes(footage, sample, options)
+    return silhouettes.without_clutter([silhouettes(frame) for frame in sample.frames])
 
 
 def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
@@ -86,7 +103,7 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
         return tracked
-    return learn_silhouettes(footage, sample, replace(options, silhouette=clean))
+    return replace(learn_silhouettes(footage, sample, replace(options, silhouette=clean)), clutter=tracked.clutter)
 
 
 def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:

@@ -55,6 +55,9 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
     sample = take_sample(footage, options.masks, longest)
     silhouettes = learn_silhouettes(footage, sample, options)
     runs = [[silhouettes(frame) for frame in run] for run in sample.runs]
+    silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
+    if silhouettes.clutter is not None:
+        runs = [[silhouettes.clutter.removed(mask) for mask in run] for run in runs]
     masks = [mask for run in runs for mask in run]
     exact = [ready_mask(frame.ready) for frame in sample.frames if frame.ready is not None and silhouettes.segmenter is not None]
     camera = footage.camera
@@ -63,7 +66,21 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
         "fov": float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))),
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
         "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
+        "left_out": _left_out(silhouettes, footage),
     })  # fmt: skip
+
+
+def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
+    """What is left out of the silhouettes, in words and the film's pixels."""
+    parts = silhouettes.clutter.parts if silhouettes.clutter is not None else ()
+    (width, height), full = footage.camera.size, footage.view.camera.size
+    return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
+
+
+def _told_of_clutter(left_out: Sequence[str]) -> list[str]:
+    if not left_out:
+        return []
+    return [f"{'; '.join(left_out)}: taken for clutter, not for the person, and left out of the silhouettes"]
 
 
 def brief_length(footage: Footage, options: Options) -> int:
@@ -131,7 +148,7 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
     if look.exact_overlap is not None and look.exact_overlap < GOOD:
         doubts.append(f"the silhouettes overlap the ready ones in masks/ by {look.exact_overlap:.2f} only: try another "
                       "--silhouette.method, or --masks")
-    return [*doubts, *look.quality.warnings()]
+    return [*doubts, *_told_of_clutter(look.left_out), *look.quality.warnings()]
 
 
 # Several cameras
@@ -194,7 +211,7 @@ def _rig_doubts(look: RigLook) -> list[str]:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
                           "try another --silhouette.method, or --masks")
-        doubts += [f"camera {camera.name!r}: {warning}" for warning in camera.quality.warnings()]
+        doubts += [f"camera {camera.name!r}: {told}" for told in (*_told_of_clutter(camera.left_out), *camera.quality.warnings())]
         doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
     return doubts
 
