@@ -36,7 +36,7 @@ from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.scene_renderer import SceneRenderer
+from shadowpuppet.synthetic.scene_renderer import Place, SceneRenderer
 from shadowpuppet.video import open_frames, read_image
 
 VIEW = Viewpoint(size=(80, 60))
@@ -295,7 +295,7 @@ def test_the_level_posture_is_symmetric_to_the_last_finger():
     assert shot.mask.any(0).sum() > 180
 
 
-def test_the_room_does_not_shine_through_the_person(rng):
+def test_the_room_does_not_shine_through_the_person(rng, monkeypatch):
     spec = small(scene=Scene(noise=0, shadow=0))
     _, figure = perform(spec, rng)
     studio = SceneRenderer(spec, VIEW.camera(), rng)
@@ -303,7 +303,7 @@ def test_the_room_does_not_shine_through_the_person(rng):
     solid = solid & np.roll(solid, 1, 0) & np.roll(solid, -1, 0) & np.roll(solid, 1, 1) & np.roll(solid, -1, 1)
     pictures = []
     for light in (0.0, 1.0):
-        studio.room.picture = np.full_like(studio.room.picture, light)
+        monkeypatch.setattr(studio, "place", lambda _, bright=light: Place(np.full((*VIEW.size[::-1], 3), bright), []))
         pictures.append(studio.take(figure, 5)[0][solid].astype(int))
     assert np.abs(np.subtract(*pictures)).max() <= 2  # the lens blurs a little
 
@@ -331,8 +331,8 @@ def test_noise_and_shadow_do_what_they_say(rng):
     studio = SceneRenderer(spec, VIEW.camera(), rng)
     two = np.stack([studio.empty(), studio.empty()]).astype(float)
     assert 5 < np.diff(two, axis=0).std() / np.sqrt(2) < 8
-    clear = studio.room.picture
-    dark = studio.room.shaded(figure, 0)
+    clear = studio.room.pictures[0]
+    dark = studio.room.shaded(clear, figure, 0)
     assert (dark <= clear + 1e-9).all()
     assert (dark >= 0.5 * clear - 1e-9).all()
     assert (dark < 0.95 * clear).any()
@@ -459,7 +459,7 @@ def test_spec_of_plain_values():
 
 
 @pytest.mark.parametrize(("values", "told"), [
-    ({"bodi": {}}, r"spec: bodi: no such setting; possible are begin, body, cameras, frames, motion, name, rate"),
+    ({"bodi": {}}, r"spec: bodi: no such setting; possible are begin, body, cameras, frames, motion, name, posture, rate"),
     ({"body": {"size": 1}}, r"body\.size: no such setting; possible are arm_length, build, girth"),
     ({"body": {"stature": 3.1}}, r"body\.stature: .*less than or equal to 2.2, found 3.1"),
     ({"body": {"stature": float("nan")}}, r"body\.stature: .*found nan"),

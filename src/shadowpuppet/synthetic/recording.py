@@ -18,7 +18,7 @@ from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, postur
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
-from shadowpuppet.synthetic.spec import Bystander, Spec
+from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
 
 Progress = Callable[[int, int], None]
@@ -37,7 +37,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
-    _folders(folder, "video", "background", "masks", *["people"][: len(spec.scene.bystanders)])
+    _folders(folder, "video", *["background"][: spec.scene.empty_seconds > 0], "masks", *["people"][: len(spec.scene.bystanders)])
     seed = seed_of(rng)
     for_motion, for_noise, for_training, for_others = rng.spawn(4)
     write_spec(folder / SPEC_FILE, spec, seed)
@@ -54,7 +54,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
             warn(f"{folder}: camera {camera.name!r}: sees nothing of the person in any picture", ShadowPuppetWarning, stacklevel=2)
         if len(cameras) == 1:
             _write_references(folder / "references", spec, studio)
-    if spec.scene.obstacles and not hidden:
+    if not (hidden or all(thing.seat for thing in spec.scene.obstacles)):
         warn(f"{folder}: obstacles: nothing of the person is hidden by them in any picture", ShadowPuppetWarning, stacklevel=2)
     return folder
 
@@ -71,14 +71,15 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
         raise SettingsError(f"frames: found {spec.frames or 1} pictures at {spec.rate:g} a second after {spec.begin:g} s, expected at most "
                             f"{max(there, 0)}: then the motion is over")
     times = np.arange(spec.frames or there) / spec.rate
-    return times, animate(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
+    return times, animate(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
     """The figure of a bystander in `count` frames, at the bystander's place."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
-    always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
+    always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None,
+                     posture="standing", scene=Scene())
     _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
@@ -104,10 +105,7 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     from shadowpuppet.video import write_frames
 
     name, crf, hidden, seen = studio.room.camera.name, spec.scene.crf, 0, 0
-    with write_frames(folder / "background" / f"{name}.mp4", spec.rate, crf=crf) as film:
-        count = max(1, round(spec.scene.empty_seconds * spec.rate))
-        for index in range(count):
-            film.write(studio.empty(index, count))
+    _shoot_empty(folder, spec, studio)
     interrupted = False
     with contextlib.ExitStack() as stack:
         film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf))
@@ -127,6 +125,18 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     if interrupted:
         raise KeyboardInterrupt
     return hidden, seen
+
+
+def _shoot_empty(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
+    """Write a camera's film of the empty scene, if the spec has one."""
+    from shadowpuppet.video import write_frames
+
+    if spec.scene.empty_seconds == 0:
+        return
+    with write_frames(folder / "background" / f"{studio.room.camera.name}.mp4", spec.rate, crf=spec.scene.crf) as film:
+        count = max(1, round(spec.scene.empty_seconds * spec.rate))
+        for index in range(count):
+            film.write(studio.empty(index, count))
 
 
 def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
@@ -164,11 +174,13 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
 
 
 def _write_references(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
-    """Write reference pictures with masks and joints; none if an obstacle hides a part, as sizes are fitted to whole silhouettes."""
+    """Write reference pictures with masks and joints; none if an obstacle hides a part, as sizes are fitted to whole silhouettes, or if the
+    person never stands.
+    """
     from shadowpuppet.video import write_image
 
     figures = {name: pose(spec.body, posture(**named)) for name, named in REFERENCES.items()}
-    if any(studio.hides(figure) for figure in figures.values()):
+    if spec.posture != "standing" or any(studio.hides(figure) for figure in figures.values()):
         return
     _folders(folder)
     for name, figure in figures.items():
