@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from warnings import warn
@@ -13,13 +14,12 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.motion.table import joint_columns
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
-from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
+from shadowpuppet.synthetic.truth import SPEED_STEP, Soles, soles, write_lines, write_truth
 
 Progress = Callable[[int, int], None]
 
@@ -41,10 +41,13 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     seed = seed_of(rng)
     for_motion, for_noise, for_training, for_others = rng.spawn(4)
     write_spec(folder / SPEC_FILE, spec, seed)
+    same_motion = deepcopy(for_motion)
     times, figure = perform(spec, for_motion)
+    feet = feet_of(spec, times, figure, same_motion)
     company = spec.scene.bystanders
     others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
-    _write_given(folder, spec, cameras, times, figure, for_training)
+    write_truth(folder / "truth", times, figure.joints, spec.rate, feet)
+    _write_given(folder, spec, cameras, for_training)
     hidden = 0
     for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
         studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others))
@@ -64,14 +67,30 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
 
     Raises `SettingsError` if the motion is shorter than the film.
     """
-    from shadowpuppet.synthetic.movement.sequence import animate, sequence_seconds
+    from shadowpuppet.synthetic.movement.sequence import sequence_seconds
 
     there = int((sequence_seconds(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
     if there < max(spec.frames or 1, 1):
         raise SettingsError(f"frames: found {spec.frames or 1} pictures at {spec.rate:g} a second after {spec.begin:g} s, expected at most "
                             f"{max(there, 0)}: then the motion is over")
     times = np.arange(spec.frames or there) / spec.rate
-    return times, animate(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
+    return times, _figure(spec, times + spec.begin, rng)
+
+
+def feet_of(spec: Spec, times: Array, figure: Figure, rng: np.random.Generator) -> Soles:
+    """The soles of `spec`'s figure at times (T,), seconds; rng: in the state before `perform`, so that the motion is the same."""
+    from shadowpuppet.synthetic.movement.sequence import sequence_seconds
+
+    before, after = (np.clip(times + spec.begin + step, 0.0, sequence_seconds(spec.motion)) for step in (-SPEED_STEP, SPEED_STEP))
+    moving = _figure(spec, np.concatenate([before, after]), rng)
+    return soles(spec.body, figure, moving, after - before)
+
+
+def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> Figure:
+    """The figure of `spec` at times `t` (T,) of its motion, seconds."""
+    from shadowpuppet.synthetic.movement.sequence import animate
+
+    return animate(spec.body, spec.motion, t, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
@@ -139,8 +158,8 @@ def _shoot_empty(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
             film.write(studio.empty(index, count))
 
 
-def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
-    """Write everything but films: calibration, the subject's data, truth, and for several cameras a training motion.
+def _write_given(folder: Path, spec: Spec, cameras: list[Camera], rng: np.random.Generator) -> None:
+    """Write what a user knows of a recording: calibration, the subject's data, and for several cameras a training motion.
 
     The training motion is another performance, with other random numbers, of the same or of other gestures by the same body.
     """
@@ -148,29 +167,10 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
-    write_truth(folder / "truth", times, figure.joints, spec.rate)
     own = spec.motion if spec.training is None else spec.training
     if len(cameras) > 1 and own and not (own == spec.motion and any(gesture.file for gesture in own)):  # a file plays the same every time
         again, rehearsal = perform(replace(spec, motion=own, frames=spec.training_frames), rng)
         write_truth(folder / "training", again, rehearsal.joints, spec.rate)
-
-
-def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
-    """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds."""
-    rows = joints.reshape(len(joints), -1)
-    lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
-    _write(path.with_suffix(".csv"), [",".join(["time", *joint_columns(JOINTS)]), *lines])
-    count, trc = len(joints), path.with_suffix(".trc")
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{trc.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"{rate:g}\t{rate:g}\t{count}\t{len(JOINTS)}\tmm\t{rate:g}\t1\t{count}",
-        "Frame#\tTime\t" + "\t\t\t".join(JOINTS),
-        "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"),
-        "",
-    ]
-    lines = ["\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)]) for n, (t, row) in enumerate(zip(times, rows), 1)]
-    _write(trc, [*head, *lines])
 
 
 def _write_references(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
@@ -199,14 +199,7 @@ def _write_subject(path: Path, spec: Spec) -> None:
     if "distance" in spec.tells and len(views) == 1:
         distance = views[0].distance
         lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
-    _write(path, lines)
-
-
-def _write(path: Path, lines: list[str]) -> None:
-    try:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+    write_lines(path, lines)
 
 
 def _folders(folder: Path, *names: str) -> None:
