@@ -31,6 +31,7 @@ from shadowpuppet.synthetic import (
     proving_ground,
     proving_rings,
     read_spec,
+    resting,
     spec_from,
     spec_text,
     synthesize,
@@ -103,7 +104,7 @@ def test_a_spec_with_a_ring_comes_back(ring):
 def test_named_specs_are_theirs_by_name_and_can_be_written():
     named = named_specs()
     assert {"demo", "ring_walking", "man_reach"} <= set(named)
-    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(humaneva()) + len(proving_rings())
+    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(humaneva()) + len(proving_rings()) + len(resting())
     for name, spec in named.items():
         assert spec.name == name
         assert spec_from(tomllib.loads(spec_text(spec))) == spec

@@ -5,7 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, humaneva, named_specs, proving_ground, proving_rings
+from shadowpuppet.synthetic.collection import (
+    around,
+    demo_ring_spec,
+    demo_spec,
+    humaneva,
+    named_specs,
+    proving_ground,
+    proving_rings,
+    resting,
+)
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
@@ -19,7 +28,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 __all__ = ["Bystander", "Gesture", "Mannequin", "Obstacle", "Ring", "Scene", "Spec", "Viewpoint", "around", "demo_ring_spec", "demo_spec",
-           "humaneva", "named_specs", "proving_ground", "proving_rings", "read_spec", "spec_from", "spec_text", "synthesize"]
+           "humaneva", "named_specs", "proving_ground", "proving_rings", "read_spec", "resting", "spec_from", "spec_text", "synthesize"]
 
 
 def synthesize(
