@@ -282,6 +282,21 @@ def test_references_are_whole_or_not_there(tmp_path):
         assert len(made.references) == count
 
 
+def test_flags_seat_a_person_on_a_chair_without_an_empty_scene(shell, tmp_path):
+    code, _, err = shell("-o", "made", "--posture", "seated", "--chair", "new", "--empty-seconds", 0, "--motion", "reach", *TINY)
+    assert (code, err) == (0, "")
+    spec = read_spec(tmp_path / "made" / "spec.toml")
+    assert spec.posture == "seated"
+    assert spec.scene.obstacles == (Obstacle(kind="chair", seat=True, enters=0.0),)
+    recording = read_recording(tmp_path / "made")
+    assert [view.background for view in recording.views] == [None]
+    known = apply_changes(SpecChanges(chair="known"), spec)
+    assert known.scene.obstacles == (Obstacle(kind="chair", seat=True),)  # in place of the other chair
+    code, _, err = shell("-o", "other", "--chair", "new", *TINY)
+    assert code != 0
+    assert "the person is not seated" in err
+
+
 def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
     code, out, err = shell("-o", "ring", "--cameras", 3, "--ring-radius", 3, "--seed", 4, "--motion", "random", *TINY)
     assert (code, err) == (0, "")

@@ -9,6 +9,7 @@ import numpy as np
 
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.movement.resting import PostureName
+from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
 from shadowpuppet.synthetic.spec import Scene, Spec
 from shadowpuppet.synthetic.spec_changes import parse_gestures
@@ -183,11 +184,16 @@ RESTING: tuple[tuple[str, Kind, int, PostureName, str, str, int], ...] = (
 
 
 def resting() -> tuple[Spec, ...]:
-    """Recordings of people who sit, sit down, kneel and lie: the upper body with one camera, the whole body with four.
+    """Recordings of people who sit, sit down, kneel and lie: the upper body with one camera, the whole body with four; and of one who walks
+    through the picture of one camera to and fro, away for some 3 s between.
 
     One camera stands level, 2.1 m away, at the height of the shoulders; its picture shows the hips and cuts the legs.
     """
-    return tuple(_resting(n, *row) for n, row in enumerate(RESTING))
+    body = _person("man", 68)
+    walk = Gesture(motion="walk", seconds=11, path="line", size=5.0)
+    passes = Spec(name="comes_and_goes", body=body, motion=(walk,), turn_deg=90, scene=Scene(clothing=68, room=68, empty_seconds=2.0),
+                  cameras=(Viewpoint(height=0.9 * body.stature, distance=2.4),), tells="height", seed=(4, len(RESTING)))
+    return (*(_resting(n, *row) for n, row in enumerate(RESTING)), passes)
 
 
 def _resting(n: int, name: str, kind: Kind, seed: int, posture: PostureName, gestures: str, chair: str, cameras: int) -> Spec:
