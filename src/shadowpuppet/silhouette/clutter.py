@@ -4,7 +4,7 @@ Masks of other programs, and the film of a room that changed since its empty sce
 the person. `find_clutter` finds them in a sample of masks; `Clutter.removed` takes them out of each.
 
 1. A line: pixels that are silhouette in nearly every mask, where the silhouette is thinner than half a forearm (4 cm) and longer than a
-   forearm (30 cm). No part of a person is that thin and that long.
+   forearm with its hand (40 cm). No part of a person is that thin and that long.
 2. A thing: a part of its own that is in nearly every mask at the same pixels, and that the person has stood well aside of.
 
 Thick things that the person never leaves, such as the seat below a person who sits, cannot be told from the person by this.
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.silhouette.cleanup import Window, bounding_window
 
-THIN, LONG = 0.06, 0.45
+THIN, LONG = 0.06, 0.55
 """Greatest width and least length of a line, over the square root of the person's area (some 0.7 m)."""
 MAX_ABSENT = 0.1
 """Greatest share of masks in which a pixel of the clutter is not silhouette."""
@@ -31,6 +31,8 @@ MIN_SEEN = 0.3
 """Least share of masks in which the clutter is seen free of the person."""
 MIN_SEEN_ON = 0.05
 """The same where a line goes on."""
+MAX_BESIDE = 0.3
+"""Greatest mean share of masks in which the pixels beside a line are silhouette: a strip of the person has more person on one side."""
 ASIDE = 0.1
 """Distance across the picture from which on the person stands aside of a thing, over the person's height."""
 MIN_THING = 0.01
@@ -161,21 +163,31 @@ def _lines(masks: Sequence[Bits], constant: Mask, size: int, length: float) -> t
     import cv2
 
     disk = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    thin = np.zeros(constant.shape)
+    thin, shares = np.zeros(constant.shape), np.mean(masks, axis=0)
     for mask in masks:
-        thin += mask & (1 - cv2.morphologyEx(mask, cv2.MORPH_OPEN, disk))
+        thick = cv2.dilate(cv2.morphologyEx(mask, cv2.MORPH_OPEN, disk), np.ones((5, 5), np.uint8))
+        thin += mask & (1 - thick)  # without the teeth that an opening leaves along every outline
     certain, possible = ((constant & (thin >= share * len(masks))).astype(np.uint8) for share in (MIN_SEEN, MIN_SEEN_ON))
     number, labels, boxes, _ = cv2.connectedComponentsWithStats(certain, connectivity=8)
     _, whole = cv2.connectedComponents(possible, connectivity=8)
     out, parts = np.zeros_like(certain), list[Part]()
     for n in range(1, number):
-        if np.hypot(*boxes[n, 2:4]) >= length:
+        if np.hypot(*boxes[n, 2:4]) >= length and _stands_free(labels == n, shares, size):
             line = whole == whole[labels == n][0]
             if not out[line].any():
                 x, y, width, height = cv2.boundingRect(line.astype(np.uint8))
                 parts.append(Part("line", (x, y, width, height), float(np.mean([mask[line].mean() for mask in masks]))))
             out[line] = 1
     return np.asarray(cv2.dilate(out, np.ones((3, 3), np.uint8)), np.uint8), parts
+
+
+def _stands_free(line: Mask, shares: NDArray[np.float64], size: int) -> bool:
+    """Whether a line has background on both sides; `shares` (H, W): share of the masks in which each pixel is silhouette."""
+    import cv2
+
+    bits = line.astype(np.uint8)
+    inner, outer = (cv2.dilate(bits, np.ones((2 * reach + 1,) * 2, np.uint8)) for reach in (2, 2 + size))
+    return bool(np.mean(shares[(outer > 0) & (inner == 0)]) <= MAX_BESIDE)
 
 
 def _things(masks: Sequence[Bits], constant: Mask, area: float) -> tuple[Bits, list[Part]]:
