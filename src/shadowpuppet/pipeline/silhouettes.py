@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
-from shadowpuppet.video import Image
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,28 +24,18 @@ class Silhouettes:
     """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
     """Rows and columns outside which masks are empty; None for all."""
-    blank: Image | None = None
-    """Image of the empty scene, which replaces the image outside the region."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:
             return self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
-        return self._within(self.segmenter(self.visible(frame.image)))
+        return self._within(self.segmenter(frame.image))
 
     def plain(self, frame: CameraFrame) -> Mask | None:
         """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
         if self.segmenter is None or self.segmenter.background.frames < 2:
             return None
         return self._within(self.segmenter.raw(frame.image))
-
-    def visible(self, image: Image) -> Image:
-        """A copy of an image with the empty scene outside the region, so that nothing there is taken for the person."""
-        if self.region is None or self.blank is None:
-            return image
-        out = self.blank.copy()
-        out[self.region] = image[self.region]
-        return out
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
@@ -66,10 +54,7 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options) -> Sil
         scene, source = [background_from_film(images)], "the film itself (median)"
     else:
         scene, source = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background)
-    first, scene = _peeked(iter(scene))
-    silhouettes = Silhouettes(source, None, footage.region, None if footage.region is None else first)
-    segmenter = learn_background(scene, options.silhouette, film=[silhouettes.visible(image) for image in images])
-    return replace(silhouettes, segmenter=segmenter)
+    return Silhouettes(source, learn_background(scene, options.silhouette, film=images, region=footage.region), footage.region)
 
 
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
@@ -94,12 +79,6 @@ def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
     if asked.method == "averaging":
         return SilhouetteSettings()
     return asked if asked.cleaned else replace(asked, clean=None)
-
-
-def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:
-    """The first of some images, and an iterator over all of them."""
-    first = next(images, None)
-    return first, chain([] if first is None else [first], images)
 
 
 def _short(path: Path | None) -> str:

@@ -13,8 +13,8 @@ from shadowpuppet.silhouette.background import Background, Image
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, disc, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene
-from shadowpuppet.silhouette.cleanup import coarse_person
-from shadowpuppet.silhouette.light import Light
+from shadowpuppet.silhouette.cleanup import Window, coarse_person
+from shadowpuppet.silhouette.correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
@@ -35,23 +35,23 @@ MAX_GREY_CHROMA = 2
 
 
 def learn_background(images: Iterable[Image], settings: SilhouetteSettings | None = None, *,
-                     film: Iterable[Image] | None = None) -> Segmenter:
+                     film: Iterable[Image] | None = None, region: Window | None = None) -> Segmenter:
     """The `Segmenter` learnt from pictures (H, W, 3) or (H, W) of the empty scene: a film, one picture, or that of `background_from_film`.
 
     film: the frames to be segmented, or some spread over them: their noise and the blur of their outlines are measured. Without them the
-    noise is that of `images`, and outlines count as sharp. Raises `SilhouetteError` for pictures that do not fit, and `SettingsError`
-    for a method that this background does not allow.
+    noise is that of `images`, and outlines count as sharp. region: rows and columns outside which nothing is a person.
+    Raises `SilhouetteError` for pictures that do not fit, and `SettingsError` for a method that this background does not allow.
     """
     settings = settings or SilhouetteSettings()
     observer = METHODS[settings.method].observer(settings) if settings.method in METHODS else None
     background = scene.learn_statistics(images, observer.add if observer is not None else lambda image: None)
-    light = Light(scene.picture_of(background)) if settings.follows_light else None
-    frames = [frame if light is None else light.normalised(frame) for frame in _sample(film, background)]
+    correction = Correction.of(scene.picture_of(background), settings, region)
+    frames = [correction(frame).image for frame in _sample(film, background)]
     channels = _channel_classifier(background, frames, settings)
     choice = _choose(background, frames, channels, settings)
     classifier = METHODS[choice.key].build(EmptyScene(background, channels, settings, observer))
     least = MIN_EDGE_CONTRAST * settings.factor / float(channels.inverse_sigma[..., 0].max())
-    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, light)
+    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, correction)
     return replace(segmenter, edge=EdgeProfile(_outline_width(segmenter, frames), least))
 
 
