@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
-from shadowpuppet.silhouette.background import Background, Image
+from shadowpuppet.silhouette.background import Background, FilmNoise, Image
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, disc, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene
@@ -24,6 +24,8 @@ COLOUR_FLOOR = 0.75
 """Noise floor of colours over that of brightness: codecs average colours over four pixels."""
 NOISE_TAIL_FACTOR = 1.8
 """Factor on the film's measured noise: compression errors have longer tails than a normal distribution."""
+EXCESS_NOISE = 0.4
+"""Standard deviation of a noisy film's noise beyond a clean film's, over the assumed one."""
 FILM_SAMPLE = 12
 """Number of frames in which the film's noise and the blur of its outlines are measured; at most twice as many are used."""
 MIN_EDGE_CONTRAST = 1.5
@@ -66,21 +68,21 @@ def _sample(film: Iterable[Image] | None, background: Background) -> list[Image]
 def _channel_classifier(background: Background, frames: list[Image], settings: SilhouetteSettings) -> ChannelClassifier:
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
-    sigma = assumed_sigma(background, frames, settings.noise_floor)
-    return ChannelClassifier("both", scene.smoothed(background.mean), (1 / sigma).astype(np.float32), settings.factor, darkest)
+    noise = scene.measured_noise(frames, background.mean)
+    sigma = assumed_sigma(background, noise, settings.noise_floor)
+    return ChannelClassifier("both", scene.smoothed(background.mean, noise.smoothing), (1 / sigma).astype(np.float32), settings.factor,
+                             darkest, noise.smoothing, EXCESS_NOISE if noise.noisy else 0.0)
 
 
-def assumed_sigma(background: Background, frames: list[Image], noise_floor: float) -> np.ndarray:
+def assumed_sigma(background: Background, noise: FilmNoise, noise_floor: float) -> np.ndarray:
     """Standard deviation (H, W, 3) of Y, Cr, Cb assumed for the empty scene: the greatest of the learnt one, the film's noise and
     the floor, increased at the background's edges."""
     import cv2
 
-    mean = scene.smoothed(background.mean)
-    floor = noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR])
-    if frames:
-        floor = np.maximum(floor, NOISE_TAIL_FACTOR * scene.film_noise(frames, mean))
+    mean = scene.smoothed(background.mean, noise.smoothing)
+    floor = np.maximum(noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR]), NOISE_TAIL_FACTOR * noise.sigma)
     across = cv2.dilate(mean, disc(1)) - cv2.erode(mean, disc(1))
-    return np.hypot(np.maximum(background.smooth_sigma, np.maximum(floor, 1e-3)), EDGE_JITTER * across)
+    return np.hypot(np.maximum(background.smooth_sigma * noise.share, np.maximum(floor, 1e-3)), EDGE_JITTER * across)
 
 
 def _choose(background: Background, frames: list[Image], channels: ChannelClassifier, settings: SilhouetteSettings) -> KeyChoice:

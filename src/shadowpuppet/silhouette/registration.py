@@ -203,7 +203,8 @@ def _searched(points: Points, picture: Floats) -> Homography:
     """The shift under which most points look alike, to a pixel of a reduced picture (H, W)."""
     reach = round(REACH * picture.shape[1])
     cap = np.float32(np.median(np.abs(points.value)))
-    y, x = np.unravel_index(np.argmin(_shift_costs(points.xy[::SEARCHED], points.value[::SEARCHED], picture, reach, cap)), (2 * reach + 1,) * 2)
+    costs = _shift_costs(points.xy[::SEARCHED], points.value[::SEARCHED], picture, reach, cap)
+    y, x = np.unravel_index(np.argmin(costs), costs.shape)
     out = np.eye(3)
     out[:2, 2] = (int(x) - reach, int(y) - reach)
     out[:2, 2] /= picture.shape[1] / 2
