@@ -82,7 +82,7 @@ class Light:
         table = np.clip(np.rint(np.arange(256)[:, None] / gains), 0, 255).astype(np.uint8)
         out = np.asarray(cv2.LUT(image, table[None] if image.ndim == 3 else table[:, 0]), np.uint8)
         if gains.max() > 1:
-            clipped = cv2.subtract(self.scene, (*np.floor(CLIPPED / gains), 0.0, 0.0, 0.0)[:4])
+            clipped = cv2.subtract(self.scene, np.append(np.floor(CLIPPED / gains), np.zeros(4 - len(gains))))
             out = np.asarray(cv2.add(out, clipped), np.uint8)
         return out
 

@@ -114,6 +114,13 @@ class Registration:
         step = _solved(*_equations(points, difference), np.eye(3), rigid=True)
         return not _alike(points, difference) or self.pixels(_matrix(step)) >= STILL
 
+    def matches(self, image: Image, movement: Homography | None) -> bool:
+        """Whether a frame under a movement looks like the scene; true if the scene has too little texture to tell."""
+        if self._levels is None:
+            return True
+        points = self._levels[0]
+        return _alike(points, _compared(points, self._reduced(image), np.eye(3) if movement is None else movement))
+
     def pixels(self, movement: Homography) -> float:
         """The greatest displacement of a corner by a movement, pixels of the frame."""
         return float(np.hypot(*(_mapped(movement, self._corners) - self._corners).T).max()) * self.scene.shape[1] / 2
@@ -145,8 +152,8 @@ class Registration:
 
         height, width = image.shape[:2]
         factor = max(1, round(width / WIDTH))
-        small = cv2.resize(to_brightness(image), (max(width // factor, 8), max(height // factor, 8)), interpolation=cv2.INTER_AREA)
-        logs = LOGS[small]
+        size = max(width // factor, 8), max(height // factor, 8)
+        logs = LOGS[np.asarray(cv2.resize(to_brightness(image), size, interpolation=cv2.INTER_AREA), np.uint8)]
         return np.asarray(cv2.GaussianBlur(logs, (0, 0), FINE) - cv2.blur(logs, (2 * round(COARSE) + 1,) * 2), np.float32)
 
 
@@ -158,7 +165,7 @@ def _gap(matrix: Homography, width: int, height: int) -> Gap:
     import cv2
 
     least, most = np.array([1, 1]), np.array([width - 2, height - 2])
-    back = np.linalg.inv(matrix)
+    back = np.asarray(np.linalg.inv(matrix), float)
     corners = _mapped(back, np.array([least, [most[0], least[1]], most, [least[0], most[1]]], float))
     unseen = cv2.fillConvexPoly(np.ones((height, width), np.uint8), np.rint(corners).astype(np.int32), 0)
     y, x = np.nonzero(unseen)
@@ -176,7 +183,7 @@ def _halved(picture: Floats) -> Floats:
 def _points(picture: Floats) -> Points | None:
     """The points of steepest slope in each block of a reduced picture (H, W); None if too few blocks have any."""
     height, width = picture.shape
-    down, across = np.gradient(picture)
+    down, across = (np.asarray(slope) for slope in np.gradient(picture))
     slope = np.hypot(down, across)
     slope[:2], slope[-2:], slope[:, :2], slope[:, -2:] = 0, 0, 0, 0
     rows, columns, filled = list[NDArray[np.intp]](), list[NDArray[np.intp]](), 0
@@ -253,7 +260,7 @@ def _solved(left: NDArray[np.float64], right: NDArray[np.float64], movement: Hom
         return SHIFTS @ np.linalg.solve(left + np.eye(3), right)
     beyond = prior * (np.eye(8) - SHIFTS @ np.linalg.pinv(SHIFTS))
     now = (movement - np.eye(3)).ravel()[:8]
-    return np.linalg.solve(left + beyond + np.eye(8), right + beyond @ now)
+    return np.asarray(np.linalg.solve(left + beyond + np.eye(8), right + beyond @ now), float)
 
 
 def _matrix(step: NDArray[np.float64]) -> Homography:
