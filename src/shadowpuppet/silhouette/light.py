@@ -40,6 +40,8 @@ SPREAD, PERSON_SPREAD = 0.03, 0.15
 """Standard deviation of a background pixel's log gain about the surface: the least assumed, and the greatest."""
 TILTED = 0.02
 """Share of the pixels by which a surface is held level: a corner without informative pixels is not bent away."""
+BLOCKS, MISFIT = (8, 6), 0.07
+"""Blocks across and down, and the greatest median of what a surface leaves of their log gain: above, it is no light that has changed."""
 NODES = 24
 """Number of the surface's nodes across the picture, between which it is interpolated."""
 
@@ -107,9 +109,20 @@ class Light:
         shared = _surface(terms, beyond, informative, ROUNDS)
         beyond -= informative * (terms @ shared)[:, None]
         own = np.column_stack([_surface(terms, beyond[:, c : c + 1], informative[:, c : c + 1], 3) for c in range(len(gains))])
+        if self._misfit(beyond - terms @ own, informative) > MISFIT:
+            return None
         own += shared[:, None]
         own[0] += logs
         return own
+
+    def _misfit(self, beyond: Floats, informative: NDArray[np.bool_]) -> float:
+        """Median, over blocks of the picture, of the mean log gain (n, C) that is left of informative pixels."""
+        import cv2
+
+        height, width = (-(-side // self._step) for side in self.scene.shape[:2])
+        sums, counts = (cv2.resize(values.reshape(height, width, -1).astype(np.float32), BLOCKS, interpolation=cv2.INTER_AREA)
+                        for values in (beyond * informative, informative))  # fmt: skip
+        return float(np.median(np.abs(sums / np.maximum(counts, 1e-3))))
 
     def _evened(self, image: Image, surface: NDArray[np.float64]) -> Image:
         """A picture divided by the gain of a surface (6, C)."""

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.jit import compiled
 from shadowpuppet.silhouette.background import Floats, Image, to_brightness
 
 Indices = NDArray[np.intp]
@@ -208,9 +207,11 @@ def _points(picture: Floats) -> Points | None:
 
 def _searched(points: Points, picture: Floats) -> Homography:
     """The shift under which most points look alike, to a pixel of a reduced picture (H, W)."""
+    from shadowpuppet.silhouette._kernels import shift_costs
+
     reach = round(REACH * picture.shape[1])
     cap = np.float32(np.median(np.abs(points.value)))
-    costs = _shift_costs(points.xy[::SEARCHED], points.value[::SEARCHED], picture, reach, cap)
+    costs = shift_costs(points.xy[::SEARCHED], points.value[::SEARCHED], picture, reach, cap)
     y, x = np.unravel_index(np.argmin(costs), costs.shape)
     out = np.eye(3)
     out[:2, 2] = (int(x) - reach, int(y) - reach)
@@ -247,8 +248,10 @@ def _alike(points: Points, difference: Floats) -> bool:
 
 def _compared(points: Points, picture: Floats, movement: Homography) -> Floats:
     """Differences (N,) of a reduced picture (H, W) and points under a movement; a point outside the picture has a very large one."""
+    from shadowpuppet.silhouette._kernels import point_differences
+
     out = np.empty(len(points.value), np.float32)
-    _differences(points.xy, points.value, picture, movement.astype(np.float32), out)
+    point_differences(points.xy, points.value, picture, movement.astype(np.float32), np.float32(OUTSIDE), out)
     return out
 
 
@@ -270,41 +273,3 @@ def _matrix(step: NDArray[np.float64]) -> Homography:
 def _mapped(movement: Homography, xy: NDArray[np.float64]) -> NDArray[np.float64]:
     out = np.column_stack([xy, np.ones(len(xy))]) @ movement.T
     return out[:, :2] / out[:, 2:]
-
-
-@compiled(nogil=True)
-def _differences(xy, value, picture, movement, out):
-    """Differences (N,) of the picture (H, W) at the moved points and the points' values; `OUTSIDE` outside the picture."""
-    height, width = picture.shape
-    half = np.float32(width / 2)
-    for n in range(len(value)):
-        u, v = xy[n, 0], xy[n, 1]
-        w = movement[2, 0] * u + movement[2, 1] * v + movement[2, 2]
-        x = ((movement[0, 0] * u + movement[0, 1] * v + movement[0, 2]) / w + 1) * half - np.float32(0.5)
-        y = (movement[1, 0] * u + movement[1, 1] * v + movement[1, 2]) / w * half + np.float32(height / 2 - 0.5)
-        if not (0 <= x < width - 1 and 0 <= y < height - 1):
-            out[n] = OUTSIDE
-            continue
-        i, j = int(y), int(x)
-        q, p = y - np.float32(i), x - np.float32(j)
-        above = picture[i, j] + p * (picture[i, j + 1] - picture[i, j])
-        below = picture[i + 1, j] + p * (picture[i + 1, j + 1] - picture[i + 1, j])
-        out[n] = above + q * (below - above) - value[n]
-
-
-@compiled(nogil=True)
-def _shift_costs(xy, value, picture, reach, cap):
-    """Mean difference, capped, of points and picture (H, W), for shifts by up to `reach` pixels down and across."""
-    height, width = picture.shape
-    out = np.empty((2 * reach + 1, 2 * reach + 1))
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            total, number = 0.0, 0
-            for n in range(len(value)):
-                x = int((xy[n, 0] + 1) * width / 2) + dx
-                y = int(xy[n, 1] * width / 2 + height / 2) + dy
-                if 0 <= x < width and 0 <= y < height:
-                    total += min(abs(picture[y, x] - value[n]), cap)
-                    number += 1
-            out[dy + reach, dx + reach] = total / max(number, 1)
-    return out
