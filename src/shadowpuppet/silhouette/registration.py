@@ -26,8 +26,8 @@ BLOCKS = 8, 6
 """Number of blocks, across and down, from each of which points are taken."""
 POINTS = 40
 """Greatest number of points in a block."""
-MIN_SLOPE = 0.02
-"""Least slope of a point's log brightness, per pixel of the reduced picture: below, it is noise."""
+MIN_SLOPE = 2.5
+"""Least slope of a point's brightness, grey levels per pixel of the reduced picture: below, it is noise, rounding or a faint shadow."""
 MIN_BLOCKS = 0.25
 """Least share of blocks with points: a plain wall shows no movement, and moves no silhouette."""
 OFFSET = 16
@@ -40,9 +40,9 @@ MIN_SCALE = 0.01
 """Least assumed standard deviation of a point's difference, log brightness."""
 STILL = 0.4
 """Greatest movement, pixels of the frame at its corners, up to which it is left unchanged."""
-UNLIKE = 0.9
-"""Median difference of points over their median value from which on picture and scene do not match: noise and light reach 0.7, pictures
-that have nothing in common 1.4."""
+UNLIKE, FOUND = 0.9, 0.75
+"""Median difference of points over their median value from which on picture and scene do not match, and up to which a movement is found:
+noise and light reach 0.7, pictures that have nothing in common 1.4."""
 BEND = 0.04
 """Standard deviation of the corners, over half the width, that is assumed for a change of view beyond shift and roll."""
 OUTSIDE = 1e3
@@ -100,25 +100,27 @@ class Registration:
             return None
         fine, coarse = levels
         picture = self._reduced(image)
-        if not self._moved(fine, _compared(fine, picture, np.eye(3))):
+        difference = _compared(fine, picture, np.eye(3))
+        if not self._moved(fine, difference):
             return None
         small = _halved(picture)
         pixel = 2 / self.scene.shape[1]
         found = _refined(coarse, small, _searched(coarse, small), True, ROUGH * pixel)
         found = _refined(fine, picture, found, False, SETTLED * pixel)
-        return found if _alike(fine, _compared(fine, picture, found)) and self.pixels(found) >= STILL else None
+        better = _unlike(fine, _compared(fine, picture, found)) < min(FOUND, _unlike(fine, difference))
+        return found if better and self.pixels(found) >= STILL else None
 
     def _moved(self, points: Points, difference: Floats) -> bool:
         """Whether points' differences (N,) look like those of a camera that moved: a little, by the first step; far, by their size."""
         step = _solved(*_equations(points, difference), np.eye(3), rigid=True)
-        return not _alike(points, difference) or self.pixels(_matrix(step)) >= STILL
+        return _unlike(points, difference) >= UNLIKE or self.pixels(_matrix(step)) >= STILL
 
     def matches(self, image: Image, movement: Homography | None) -> bool:
         """Whether a frame under a movement looks like the scene; true if the scene has too little texture to tell."""
         if self._levels is None:
             return True
         points = self._levels[0]
-        return _alike(points, _compared(points, self._reduced(image), np.eye(3) if movement is None else movement))
+        return _unlike(points, _compared(points, self._reduced(image), np.eye(3) if movement is None else movement)) < UNLIKE
 
     def pixels(self, movement: Homography) -> float:
         """The greatest displacement of a corner by a movement, pixels of the frame."""
@@ -142,17 +144,22 @@ class Registration:
     @cached_property
     def _levels(self) -> tuple[Points, Points] | None:
         """Points of the reduced scene and of its half; None if it has too little texture."""
-        fine = self._reduced(self.scene)
-        points = _points(fine)
-        return None if points is None else (points, _points(_halved(fine)) or points)
+        fine, grey = self._reduced(self.scene), self._reduced_grey(self.scene).astype(np.float32)
+        points = _points(fine, grey)
+        return None if points is None else (points, _points(_halved(fine), _halved(grey)) or points)
 
-    def _reduced(self, image: Image) -> Floats:
+    def _reduced_grey(self, image: Image) -> Image:
         import cv2
 
         height, width = image.shape[:2]
         factor = max(1, round(width / WIDTH))
         size = max(width // factor, 8), max(height // factor, 8)
-        logs = LOGS[np.asarray(cv2.resize(to_brightness(image), size, interpolation=cv2.INTER_AREA), np.uint8)]
+        return np.asarray(cv2.resize(to_brightness(image), size, interpolation=cv2.INTER_AREA), np.uint8)
+
+    def _reduced(self, image: Image) -> Floats:
+        import cv2
+
+        logs = LOGS[self._reduced_grey(image)]
         return np.asarray(cv2.GaussianBlur(logs, (0, 0), FINE) - cv2.blur(logs, (2 * round(COARSE) + 1,) * 2), np.float32)
 
 
@@ -179,18 +186,20 @@ def _halved(picture: Floats) -> Floats:
     return np.asarray(cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _points(picture: Floats) -> Points | None:
-    """The points of steepest slope in each block of a reduced picture (H, W); None if too few blocks have any."""
+def _points(picture: Floats, grey: Floats) -> Points | None:
+    """The points of steepest slope in each block of a reduced picture (H, W), of brightness `grey` (H, W), grey levels; None if too few
+    blocks have any."""
     height, width = picture.shape
     down, across = (np.asarray(slope) for slope in np.gradient(picture))
     slope = np.hypot(down, across)
+    slope[slope * (grey + OFFSET) < MIN_SLOPE] = 0
     slope[:2], slope[-2:], slope[:, :2], slope[:, -2:] = 0, 0, 0, 0
     rows, columns, filled = list[NDArray[np.intp]](), list[NDArray[np.intp]](), 0
     for ys in np.array_split(np.arange(height), BLOCKS[1]):
         for xs in np.array_split(np.arange(width), BLOCKS[0]):
             block = slope[np.ix_(ys, xs)].ravel()
             order = np.argsort(-block, kind="stable")[: min(POINTS, len(block) // 3)]
-            best = order[block[order] > MIN_SLOPE]
+            best = order[block[order] > 0]
             filled += len(best) >= 3
             rows.append(ys[best // len(xs)])
             columns.append(xs[best % len(xs)])
@@ -241,9 +250,9 @@ def _equations(points: Points, difference: Floats) -> tuple[NDArray[np.float64],
     return (weighted.T @ points.jacobian).astype(float), (difference @ weighted).astype(float)
 
 
-def _alike(points: Points, difference: Floats) -> bool:
-    """Whether differences (N,) of points are those of pictures that match."""
-    return bool(np.median(np.abs(difference)) < UNLIKE * np.median(np.abs(points.value)))
+def _unlike(points: Points, difference: Floats) -> float:
+    """Median of the differences (N,) of points over that of their values: near 0 for pictures that match, 1.4 for strangers."""
+    return float(np.median(np.abs(difference)) / np.median(np.abs(points.value)))
 
 
 def _compared(points: Points, picture: Floats, movement: Homography) -> Floats:
