@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sam
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
 from shadowpuppet.silhouette.clutter import Clutter, find_clutter
-from shadowpuppet.video import Image
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +25,6 @@ class Silhouettes:
     """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
     """Rows and columns outside which masks are empty; None for all."""
-    blank: Image | None = None
-    """Image of the empty scene, which replaces the image outside the region."""
     clutter: Clutter | None = None
     """What is left out of every mask, because it is not the person."""
 
@@ -37,7 +33,7 @@ class Silhouettes:
         if self.segmenter is None:
             mask = self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
         else:
-            mask = self._within(self.segmenter(self.visible(frame.image)))
+            mask = self._within(self.segmenter(frame.image))
         return mask if self.clutter is None else self.clutter.removed(mask)
 
     def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
@@ -51,14 +47,6 @@ class Silhouettes:
         if self.segmenter is None or self.segmenter.background.frames < 2:
             return None
         return self._within(self.segmenter.raw(frame.image))
-
-    def visible(self, image: Image) -> Image:
-        """A copy of an image with the empty scene outside the region, so that nothing there is taken for the person."""
-        if self.region is None or self.blank is None:
-            return image
-        out = self.blank.copy()
-        out[self.region] = image[self.region]
-        return out
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
@@ -77,10 +65,7 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options) -> Sil
         scene, source = [background_from_film(images)], "the film itself (median)"
     else:
         scene, source = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background)
-    first, scene = _peeked(iter(scene))
-    silhouettes = Silhouettes(source, None, footage.region, None if footage.region is None else first)
-    segmenter = learn_background(scene, options.silhouette, film=[silhouettes.visible(image) for image in images])
-    return replace(silhouettes, segmenter=segmenter)
+    return Silhouettes(source, learn_background(scene, options.silhouette, film=images, region=footage.region), footage.region)
 
 
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
@@ -111,12 +96,6 @@ def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
     if asked.method == "averaging":
         return SilhouetteSettings()
     return asked if asked.cleaned else replace(asked, clean=None)
-
-
-def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:
-    """The first of some images, and an iterator over all of them."""
-    first = next(images, None)
-    return first, chain([] if first is None else [first], images)
 
 
 def _short(path: Path | None) -> str:

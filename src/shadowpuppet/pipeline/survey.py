@@ -22,6 +22,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.condition import FilmCondition, film_condition
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
 
@@ -67,6 +68,7 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
         "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
         "left_out": _left_out(silhouettes, footage),
+        "condition": condition_of(silhouettes, sample),
     })  # fmt: skip
 
 
@@ -148,7 +150,7 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
     if look.exact_overlap is not None and look.exact_overlap < GOOD:
         doubts.append(f"the silhouettes overlap the ready ones in masks/ by {look.exact_overlap:.2f} only: try another "
                       "--silhouette.method, or --masks")
-    return [*doubts, *_told_of_clutter(look.left_out), *look.quality.warnings()]
+    return [*doubts, *_poor(look.condition), *_told_of_clutter(look.left_out), *look.quality.warnings()]
 
 
 # Several cameras
@@ -211,7 +213,8 @@ def _rig_doubts(look: RigLook) -> list[str]:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
                           "try another --silhouette.method, or --masks")
-        doubts += [f"camera {camera.name!r}: {told}" for told in (*_told_of_clutter(camera.left_out), *camera.quality.warnings())]
+        warnings = (*_poor(camera.condition), *_told_of_clutter(camera.left_out), *camera.quality.warnings())
+        doubts += [f"camera {camera.name!r}: {warning}" for warning in warnings]
         doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
     return doubts
 
@@ -221,6 +224,17 @@ def _rig_doubts(look: RigLook) -> list[str]:
 
 def _share(masks: Sequence[Mask]) -> float:
     return float(np.mean([mask.mean() for mask in masks]))
+
+
+def condition_of(silhouettes: Silhouettes, sample: Sample) -> FilmCondition | None:
+    """The condition of a film in its sampled frames; None for ready silhouettes and an empty film."""
+    if silhouettes.segmenter is None or not sample.frames:
+        return None
+    return film_condition(silhouettes.segmenter, [[(frame.time, frame.image) for frame in run] for run in sample.runs])
+
+
+def _poor(condition: FilmCondition | None) -> tuple[str, ...]:
+    return () if condition is None else condition.warnings()
 
 
 def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:
