@@ -1,0 +1,74 @@
+"""Where the frames of a film differ: the pixels that something moved over, and those that are enclosed by them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.silhouette.background import Floats
+
+CALM_SHARE = 30
+"""Percentile of the pixels' standard deviations over time that counts as the film's noise: those of the person are among the greatest."""
+LEAST_NOISE = np.array([0.7, 0.5, 0.5])
+"""Least noise of Y, Cr, Cb, grey levels: compression leaves none at all in places."""
+MOVED = 3.0
+"""Standard deviation over time, over the noise, from which on something moved over a pixel."""
+PART_SHARE, PART_PIXELS = 0.1, 30
+"""Least size of a part that moves, over the largest part's, and in pixels."""
+BORDER_SHARE = 0.5
+"""Share of moving pixels at the picture's upper corners and sides from which on it is the camera, or the light, that changes."""
+
+Mask = NDArray[np.bool_]
+
+
+class Movement(NamedTuple):
+    """What moves in a film."""
+
+    noise: NDArray[np.float64]
+    """Standard deviation (3,) of Y, Cr, Cb where nothing moves, grey levels."""
+    region: Mask
+    """Pixels that something moved over, and those that these enclose, of shape (H, W)."""
+    enclosed: Mask
+    """The enclosed pixels, in which all frames agree, of shape (H, W): the trunk and legs of a person who stands, or the wall between
+    arm and body."""
+
+
+def find_movement(planes: Floats) -> Movement:
+    """The movement in frames (N, H, W, 3), smoothed Y, Cr, Cb; its region is empty if nothing moves."""
+    import cv2
+
+    deviation = planes.std(axis=0)
+    noise = np.maximum(np.percentile(deviation.reshape(-1, 3), CALM_SHARE, axis=0), LEAST_NOISE)
+    moved = ((deviation / noise).max(axis=2) > MOVED).astype(np.uint8)
+    parts = _large_parts(np.asarray(cv2.morphologyEx(moved, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)), np.uint8))
+    region = np.asarray(cv2.dilate(parts, np.ones((3, 3), np.uint8)), np.uint8) > 0
+    inside = _enclosed(region)
+    return Movement(noise, region | inside, inside)
+
+
+def unsteady(region: Mask) -> bool:
+    """Whether the picture's left, right and upper border move, as if the camera or the light, and not a person, had moved."""
+    border = np.concatenate([region[:-1, 0], region[:-1, -1], region[0]])
+    return float(border.mean()) > BORDER_SHARE
+
+
+def _large_parts(moved: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The moving parts without specks; parts up to four pixels apart count as one."""
+    import cv2
+
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(cv2.dilate(moved, np.ones((5, 5), np.uint8)))
+    areas = np.bincount(np.asarray(parts)[moved > 0], minlength=len(stats))
+    areas[0] = 0
+    return moved & (areas >= max(PART_SHARE * areas.max(), PART_PIXELS)).astype(np.uint8)[np.asarray(parts, np.intp)]
+
+
+def _enclosed(region: Mask) -> Mask:
+    """The pixels (H, W) that only lead to the left, right or upper border through the region; the lower border cuts a person off."""
+    import cv2
+
+    around = np.pad(~region, ((1, 0), (1, 1)), constant_values=True).astype(np.uint8)
+    _, parts = cv2.connectedComponents(around, connectivity=4)
+    parts = np.asarray(parts)[1:, 1:-1]
+    return (parts != parts.dtype.type(1)) & ~region if around[0, 0] else ~region
