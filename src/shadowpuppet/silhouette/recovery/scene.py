@@ -26,13 +26,15 @@ LEAST_SEEN = 2
 """Least number of frames that show the scene at a pixel."""
 ROUNDS = 3
 """Times that pixels are labelled, each but the first with colour models from the labels before."""
-RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.1, 0.4, 0.6, 0.3
+RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.1, 0.4, 0.8, 0.3
 """Costs of labels: of a scene that is seen rarely, over the logarithm of its share of the frames; of a covered pixel that something moved
 over, and of one whose colour stays the same nevertheless, over the share of frames that have it; gain of a covered pixel that is enclosed."""
 COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
 """Weight of a colour's log likelihood ratio, and its limit."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
+CONNECTED = 0.8
+"""Least share of the frames in which another covered part is connected with the largest."""
 MEMBER = 1.2
 """Distance, over a mode's radius, within which a sample at full size shows it."""
 
@@ -139,11 +141,11 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     assert labels is not None
     covered = np.zeros(movement.region.shape, bool)
     covered[movement.region] = labels == COUNT
-    covered = _persons_parts(covered, movement.region, ratio[:, 0])
     chosen = np.where(labels == COUNT, 0, labels)
     scene = field.still.copy()
     scene[movement.region] = modes.colour[np.arange(len(chosen)), chosen]
-    return scene, covered
+    passing = (np.abs(planes - scene) > radius_of(movement.noise)).any(axis=3) & movement.region
+    return scene, _persons_parts(covered, passing, movement.region, ratio[:, 0])
 
 
 def _on_picture(field: _Field) -> tuple[Floats, Floats]:
@@ -183,8 +185,12 @@ def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.
     return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene)))).clip(-GREATEST_RATIO, GREATEST_RATIO)
 
 
-def _persons_parts(covered: Mask, region: Mask, ratio: NDArray[np.float64]) -> Mask:
-    """The largest covered part (H, W), and others whose colours are a person's by their log `ratio` (M,); no thin lines."""
+def _persons_parts(covered: Mask, passing: Mask, region: Mask, ratio: NDArray[np.float64]) -> Mask:
+    """The largest covered part (H, W), and others that belong to it; no thin lines.
+
+    Others belong to it if their colours are a person's by their log `ratio` (M,), and if in most frames what passes over the scene,
+    `passing` (N, H, W), connects them with it.
+    """
     import cv2
 
     opened = cv2.morphologyEx(covered.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
@@ -196,8 +202,22 @@ def _persons_parts(covered: Mask, region: Mask, ratio: NDArray[np.float64]) -> M
     areas[0] = 0
     largest = int(areas.argmax())
     kept = (areas >= PART_SHARE * areas[largest]) & (evidence > PART_COLOUR * evidence[largest])
+    kept &= _connected(np.asarray(parts), number, largest, passing) >= CONNECTED
     kept[largest], kept[0] = True, False
     return kept[np.asarray(parts, np.intp)]
+
+
+def _connected(parts: NDArray[np.int32], number: int, largest: int, passing: Mask) -> NDArray[np.float64]:
+    """Share of the frames in which each of `number` parts (H, W) is connected with the largest by what passes over the scene."""
+    import cv2
+
+    firsts = np.unique(parts, return_index=True)[1]
+    together = np.zeros(number)
+    for frame in passing:
+        near = cv2.dilate((frame | (parts > 0)).astype(np.uint8), np.ones((3, 3), np.uint8))
+        joined = np.asarray(cv2.connectedComponents(near)[1]).reshape(-1)[firsts]
+        together += joined == joined[largest]
+    return together / len(passing)
 
 
 # The picture
