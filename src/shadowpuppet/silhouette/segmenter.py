@@ -49,6 +49,8 @@ class Segmenter:
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
     light: Light | None = None
     """The light of the empty scene; None: changes of light are not corrected."""
+    covered: NDArray[np.bool_] | None = None
+    """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if it shows no person.
@@ -58,9 +60,11 @@ class Segmenter:
         self._check(image)
         image = image if self.light is None else self.light.normalised(image)
         label = self.classifier(image)
+        if self.covered is not None:
+            label[self.covered] = 2
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.edge)
-        return label > 0
+        return label > 0 if self.covered is None else (label > 0) | self.covered
 
     def raw(self, image: Image) -> NDArray[np.bool_]:
         """Liu 2011, eq. 1, and nothing else: |I_B - I_t| >= factor * sigma_B, of shape (H, W).

@@ -16,6 +16,8 @@ LEAST_NOISE = np.array([0.7, 0.5, 0.5])
 MOVED, STIRRED = 3.0, 2.0
 """Standard deviation over time, over the noise, from which on something moved over a pixel; and over a pixel and its neighbours, next to
 such pixels: the outline of someone who stands still."""
+GAP = 2
+"""Half of the widest gap, pixels, in what moves around a person that stands that does not open it."""
 DEPTH = 2
 """Pixels from its border from which on a calm pixel is inside a region."""
 PART_SHARE, PART_PIXELS = 0.1, 30
@@ -92,7 +94,8 @@ def _enclosed(region: Mask) -> Mask:
     """The pixels (H, W) that only lead to the left, right or upper border through the region; the lower border cuts a person off."""
     import cv2
 
-    around = np.pad(~region, ((1, 0), (1, 1)), constant_values=True).astype(np.uint8)
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((2 * GAP + 1, 2 * GAP + 1), np.uint8))
+    around = np.pad(closed == 0, ((1, 0), (1, 1)), constant_values=True).astype(np.uint8)
     _, parts = cv2.connectedComponents(around, connectivity=4)
-    parts = np.asarray(parts)[1:, 1:-1]
-    return (parts != parts.dtype.type(1)) & ~region if around[0, 0] else ~region
+    outside = np.asarray(parts) == np.asarray(parts)[0, 0]
+    return ~outside[1:, 1:-1] & ~region
