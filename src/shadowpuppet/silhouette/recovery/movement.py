@@ -11,6 +11,8 @@ from shadowpuppet.silhouette.background import Floats
 
 CALM_SHARE = 30
 """Percentile of the pixels' standard deviations over time that counts as the film's noise: those of the person are among the greatest."""
+GREATEST_NOISE = 15.0
+"""Greatest noise, grey levels, that a film's calm pixels can have: beyond it, they are not calm."""
 LEAST_NOISE = np.array([0.7, 0.5, 0.5])
 """Least noise of Y, Cr, Cb, grey levels: compression leaves none at all in places."""
 MOVED, STIRRED = 3.0, 2.0
@@ -50,17 +52,18 @@ def find_movement(planes: Floats) -> Movement:
     moved = _large_parts(_without_specks(variance > MOVED**2))
     stirred = _without_specks(cv2.blur(variance, (3, 3)) > STIRRED**2) | moved
     region = np.asarray(cv2.dilate(_touching(stirred, moved), np.ones((3, 3), np.uint8)), np.uint8) > 0
-    region |= _enclosed(region)
     # The picture's lower border cuts a person off: what lies there is as deep inside as above it.
-    inside = np.pad(region.astype(np.uint8), DEPTH, mode="edge")
+    inside = np.pad((region | _enclosed(region)).astype(np.uint8), DEPTH, mode="edge")
     inside = cv2.erode(inside, np.ones((2 * DEPTH + 1, 2 * DEPTH + 1), np.uint8))[DEPTH:-DEPTH, DEPTH:-DEPTH] > 0
+    region |= _enclosed(region, GAP)
     return Movement(noise, region, inside & ~(cv2.dilate(moved, np.ones((3, 3), np.uint8)) > 0))
 
 
-def unsteady(region: Mask) -> bool:
-    """Whether the picture's left, right and upper border move, as if the camera or the light, and not a person, had moved."""
+def unsteady(movement: Movement) -> bool:
+    """Whether the picture's left, right and upper border move, or nearly all of it, as if the camera, and not a person, had moved."""
+    region = movement.region
     border = np.concatenate([region[:-1, 0], region[:-1, -1], region[0]])
-    return float(border.mean()) > BORDER_SHARE
+    return float(border.mean()) > BORDER_SHARE or float(movement.noise.max()) > GREATEST_NOISE
 
 
 def _without_specks(moved: Mask) -> NDArray[np.uint8]:
@@ -90,11 +93,12 @@ def _large_parts(moved: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return moved & (areas >= max(PART_SHARE * areas.max(), PART_PIXELS)).astype(np.uint8)[np.asarray(parts, np.intp)]
 
 
-def _enclosed(region: Mask) -> Mask:
-    """The pixels (H, W) that only lead to the left, right or upper border through the region; the lower border cuts a person off."""
+def _enclosed(region: Mask, gap: int = 0) -> Mask:
+    """The pixels (H, W) from which every way to the left, right or upper border leads through the region, its gaps of up to twice `gap`
+    pixels closed."""
     import cv2
 
-    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((2 * GAP + 1, 2 * GAP + 1), np.uint8))
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((2 * gap + 1, 2 * gap + 1), np.uint8))
     around = np.pad(closed == 0, ((1, 0), (1, 1)), constant_values=True).astype(np.uint8)
     _, parts = cv2.connectedComponents(around, connectivity=4)
     outside = np.asarray(parts) == np.asarray(parts)[0, 0]

@@ -31,6 +31,8 @@ RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.1, 0.4, 0.8, 0.3
 over, and of one whose colour stays the same nevertheless, over the share of frames that have it; gain of a covered pixel that is enclosed."""
 COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
 """Weight of a colour's log likelihood ratio, and its limit."""
+CALM_WEIGHT = 0.1
+"""Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
 CONNECTED = 0.8
@@ -88,10 +90,10 @@ def check_frames(frames: Sequence[Image]) -> None:
 
 
 def _doubt(movement: Movement) -> str | None:
+    if unsteady(movement):
+        return f"nearly all of the picture changes in the film, as if the camera or the light had moved: {REMEDY}"
     if not movement.region.any():
         return f"nothing moves in the film, so the person cannot be told from the scene: {REMEDY}"
-    if unsteady(movement.region):
-        return f"nearly all of the picture changes in the film, as if the camera or the light had moved: {REMEDY}"
     return None
 
 
@@ -141,11 +143,19 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     assert labels is not None
     covered = np.zeros(movement.region.shape, bool)
     covered[movement.region] = labels == COUNT
-    chosen = np.where(labels == COUNT, 0, labels)
-    scene = field.still.copy()
-    scene[movement.region] = modes.colour[np.arange(len(chosen)), chosen]
-    passing = (np.abs(planes - scene) > radius_of(movement.noise)).any(axis=3) & movement.region
-    return scene, _persons_parts(covered, passing, movement.region, ratio[:, 0])
+    passing = (np.abs(planes - _scene(field, labels)) > radius_of(movement.noise)).any(axis=3) & movement.region
+    covered = _persons_parts(covered, passing, movement.region, ratio[:, 0])
+    cost = _costs(field, ratio)
+    cost[..., COUNT] = np.where(covered, 0, NEVER)
+    cost[covered, :COUNT] = NEVER
+    return _scene(field, label_pixels(colour, share, cost, movement.region)[movement.region]), covered
+
+
+def _scene(field: _Field, labels: NDArray[np.intp]) -> Floats:
+    """The scene's Y, Cr, Cb (H, W, 3) by labels (M,); the most frequent colour where it is covered."""
+    out = field.still.copy()
+    out[field.movement.region] = field.modes.colour[np.arange(len(labels)), np.where(labels == COUNT, 0, labels)]
+    return out
 
 
 def _on_picture(field: _Field) -> tuple[Floats, Floats]:
@@ -181,7 +191,9 @@ def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.
     scene = np.concatenate([still, modes.colour[uncovered, labels[uncovered]]])
     passing = modes.share[uncovered]
     passing[np.arange(len(uncovered)), labels[uncovered]] = 0
-    person = colour_model(modes.colour[uncovered].reshape(-1, 3), passing.reshape(-1))
+    calm = (labels == COUNT) & field.movement.enclosed[field.movement.region]
+    weights = np.concatenate([passing.reshape(-1), np.full(np.count_nonzero(calm), CALM_WEIGHT)])
+    person = colour_model(np.concatenate([modes.colour[uncovered].reshape(-1, 3), modes.colour[calm, 0]]), weights)
     return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene)))).clip(-GREATEST_RATIO, GREATEST_RATIO)
 
 
