@@ -188,8 +188,8 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
     walk = [np.roll(image, shift * (n % 3 - 1), axis=1) for n, image in enumerate(film)]  # the person, and the room, move
     made.write_film(bare / "video" / "cam.mp4", walk)
     look = look_at_masks(bare)
-    assert "the film itself (median)" in look.background
-    assert any("it is the median of the film, so whoever stands still becomes background" in doubt for doubt in look.doubts)
+    assert "the film itself (recovered from" in look.background
+    assert any("no picture of the empty scene: it was recovered from the film" in doubt for doubt in look.doubts)
 
 
 def look_at_masks(recording):

@@ -44,10 +44,11 @@ if TYPE_CHECKING:
     SpecFlags = Any
 else:
     SPEC_GROUPS = {
-        **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
+        **dict.fromkeys(("motion", "seconds", "posture", "body", "height"), PERSON),
         **dict.fromkeys(("cameras", "ring_radius", "distance", "camera_height", "fov", "fisheye"), CAMERAS),
-        **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
-        **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf"), PICTURES),
+        **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "chair", "second_person"), SCENE),
+        **dict.fromkeys(("empty_seconds",), SCENE),
+        **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf", "faults"), PICTURES),
     }
     SpecFlags = unpacked(flags_of(SpecChanges, groups=SPEC_GROUPS))
 
@@ -204,6 +205,7 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
         ("recording", str(path)),
         ("person", f"{spec.body.stature:.2f} m: {_gestures(spec)}" + (f"; in the scene: {', '.join(extras)}" if extras else "")),
         ("films", f"{cameras}, {first.size[0]} x {first.size[1]} pixels, {spec.rate:g} frames/s, {seconds:g} s of motion"),
+        *([("faults", ", ".join(dict.fromkeys(fault.kind for fault in spec.faults)))] if spec.faults else []),
         ("truth", ", ".join(["truth.csv, truth.trc, masks/", *(name for name, there in also.items() if there)])),
         ("again", f"shadowpuppet synthesize {path}/spec.toml -o FOLDER"),
         ("look", f"shadowpuppet info {path}{one_camera}"),

@@ -10,6 +10,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.silhouette.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
 
 
@@ -55,6 +56,8 @@ class Look:
     """Quality of the silhouettes in the sampled frames."""
     left_out: tuple[str, ...] = ()
     """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
+    condition: FilmCondition | None = None
+    """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
     person: dict[str, Any] | None = None
     """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
     it was not fitted."""
@@ -93,6 +96,8 @@ class CameraLook:
     """Quality of the silhouettes in the sampled frames."""
     left_out: tuple[str, ...] = ()
     """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
+    condition: FilmCondition | None = None
+    """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
 
 
 @dataclass(frozen=True, kw_only=True)
