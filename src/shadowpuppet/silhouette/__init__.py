@@ -4,8 +4,8 @@
 `recover_scene` recovers it from the film.
 """
 
+from shadowpuppet.silhouette.external.ready_mask import ready_mask
 from shadowpuppet.silhouette.learning import learn_background
-from shadowpuppet.silhouette.ready_mask import ready_mask
 from shadowpuppet.silhouette.recovery import RecoveredScene, recover_scene
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings

@@ -15,7 +15,7 @@ import numpy as np
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import SilhouetteError, reason
 from shadowpuppet.silhouette.external.environment import LAST_LINES, last_words, variables
-from shadowpuppet.silhouette.ready_mask import ready_mask
+from shadowpuppet.silhouette.external.ready_mask import ready_mask
 from shadowpuppet.video import Image, Size
 
 PATIENCE = 5.0
