@@ -57,7 +57,8 @@ class Measures(NamedTuple):
     status: np.ndarray
     """Of shape (T,)."""
     overlap: Array
-    """Intersection over union of silhouettes and exact masks, mean of the cameras, of shape (T,); not a number where both are empty."""
+    """Intersection over union of silhouettes and exact masks, mean of the cameras, of shape (T,); not a number where the person
+    cannot be seen."""
     refused: str = ""
     """Why the film could not be tracked."""
 
@@ -99,7 +100,7 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
                   if mask is not None and round(frames.time * film.rate) < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
-    return Measures(motion.times, mean, worst, motion.status, alike)
+    return Measures(motion.times, mean, worst, motion.status, np.where(seen, alike, np.nan))
 
 
 def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array]:
@@ -148,7 +149,7 @@ class Figures(NamedTuple):
             if clean:
                 shared = min(len(faulty.times), len(plain.times))
                 here[shared:] = False
-                here[:shared] &= np.isfinite(faulty.mean[:shared])
+                here[:shared] &= np.isfinite(faulty.mean[:shared])  # where the person can be seen
             parts.append(values(of)[here])
         return np.concatenate(parts)
 
