@@ -46,10 +46,11 @@ def _passes(name: str, fault: str, begin: float, end: float, camera: str = "") -
 
 
 def _beside(**values: Any) -> dict[str, Any]:
-    return {"bystanders": [{"seed": 4, **values}]}
+    return {"bystanders": [{"seed": 4, "kind": "man", **values}]}
 
 
-CROSSING = {"turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 4.0}}
+CROSSING = {"turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 5.5}}
+"""Somebody who walks past; they are in the picture between the rows' begin and end."""
 ONE: tuple[Row, ...] = (
     Row(CLEAN),
     _stays("gain 0.9 from the middle on", "gain 0.9"),
@@ -87,8 +88,8 @@ ONE: tuple[Row, ...] = (
     _passes("black for 1 s", "black", 3, 4),
     _passes("leaves for 2 s", "absent", 2.5, 4.5),
     Row("a second person 1 m aside", scene=_beside(ahead=0.0, left=1.0)),
-    Row("a second person passes behind", scene=_beside(ahead=-1.2, left=0.0, **CROSSING)),
-    Row("a second person passes in front", scene=_beside(ahead=0.8, left=0.0, **CROSSING)),
+    Row("a second person passes behind", begin=2, end=5.5, scene=_beside(ahead=-1.2, left=0.0, **CROSSING)),
+    Row("a second person passes in front", begin=2.7, end=4.7, scene=_beside(ahead=0.5, left=0.0, **CROSSING)),
 )
 """Faults of one camera's film."""
 SEVERAL: tuple[Row, ...] = (
