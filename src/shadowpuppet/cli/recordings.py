@@ -41,9 +41,10 @@ if TYPE_CHECKING:
     SpecFlags = Any
 else:
     SPEC_GROUPS = {
-        **dict.fromkeys(("motion", "seconds", "body", "height"), PERSON),
+        **dict.fromkeys(("motion", "seconds", "posture", "body", "height"), PERSON),
         **dict.fromkeys(("cameras", "ring_radius", "distance", "camera_height", "fov", "fisheye"), CAMERAS),
-        **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "second_person"), SCENE),
+        **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "chair", "second_person"), SCENE),
+        **dict.fromkeys(("empty_seconds",), SCENE),
         **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf", "faults"), PICTURES),
     }
     SpecFlags = unpacked(flags_of(SpecChanges, groups=SPEC_GROUPS))

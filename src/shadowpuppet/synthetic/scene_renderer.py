@@ -12,9 +12,8 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
-from shadowpuppet.synthetic.compositing import composite, composite_people, visible
+from shadowpuppet.synthetic.compositing import Layer, composite, composite_people, visible
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
-from shadowpuppet.synthetic.furniture import Furniture
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import Figure
@@ -35,6 +34,15 @@ class RenderedFrame(NamedTuple):
     """Visible parts of all people, of shape (H, W), uint8, 0 or 255; `mask` itself if there are no bystanders."""
     hidden: int
     """Number of the person's pixels hidden by obstacles and bystanders."""
+
+
+class Place(NamedTuple):
+    """The scene without people, while the same obstacles are there."""
+
+    room: Array
+    """Light of the room with the obstacles' shadows, of shape (H, W, 3), RGB, about 0 to 1."""
+    things: list[Layer]
+    """The obstacles, as one layer; none if there are none."""
 
 
 class Lit(NamedTuple):
@@ -63,19 +71,23 @@ class SceneRenderer:
         camera = self.faults.wide_camera()
         scene = spec.scene
         least = max([least, *(view.distance + 1 for view in spec.views() if abs(view.azimuth_deg) > 60)])
-        furniture = Furniture(scene.obstacles)
-        self.room = Room(camera, np.random.default_rng(scene.room), scene.shadow, least, scene.background, furniture)
+        self.furniture = spec.furniture()
+        arrangements = self.furniture.arrangements()
+        self.room = Room(camera, np.random.default_rng(scene.room), scene.shadow, least, scene.background, arrangements)
         clothes = Clothes.draw(np.random.default_rng(scene.clothing))
         if scene.camouflage:
             clothes = _camouflaged(clothes, self.room.wall_colour, scene.camouflage)
         self.renderer = PersonRenderer(camera, dressed(spec.body, clothes), clothes, self.room.lights)
         self.spec, self.rng = spec, rng
         self.others = [(figure, self._of(bystander, camera)) for figure, bystander in zip(others, scene.bystanders, strict=True)]
-        self.things = []
-        if furniture:
-            fine = self.renderer.fine_rays()
-            self.things = [furniture.layer(camera.centre, self.renderer.rays, fine, self.room.lights)]
+        fine = self.renderer.fine_rays() if self.furniture else np.zeros((0, 0, 3))
+        layers = [[now.layer(camera.centre, self.renderer.rays, fine, self.room.lights)] if now else [] for now in arrangements]
+        self._places = {now.things: Place(room, drawn) for now, room, drawn in zip(arrangements, self.room.pictures, layers)}
         self._length = 0.0
+
+    def place(self, seconds: float | None) -> Place:
+        """The place without people, `seconds` after the film's first frame; None: in the film of the empty scene."""
+        return self._places[self.furniture.at(seconds).things]
 
     def _of(self, bystander: Bystander, camera: Camera) -> PersonRenderer:
         clothes = Clothes.draw(np.random.default_rng([bystander.seed, 1]))
@@ -83,17 +95,21 @@ class SceneRenderer:
 
     def empty(self, index: int = 0, count: int = 1) -> np.ndarray:
         """Frame `index` of `count` of the empty scene, (H, W, 3) BGR, before the film begins."""
-        light = self.faults.cropped(composite(self.room.picture, self.things))
+        light = self.faults.cropped(composite(*self.place(None)))
         return self._exposed(light, (index - count) / self.spec.rate, None)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A frame (H, W, 3) BGR of the figure's posture `index`, and its exact mask (H, W), 0 or 255, without bystanders."""
-        light, mask, *_ = self._lit(figure, index)
+        """A frame (H, W, 3) BGR of the figure's posture `index` in the empty scene, without bystanders, and its exact mask (H, W)."""
+        light, mask, *_ = self._lit(figure, index, None)
         return self._exposed(self.faults.cropped(light), 0.0, None), self.faults.cropped(mask)
 
+    def crf(self, empty: bool) -> int:
+        """Constant rate factor of the film, or of the empty scene's."""
+        return self.faults.crf(self.spec.scene.crf, empty)
+
     def hides(self, figure: Figure) -> bool:
-        """Whether obstacles hide a part of the figure in its first posture."""
-        return bool(self.things) and self._lit(figure, 0)[3] > 0
+        """Whether obstacles of the empty scene hide a part of the figure in its first posture."""
+        return bool(self.place(None).things) and self._lit(figure, 0, None)[3] > 0
 
     def film(self, figure: Figure, workers: int | None = None) -> Iterator[RenderedFrame]:
         """Frames of the film in order; `workers` threads (by default 2 to 8) draw ahead, the noise is drawn in order."""
@@ -117,7 +133,7 @@ class SceneRenderer:
 
     def _seen(self, figure: Figure, index: int) -> Lit:
         """A posture among the bystanders; what the moved camera sees of it."""
-        light, mask, people, hidden = self._lit(figure, index, company=True)
+        light, mask, people, hidden = self._lit(figure, index, index / self.spec.rate)
         light, moved = self.faults.displaced(light, index), self.faults.displaced(mask, index)
         return Lit(light, moved, moved if people is mask else self.faults.displaced(people, index), hidden)
 
@@ -126,22 +142,25 @@ class SceneRenderer:
         there = np.uint8(not self.faults.is_black(index))
         return RenderedFrame(self._exposed(light, index / self.spec.rate, index), lit.mask * there, lit.people * there, lit.hidden)
 
-    def _lit(self, figure: Figure, index: int, company: bool = False) -> Lit:
-        """Light, masks and number of hidden pixels, with the margin; company: whether to include the bystanders."""
+    def _lit(self, figure: Figure, index: int, seconds: float | None) -> Lit:
+        """Light, masks and number of hidden pixels, with the margin, `seconds` after the film's first frame; None: in the empty scene,
+        without bystanders.
+        """
         person = self.renderer.draw(figure, index)
-        others = self.others if company else []
-        room = self.room.shaded(figure, index, *(other for other, _ in others))
-        if not (others or self.things):
+        others = self.others if seconds is not None else []
+        empty, things = self.place(seconds)
+        room = self.room.shaded(empty, figure, index, *(other for other, _ in others))
+        if not (others or things):
             mask = _mask(person.mask)
             return Lit(person.over(room), mask, mask, 0)
         bystanders = [renderer.draw(other, index) for other, renderer in others]
-        rest = [*bystanders, *self.things]
+        rest = [*bystanders, *things]
         seen = visible(person, rest)
         people = seen.copy()
         for n, layer in enumerate(bystanders):
             people |= visible(layer, [person, *rest[:n], *rest[n + 1 :]])
         hidden = int((person.mask & ~seen).sum())
-        return Lit(composite_people(room, [person, *bystanders], self.things), _mask(seen), _mask(people), hidden)
+        return Lit(composite_people(room, [person, *bystanders], things), _mask(seen), _mask(people), hidden)
 
     def _exposed(self, light: Array, seconds: float, index: int | None) -> np.ndarray:
         """The sensor's picture, BGR uint8; index None: not in the film."""
