@@ -35,8 +35,9 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
 
     rng: by default a generator of the spec's seed. tell: called after each frame with the numbers of frames done and in all. The same
     spec and seed give the same frames, masks and truth, whatever the number of threads; `spec.toml` keeps both. After Ctrl-C the frames
-    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written, `SettingsError` if the motion is too short or
-    a fault is impossible; warns if obstacles hide nothing, and if a camera never sees the person.
+    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written, `SettingsError` if
+    the motion is too short or a fault is impossible; warns if obstacles hide nothing, and if a
+    camera never sees the person.
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
@@ -138,11 +139,11 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     """
     from shadowpuppet.video import write_frames
 
-    name, hidden, seen = studio.room.camera.name, 0, 0
+    name, crf, hidden, seen = studio.room.camera.name, studio.faults.crf, 0, 0
     _shoot_empty(folder, spec, studio)
     interrupted = False
     with contextlib.ExitStack() as stack:
-        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=studio.crf(empty=False)))
+        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=False)))
         kinds = ["masks", *["people"][: len(spec.scene.bystanders)]]
         exact = [stack.enter_context(write_frames(folder / kind / f"{name}.mkv", spec.rate, lossless=True)) for kind in kinds]
         try:
@@ -167,7 +168,8 @@ def _shoot_empty(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
 
     if spec.scene.empty_seconds == 0:
         return
-    with write_frames(folder / "background" / f"{studio.room.camera.name}.mp4", spec.rate, crf=studio.crf(empty=True)) as film:
+    crf, path = studio.faults.crf(spec.scene.crf, empty=True), folder / "background" / f"{studio.room.camera.name}.mp4"
+    with write_frames(path, spec.rate, crf=crf) as film:
         count = max(1, round(spec.scene.empty_seconds * spec.rate))
         for index in range(count):
             film.write(studio.empty(index, count))

@@ -36,15 +36,6 @@ class RenderedFrame(NamedTuple):
     """Number of the person's pixels hidden by obstacles and bystanders."""
 
 
-class Place(NamedTuple):
-    """The scene without people, while the same obstacles are there."""
-
-    room: Array
-    """Light of the room with the obstacles' shadows, of shape (H, W, 3), RGB, about 0 to 1."""
-    things: list[Layer]
-    """The obstacles, as one layer; none if there are none."""
-
-
 class Lit(NamedTuple):
     """Light of a frame before lens and sensor, with its exact masks as in `RenderedFrame`."""
 
@@ -55,6 +46,13 @@ class Lit(NamedTuple):
     people: np.ndarray
     """Of shape (H, W), uint8, 0 or 255."""
     hidden: int
+class Place(NamedTuple):
+    """The scene without people, while the same obstacles are there."""
+
+    room: Array
+    """Light of the room with the obstacles' shadows, of shape (H, W, 3), RGB, about 0 to 1."""
+    things: list[Layer]
+    """The obstacles, as one layer; none if there are none."""
 
 
 class SceneRenderer:
@@ -99,13 +97,9 @@ class SceneRenderer:
         return self._exposed(light, (index - count) / self.spec.rate, None)
 
     def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A frame (H, W, 3) BGR of the figure's posture `index` in the empty scene, without bystanders, and its exact mask (H, W)."""
+        """A frame (H, W, 3) BGR of posture `index` in the empty scene, without bystanders, and its exact mask (H, W), 0 or 255."""
         light, mask, *_ = self._lit(figure, index, None)
         return self._exposed(self.faults.cropped(light), 0.0, None), self.faults.cropped(mask)
-
-    def crf(self, empty: bool) -> int:
-        """Constant rate factor of the film, or of the empty scene's."""
-        return self.faults.crf(self.spec.scene.crf, empty)
 
     def hides(self, figure: Figure) -> bool:
         """Whether obstacles of the empty scene hide a part of the figure in its first posture."""
@@ -144,8 +138,7 @@ class SceneRenderer:
 
     def _lit(self, figure: Figure, index: int, seconds: float | None) -> Lit:
         """Light, masks and number of hidden pixels, with the margin, `seconds` after the film's first frame; None: in the empty scene,
-        without bystanders.
-        """
+        without bystanders."""
         person = self.renderer.draw(figure, index)
         others = self.others if seconds is not None else []
         empty, things = self.place(seconds)

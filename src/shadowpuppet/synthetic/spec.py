@@ -129,8 +129,7 @@ class Spec:
 
     def __post_init__(self) -> None:
         """Check that camera names differ, that the posture allows the motions, that no camera is inside an obstacle or a bystander, and
-        that faults name cameras.
-        """
+        that faults name cameras."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")

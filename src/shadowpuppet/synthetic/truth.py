@@ -56,13 +56,13 @@ def write_truth(path: Path, times: Array, joints: Array, rate: float, feet: Sole
                 absent: np.ndarray | None = None) -> None:
     """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds.
 
-    feet: also written, after the joints; their contacts, 0 or 1, in the .csv only; absent: in which frames the person is away, of shape
-    (T,), true or false: then places are "nan", contacts 0. Raises `RecordingError`.
+    feet: also written, after the joints; their contacts, 0 or 1, in the .csv only. absent: frames (T,) without the person, in which places
+    are "nan" and nothing touches the floor. Raises `RecordingError`.
     """
     names, contacts = JOINTS, np.zeros((len(times), 0), bool)
     if feet is not None:
         joints, names, contacts = np.concatenate([joints, feet.points], 1), (*JOINTS, *SOLES), feet.contact
-    if absent is not None:
+    if absent is not None and absent.any():
         joints, contacts = np.where(absent[:, None, None], np.nan, joints), contacts & ~absent[:, None]
     rows = joints.reshape(len(joints), -1)
     lines = [",".join([*(f"{value:.5f}" for value in (t, *row)), *(str(int(held)) for held in held_by)])

@@ -13,7 +13,7 @@ from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure
 from shadowpuppet.synthetic.person.mannequin import JOINTS
-from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.recording import feet_of, perform
 
 bodies = st.builds(lambda seed, kind: Mannequin.draw(np.random.default_rng(seed), kind), st.integers(0, 500),
                    st.sampled_from(["woman", "man", "child"]))  # fmt: skip
@@ -84,6 +84,21 @@ def test_hands_lie_on_the_thighs_and_leave_them_to_wave():
     mid = len(up.joints) // 2
     arm = [fig.joints[mid, JOINTS.index("left_wrist")] - fig.joints[mid, JOINTS.index("left_elbow")] for fig in (waving, up)]
     assert np.linalg.norm(arm[0] - arm[1]) < 0.06  # the same wave as in standing
+
+
+@pytest.mark.parametrize("kind", ["woman", "child"])
+def test_kneeling_down_ends_on_the_knees_with_the_tips_of_the_toes_in_place(kind):
+    spec = Spec(body=Mannequin.draw(np.random.default_rng(8), kind), motion=(Gesture(motion="kneel", seconds=5),), rate=10)
+    times, figure = perform(spec, np.random.default_rng(1))
+    low = lowest(spec.body, figure)
+    assert min(low.values()) > -0.02
+    assert low["left_shank"] < 0.02
+    feet = feet_of(spec, times, figure, np.random.default_rng(1))
+    kneels = figure.joints[:, 0, 2].argmin()
+    assert feet.contact[0].all()
+    assert not feet.contact[kneels, [0, 2]].any()
+    assert np.ptp(feet.points[:, [1, 3], :2], axis=0).max() < 0.06
+    assert figure.joints[-1, 0, 2] > figure.joints[kneels, 0, 2] + 0.25
 
 
 @pytest.mark.parametrize("kind", ["man", "child"])

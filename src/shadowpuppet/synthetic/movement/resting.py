@@ -50,6 +50,11 @@ def seated_pelvis(body: Mannequin) -> float:
     return seat_height(body) + 0.92 * body.measure("thigh") / (2 * np.pi)
 
 
+def kneeling_knee(body: Mannequin) -> float:
+    """Height of the knee's centre of a person who kneels on it, metres."""
+    return 0.97 * body.measure("knee") / (2 * np.pi) + 0.012
+
+
 def chair_place(body: Mannequin, posture: PostureName, turn: float) -> tuple[float, float, float]:
     """Place of the chair's middle to the person's left and ahead, metres, and its scale.
 
@@ -112,7 +117,7 @@ def _seated(body: Mannequin) -> tuple[float, Array, float, Array]:
 
 def _kneeling(body: Mannequin) -> tuple[float, Array, float, Array]:
     """The same: the thighs upright, shanks and insteps on the floor."""
-    knee = 0.97 * body.measure("knee") / (2 * np.pi) + 0.012
+    knee = kneeling_knee(body)
     aside, back = float(body.rest()["left_hip"][0]), body.length("shank")
     instep = 0.115 - body.length("ankle")
     return knee + body.length("thigh"), _feet(aside, -0.998 * back, instep), np.radians(-165.0), np.array([0.0, -1.0, -0.5])
