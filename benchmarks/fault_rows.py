@@ -46,10 +46,16 @@ def _passes(name: str, fault: str, begin: float, end: float, camera: str = "") -
 
 
 def _beside(**values: Any) -> dict[str, Any]:
-    return {"bystanders": [{"seed": 4, **values}]}
+    return {"bystanders": [{"seed": 4, "kind": "man", **values}]}
 
 
-CROSSING = {"turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 4.0}}
+def _thing(**times: float) -> dict[str, Any]:
+    """A pillar before an arm, in the film only."""
+    return {"obstacles": [{"kind": "pillar", "ahead": 0.7, "left": 0.35, **times}]}
+
+
+CROSSING = {"turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 5.5}}
+"""A person who walks past, in the picture between the rows' begin and end."""
 ONE: tuple[Row, ...] = (
     Row(CLEAN),
     _stays("gain 0.9 from the middle on", "gain 0.9"),
@@ -86,9 +92,11 @@ ONE: tuple[Row, ...] = (
     _stays("frozen for good", "frozen"),
     _passes("black for 1 s", "black", 3, 4),
     _passes("leaves for 2 s", "absent", 2.5, 4.5),
+    Row("a pillar comes and stays", begin=3, scene=_thing(enters=3.0)),
+    Row("a pillar comes for 1.5 s", begin=2.5, end=4, scene=_thing(enters=2.5, leaves=4.0)),
     Row("a second person 1 m aside", scene=_beside(ahead=0.0, left=1.0)),
-    Row("a second person passes behind", scene=_beside(ahead=-1.2, left=0.0, **CROSSING)),
-    Row("a second person passes in front", scene=_beside(ahead=0.8, left=0.0, **CROSSING)),
+    Row("a second person passes behind", begin=2, end=5.5, scene=_beside(ahead=-1.2, left=0.0, **CROSSING)),
+    Row("a second person passes in front", begin=2.7, end=4.7, scene=_beside(ahead=0.5, left=0.0, **CROSSING)),
 )
 """Faults of one camera's film."""
 SEVERAL: tuple[Row, ...] = (
@@ -109,6 +117,7 @@ SEVERAL: tuple[Row, ...] = (
     _stays("one late by 5 frames", "late 5", "cam2", 2),
     Row("one loses a frame in 20", "dropped 0.05 cam2"),
     _passes("all: every picture twice for 1 s", "repeated 2", 2, 3),
+    Row("a pillar comes and stays", begin=2, scene=_thing(enters=2.0)),
     Row("a second person 1 m aside", scene=_beside(ahead=0.0, left=1.0)),
 )
 """Faults of several cameras' films; cam2 is the second of four."""

@@ -36,6 +36,7 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.synthetic import Spec, read_spec, synthesize
+from shadowpuppet.synthetic.faults.kinds import KINDS
 from shadowpuppet.video import open_frames
 
 HERE = Path(__file__).resolve().parent.parent / "build" / "faults"
@@ -57,7 +58,8 @@ class Measures(NamedTuple):
     status: np.ndarray
     """Of shape (T,)."""
     overlap: Array
-    """Intersection over union of silhouettes and exact masks, mean of the cameras, of shape (T,); not a number where both are empty."""
+    """Intersection over union of silhouettes and exact masks of the cameras as calibrated, mean of the cameras, of shape (T,); not a number
+    where the person cannot be seen."""
     refused: str = ""
     """Why the film could not be tracked."""
 
@@ -80,6 +82,8 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
     path = made(film, row, folder, again)
     exact = _exact_masks(path)
     truth, seen = read_truth(path / "truth.csv"), _seen(exact)
+    if any(KINDS[fault.kind].displacement for fault in row.of(film).faults):  # silhouettes belong where the calibrated camera sees them
+        exact = _exact_masks(made(film, ONE[0], folder, False))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -99,7 +103,7 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
                   if mask is not None and round(frames.time * film.rate) < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
-    return Measures(motion.times, mean, worst, motion.status, alike)
+    return Measures(motion.times, mean, worst, motion.status, np.where(seen, alike, np.nan))
 
 
 def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array]:
@@ -148,7 +152,7 @@ class Figures(NamedTuple):
             if clean:
                 shared = min(len(faulty.times), len(plain.times))
                 here[shared:] = False
-                here[:shared] &= np.isfinite(faulty.mean[:shared])
+                here[:shared] &= np.isfinite(faulty.mean[:shared])  # where the person can be seen
             parts.append(values(of)[here])
         return np.concatenate(parts)
 
@@ -216,6 +220,8 @@ def tables(jobs: Sequence[tuple[str, Spec, Row]], folder: Path, workers: int, ag
     """The rows of all tables by its name, in order, each as soon as it is measured."""
     os.environ |= ONE_THREAD_EACH
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        clean_films = list({film.name: film for _, film, _ in jobs}.values())
+        list(pool.map(made, clean_films, *zip(*[(ONE[0], folder, again)] * len(clean_films))))  # before others need their masks
         results = pool.map(measured, *zip(*[(film, row, folder, again) for _, film, row in jobs]))
         clean: dict[str, Measures] = {}
         for (table, row), some in groupby(zip(jobs, results), lambda one: (one[0][0], one[0][2])):

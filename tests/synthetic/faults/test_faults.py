@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import SettingsError
@@ -169,11 +169,13 @@ def test_timing_in_numbers():
 
 
 @given(st.lists(st.integers(0, 30), min_size=1, max_size=40))
+@settings(deadline=None)
 def test_frames_are_rearranged_as_listed(sources):
     assert list(rearranged(iter(range(31)), sources)) == sources
 
 
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=25))
+@settings(deadline=None)
 def test_pictures_are_averaged_over_their_spans(spans):
     pictures = np.random.default_rng(0).random((len(spans), 2, 3, 3))
     found = list(averaged(((one, n) for n, one in enumerate(pictures)), spans))
@@ -203,6 +205,7 @@ faults = st.builds(Fault, kind=kinds, begin=st.floats(0, 5), end=st.one_of(st.no
 
 
 @given(st.lists(faults, max_size=3).map(tuple))
+@settings(deadline=None)
 def test_faults_come_back_from_a_specs_text(some):
     spec = Spec(faults=some)
     assert spec_from(tomllib.loads(spec_text(spec))) == spec
