@@ -103,8 +103,7 @@ def test_the_frame_is_brought_back_and_what_it_does_not_show_is_named():
     movement = registration.movement(image)
     assert movement is not None
     back, gap = registration.undone(image, movement)
-    seen = np.ones((HEIGHT, WIDTH), bool)
-    seen[gap.unseen] = False
+    seen = gap.unseen == 0
     assert 0.8 < seen.mean() < 0.95
     assert np.median(np.abs(back[seen].astype(int) - scene[seen])) <= 3
     assert np.percentile(np.abs(image[seen].astype(int) - scene[seen]), 60) > 10

@@ -12,6 +12,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
+from shadowpuppet.video import Image
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,14 @@ class Silhouettes:
         if self.segmenter is None or self.segmenter.background.frames < 2:
             return None
         return self._within(self.segmenter.raw(frame.image))
+
+    def steadied(self, image: Image) -> Image:
+        """An image as the camera would see it without its movement since the empty scene: it fits the mask."""
+        correction = None if self.segmenter is None else self.segmenter.correction
+        if correction is None or correction.registration is None:
+            return image
+        movement = correction.registration.movement(image)
+        return image if movement is None else correction.registration.undone(image, movement)[0]
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:

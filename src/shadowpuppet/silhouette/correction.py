@@ -50,7 +50,7 @@ class Correction:
         if self.light is not None:
             image = self.light.normalised(image)
         if gap is not None:
-            image[gap.unseen] = self.scene[gap.unseen]
+            image = gap.blanked(image, self.scene)
         if self.region is not None:
             blank = self.scene.copy()
             blank[self.region] = image[self.region]
