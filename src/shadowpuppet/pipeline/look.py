@@ -54,6 +54,8 @@ class Look:
     """The same with the plain rule of eq. 1."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
     condition: FilmCondition | None = None
     """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
     person: dict[str, Any] | None = None
@@ -92,6 +94,8 @@ class CameraLook:
     """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
     condition: FilmCondition | None = None
     """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sample
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
+from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
+from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.video import Image
 
 
@@ -25,12 +26,24 @@ class Silhouettes:
     """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
     """Rows and columns outside which masks are empty; None for all."""
+    clutter: Clutter | None = None
+    """What is left out of every mask, because it is not the person."""
+    recovered: RecoveredScene | None = None
+    """The empty scene if it was recovered from the film."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:
-            return self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
-        return self._within(self.segmenter(frame.image))
+            mask = self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
+        else:
+            mask = self._within(self.segmenter(frame.image))
+        return mask if self.clutter is None else self.clutter.removed(mask)
+
+    def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
+        """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
+        none."""
+        clutter = find_clutter(masks)
+        return self if clutter is None else replace(self, clutter=clutter)
 
     def plain(self, frame: CameraFrame) -> Mask | None:
         """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
@@ -54,22 +67,45 @@ class Silhouettes:
         return out
 
 
-def learn_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
-    """Silhouettes with a learnt background, or the ready ones. Raises `SilhouetteError` or `SettingsError`."""
+def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recovered: RecoveredScene | None = None) -> Silhouettes:
+    """Silhouettes with a learnt background, or the ready ones. Raises `SilhouetteError` or `SettingsError`.
+
+    recovered: the empty scene as it was recovered from the same film before; None to do so where the recording has none.
+    """
     if options.masks:
         return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes", None, footage.region)
     images = [frame.image for frame in sample.frames]
-    if footage.view.background is None:
-        scene, source = [background_from_film(images)], "the film itself (median)"
+    if footage.view.background is not None:
+        scene, source, recovered = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background), None
     else:
-        scene, source = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background)
-    return Silhouettes(source, learn_background(scene, options.silhouette, film=images, region=footage.region), footage.region)
+        recovered = recovered or _recovered(footage, images)
+        scene, source = iter([recovered.picture]), f"the film itself (recovered from {recovered.frames} frames)"
+    covered = recovered.covered if recovered is not None and recovered.covered.any() else None
+    segmenter = learn_background(scene, options.silhouette, film=images, region=footage.region, covered=covered)
+    return Silhouettes(source, segmenter, footage.region, recovered=recovered)
+
+
+def _recovered(footage: Footage, sampled: list[Image]) -> RecoveredScene:
+    """The empty scene recovered from the whole film, or from the images `sampled` of it if it cannot be sought through."""
+    images = max(spread_frames(footage), sampled, key=len)
+    if footage.region is None or not images:
+        return recover_scene(images)
+    alike = [images[0].copy() for _ in images]  # nothing moves outside the region
+    for out, image in zip(alike, images):
+        out[footage.region] = image[footage.region]
+    return recover_scene(alike)
 
 
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
-    return map(learn_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+    return map(uncluttered_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+
+
+def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
+    """`learn_silhouettes` without the clutter in the sample's frames."""
+    silhouettes = learn_silhouettes(footage, sample, options)
+    return silhouettes.without_clutter([silhouettes(frame) for frame in sample.frames])
 
 
 def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
@@ -80,7 +116,8 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
         return tracked
-    return learn_silhouettes(footage, sample, replace(options, silhouette=clean))
+    clean_ones = learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered)
+    return replace(clean_ones, clutter=tracked.clutter)
 
 
 def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:

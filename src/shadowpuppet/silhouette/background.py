@@ -63,7 +63,7 @@ def learn_statistics(images: Iterable[Image], observe: Callable[[Image], object]
         observe(image)
     if sums is None:
         raise SilhouetteError("background: found no frame, expected a picture or film of the empty scene; "
-                              "without one, it is taken from the film itself (background_from_film)")
+                              "without one, it is recovered from the film itself (recover_scene)")
     return sums.statistics()
 
 
@@ -94,24 +94,6 @@ class _Sums:
         brightness, sigma = moments(self.grey)
         return Background(self.frames, len(self.shape) == 3, brightness, sigma, moments(self.planes)[0].astype(np.float32),
                           moments(self.smooth)[1].astype(np.float32))
-
-
-def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
-    """The empty scene (H, W, 3) or (H, W) of a film: the median, pixel by pixel, of `count` to 2 * `count` frames spread over it.
-
-    Memory does not grow with the film. A pixel is correct if the person covers it in less than half of the film; a person standing
-    still becomes background. Raises `SilhouetteError` for fewer than 3 frames.
-    """
-    frames = sample_frames(images, count)
-    if len(frames) < 3:
-        raise SilhouetteError(f"background: found a film of {len(frames)} frames, expected at least 3 to tell a person who moves "
-                              "from the scene; give a picture or film of the empty scene")
-    for n, image in enumerate(frames):
-        check_image(image, f"film frame {n}")
-        check_alike(image, frames[0].shape, f"film frame {n}")
-    middle, rows = len(frames) // 2, 32
-    strips = (np.stack([f[y : y + rows] for f in frames]) for y in range(0, len(frames[0]), rows))
-    return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
 
 
 class FrameSampler:

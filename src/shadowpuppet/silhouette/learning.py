@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
@@ -37,12 +38,14 @@ MAX_GREY_CHROMA = 2
 
 
 def learn_background(images: Iterable[Image], settings: SilhouetteSettings | None = None, *,
-                     film: Iterable[Image] | None = None, region: Window | None = None) -> Segmenter:
-    """The `Segmenter` learnt from pictures (H, W, 3) or (H, W) of the empty scene: a film, one picture, or that of `background_from_film`.
+                     film: Iterable[Image] | None = None, region: Window | None = None,
+                     covered: NDArray[np.bool_] | None = None) -> Segmenter:
+    """The `Segmenter` learnt from pictures (H, W, 3) or (H, W) of the empty scene: a film, one picture, or that of `recover_scene`.
 
     film: the frames to be segmented, or some spread over them: their noise and the blur of their outlines are measured. Without them the
-    noise is that of `images`, and outlines count as sharp. region: rows and columns outside which nothing is a person.
-    Raises `SilhouetteError` for pictures that do not fit, and `SettingsError` for a method that this background does not allow.
+    noise is that of `images`, and outlines count as sharp. region: rows and columns outside which nothing is a person. covered: pixels
+    (H, W) that the person covers in every frame, as `recover_scene` finds them. Raises `SilhouetteError` for pictures that do not fit, and
+    `SettingsError` for a method that this background does not allow.
     """
     settings = settings or SilhouetteSettings()
     observer = METHODS[settings.method].observer(settings) if settings.method in METHODS else None
@@ -53,7 +56,7 @@ def learn_background(images: Iterable[Image], settings: SilhouetteSettings | Non
     choice = _choose(background, frames, channels, settings)
     classifier = METHODS[choice.key].build(EmptyScene(background, channels, settings, observer))
     least = MIN_EDGE_CONTRAST * settings.factor / float(channels.inverse_sigma[..., 0].max())
-    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, correction)
+    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, correction, covered)
     return replace(segmenter, edge=EdgeProfile(_outline_width(segmenter, frames), least))
 
 

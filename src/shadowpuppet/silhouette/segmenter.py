@@ -50,6 +50,8 @@ class Segmenter:
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
     correction: Correction | None = None
     """Undoes what has changed since the empty scene; None: nothing."""
+    covered: NDArray[np.bool_] | None = None
+    """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if it shows no person.
@@ -61,9 +63,11 @@ class Segmenter:
         if self.correction is not None:
             image, gap = self.correction(image)
         label = self.classifier(image)
+        if self.covered is not None:
+            label[self.covered] = 2
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.edge)
-        mask = label > 0
+        mask = label > 0 if self.covered is None else (label > 0) | self.covered
         return mask if gap is None else gap.filled(mask)
 
     def raw(self, image: Image) -> NDArray[np.bool_]:
