@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.silhouette import Segmenter, learn_background
-from shadowpuppet.silhouette.correction import Corrected
+from shadowpuppet.silhouette.correction.frame_correction import Corrected
 
 Image = NDArray[np.uint8]
 SIZE = (640, 480)

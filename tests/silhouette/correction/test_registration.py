@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
-from shadowpuppet.silhouette.registration import STILL, Registration
+from shadowpuppet.silhouette.correction.registration import STILL, Registration
 
 HEIGHT, WIDTH = 120, 160
 FOCAL = 140.0

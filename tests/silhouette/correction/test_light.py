@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.silhouette import learn_background
-from shadowpuppet.silhouette.light import NEGLIGIBLE, Light
+from shadowpuppet.silhouette.correction.light import NEGLIGIBLE, Light
 
 SIZE = (96, 128)
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from shadowpuppet.silhouette.background import Image
 from shadowpuppet.silhouette.cleanup import Window
-from shadowpuppet.silhouette.light import Light
-from shadowpuppet.silhouette.registration import Gap, Registration
+from shadowpuppet.silhouette.correction.light import Light
+from shadowpuppet.silhouette.correction.registration import Gap, Registration
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 

@@ -222,7 +222,7 @@ def _points(picture: Floats, grey: Floats) -> Points | None:
 
 def _searched(points: Points, picture: Floats) -> Homography:
     """The shift under which most points look alike, to a pixel of a reduced picture (H, W)."""
-    from shadowpuppet.silhouette._kernels import shift_costs
+    from shadowpuppet.silhouette.correction._kernels import shift_costs
 
     reach = round(REACH * picture.shape[1])
     cap = np.float32(np.median(np.abs(points.value)))
@@ -263,7 +263,7 @@ def _unlike(points: Points, difference: Floats) -> float:
 
 def _compared(points: Points, picture: Floats, movement: Homography) -> Floats:
     """Differences (N,) of a reduced picture (H, W) and points under a movement; a point outside the picture has a very large one."""
-    from shadowpuppet.silhouette._kernels import point_differences
+    from shadowpuppet.silhouette.correction._kernels import point_differences
 
     out = np.empty(len(points.value), np.float32)
     point_differences(points.xy, points.value, picture, movement.astype(np.float32), np.float32(OUTSIDE), out)
