@@ -61,9 +61,9 @@ def contenders() -> dict[str, Contender]:
         "opencv_arm": Contender(OpenCV(arm).run, arm.particles),
         "step": Contender(paper.run, 10),
         "default": Contender(default.run, 10),
+        "naive_frame": Contender(lambda: naive_mono.frame(rng, full.picture, settings, full.pose, full.mask, NAIVE_PARTICLES), share),
         "silhouette": Contender(film.segment),
         "correct": Contender(lambda: film.correct("clean")),
         "correct_moved": Contender(lambda: film.correct("moved")),
         "correct_uneven": Contender(lambda: film.correct("uneven")),
-        "naive_frame": Contender(lambda: naive_mono.frame(rng, full.picture, settings, full.pose, full.mask, NAIVE_PARTICLES), share),
     }
