@@ -39,9 +39,11 @@ MIN_SCALE = 0.01
 """Least assumed standard deviation of a point's difference, log brightness."""
 STILL = 0.4
 """Greatest movement, pixels of the frame at its corners, up to which it is left unchanged."""
-UNLIKE, FOUND = 0.9, 0.75
-"""Median difference of points over their median value from which on picture and scene do not match, and up to which a movement is found:
-noise and light reach 0.7, pictures that have nothing in common 1.4."""
+UNLIKE, SEARCHED_FROM = 0.9, 0.6
+"""Median difference of points over their median value: from which on picture and scene do not match, and a movement is searched for. Noise
+and light reach 0.7, pictures that have nothing in common 1.4, a nudge in a room with few details 0.8."""
+BETTER = 0.6
+"""Greatest such difference under a movement, over that without it: compression leaves 0.65 under a movement that is none."""
 BEND = 0.04
 """Standard deviation of the corners, over half the width, that is assumed for a change of view beyond shift and roll."""
 OUTSIDE = 1e3
@@ -115,13 +117,13 @@ class Registration:
         pixel = 2 / self.scene.shape[1]
         found = _refined(coarse, small, _searched(coarse, small), True, ROUGH * pixel)
         found = _refined(fine, picture, found, False, SETTLED * pixel)
-        better = _unlike(fine, _compared(fine, picture, found)) < min(FOUND, _unlike(fine, difference))
+        better = _unlike(fine, _compared(fine, picture, found)) < BETTER * min(_unlike(fine, difference), 1)
         return found if better and self.pixels(found) >= STILL else None
 
     def _moved(self, points: Points, difference: Floats) -> bool:
         """Whether points' differences (N,) look like those of a camera that moved: a little, by the first step; far, by their size."""
         step = _solved(*_equations(points, difference), np.eye(3), rigid=True)
-        return _unlike(points, difference) >= UNLIKE or self.pixels(_matrix(step)) >= STILL
+        return _unlike(points, difference) >= SEARCHED_FROM or self.pixels(_matrix(step)) >= STILL
 
     def matches(self, image: Image, movement: Homography | None) -> bool:
         """Whether a frame under a movement looks like the scene; true if the scene has too little texture to tell."""
