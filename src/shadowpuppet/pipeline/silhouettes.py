@@ -51,6 +51,14 @@ class Silhouettes:
             return None
         return self._within(self.segmenter.raw(frame.image))
 
+    def steadied(self, image: Image) -> Image:
+        """An image as the camera would see it without its movement since the empty scene: it fits the mask."""
+        correction = None if self.segmenter is None else self.segmenter.correction
+        if correction is None or correction.registration is None:
+            return image
+        movement = correction.registration.movement(image)
+        return image if movement is None else correction.registration.undone(image, movement)[0]
+
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
             return mask

@@ -15,7 +15,7 @@ from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, disc, out
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene
 from shadowpuppet.silhouette.cleanup import Window, coarse_person
-from shadowpuppet.silhouette.correction import Correction
+from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 

@@ -12,7 +12,7 @@ from shadowpuppet.silhouette.background import Background, Image, check_alike, c
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, Classifier
 from shadowpuppet.silhouette.cleanup import Window, clean
-from shadowpuppet.silhouette.correction import Correction
+from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 WHOLE_IMAGE: Window = (slice(None), slice(None))
@@ -25,8 +25,8 @@ class Segmenter:
     The steps of a call, in order:
 
     1. Check that the frame has the background's size and channels.
-    2. Undo what has changed since the empty scene (`correction.Correction`): the camera's movement (`registration.Registration`), and the
-       gain of exposure, white balance and lamps (`light.Light.normalised`).
+    2. Undo what has changed since the empty scene (`correction.frame_correction.Correction`): the camera's movement
+       (`correction.registration.Registration`), and the gain of exposure, white balance and lamps (`correction.light.Light`).
     3. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
        its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`).
        `averaging`, `mog2` and `knn` have comparisons of their own.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import Floats, Image, check_alike, check_image, smoothed, to_planes
-from shadowpuppet.silhouette.light import Light
+from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
 from shadowpuppet.silhouette.recovery.filling import filled
 from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels

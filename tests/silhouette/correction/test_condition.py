@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.silhouette import learn_background
-from shadowpuppet.silhouette.condition import FilmCondition, film_condition
+from shadowpuppet.silhouette.correction.condition import FilmCondition, film_condition
 
 Image = np.ndarray
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
-from shadowpuppet.silhouette.registration import STILL, Registration
+from shadowpuppet.silhouette.correction.registration import STILL, Registration
 
 HEIGHT, WIDTH = 120, 160
 FOCAL = 140.0
@@ -103,8 +103,7 @@ def test_the_frame_is_brought_back_and_what_it_does_not_show_is_named():
     movement = registration.movement(image)
     assert movement is not None
     back, gap = registration.undone(image, movement)
-    seen = np.ones((HEIGHT, WIDTH), bool)
-    seen[gap.unseen] = False
+    seen = gap.unseen == 0
     assert 0.8 < seen.mean() < 0.95
     assert np.median(np.abs(back[seen].astype(int) - scene[seen])) <= 3
     assert np.percentile(np.abs(image[seen].astype(int) - scene[seen]), 60) > 10

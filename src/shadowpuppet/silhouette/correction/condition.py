@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
-from shadowpuppet.silhouette.correction import Correction
+from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
 
 # Limits of the warnings. Films in good light have a noise of 0.9 to 1.3; sensor noise of sd 15 leaves 5.8, H.264 at crf 32 leaves 3.0.

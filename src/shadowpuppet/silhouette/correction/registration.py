@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Floats, Image, to_brightness
 
-Indices = NDArray[np.intp]
 Homography = NDArray[np.float64]
 """Of shape (3, 3): pixels of the empty scene to pixels of the frame, in coordinates about the middle over half the width."""
 
@@ -40,9 +39,11 @@ MIN_SCALE = 0.01
 """Least assumed standard deviation of a point's difference, log brightness."""
 STILL = 0.4
 """Greatest movement, pixels of the frame at its corners, up to which it is left unchanged."""
-UNLIKE, FOUND = 0.9, 0.75
-"""Median difference of points over their median value from which on picture and scene do not match, and up to which a movement is found:
-noise and light reach 0.7, pictures that have nothing in common 1.4."""
+UNLIKE, SEARCHED_FROM = 0.9, 0.6
+"""Median difference of points over their median value: from which on picture and scene do not match, and a movement is searched for. Noise
+and light reach 0.7, pictures that have nothing in common 1.4, a nudge in a room with few details 0.8."""
+BETTER = 0.6
+"""Greatest such difference under a movement, over that without it: compression leaves 0.65 under a movement that is none."""
 BEND = 0.04
 """Standard deviation of the corners, over half the width, that is assumed for a change of view beyond shift and roll."""
 OUTSIDE = 1e3
@@ -74,16 +75,25 @@ class Points(NamedTuple):
 class Gap(NamedTuple):
     """Pixels of the empty scene that a frame of a moved camera does not show."""
 
-    unseen: tuple[Indices, Indices]
-    """Their rows and columns (M,)."""
-    nearest: tuple[Indices, Indices]
-    """Rows and columns (M,) of the nearest shown pixels."""
+    unseen: Image
+    """255 for them, else 0, of shape (H, W)."""
+    seen: tuple[int, int, int, int]
+    """Top, bottom, left and right border of a rectangle that is shown whole, pixels."""
+
+    def blanked(self, image: Image, scene: Image) -> Image:
+        """An image (H, W, 3) or (H, W) with the scene where it is not shown."""
+        import cv2
+
+        return np.asarray(cv2.copyTo(scene, self.unseen, image), np.uint8)
 
     def filled(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """A copy of a mask (H, W) that continues over the pixels that are not shown: a body that the border cuts does not end there."""
-        out = mask.copy()
-        out[self.unseen] = mask[self.nearest]
-        return out
+        """A mask (H, W) that continues over the pixels that are not shown: a body that the border cuts does not end there."""
+        import cv2
+
+        (top, bottom, left, right), (height, width) = self.seen, mask.shape
+        inner = np.ascontiguousarray(mask[top:bottom, left:right]).view(np.uint8)
+        around = cv2.copyMakeBorder(inner, top, height - bottom, left, width - right, cv2.BORDER_REPLICATE)
+        return np.asarray(cv2.copyTo(around, self.unseen, mask.astype(np.uint8)), np.uint8).view(np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +117,13 @@ class Registration:
         pixel = 2 / self.scene.shape[1]
         found = _refined(coarse, small, _searched(coarse, small), True, ROUGH * pixel)
         found = _refined(fine, picture, found, False, SETTLED * pixel)
-        better = _unlike(fine, _compared(fine, picture, found)) < min(FOUND, _unlike(fine, difference))
+        better = _unlike(fine, _compared(fine, picture, found)) < BETTER * min(_unlike(fine, difference), 1)
         return found if better and self.pixels(found) >= STILL else None
 
     def _moved(self, points: Points, difference: Floats) -> bool:
         """Whether points' differences (N,) look like those of a camera that moved: a little, by the first step; far, by their size."""
         step = _solved(*_equations(points, difference), np.eye(3), rigid=True)
-        return _unlike(points, difference) >= UNLIKE or self.pixels(_matrix(step)) >= STILL
+        return _unlike(points, difference) >= SEARCHED_FROM or self.pixels(_matrix(step)) >= STILL
 
     def matches(self, image: Image, movement: Homography | None) -> bool:
         """Whether a frame under a movement looks like the scene; true if the scene has too little texture to tell."""
@@ -170,14 +180,12 @@ def _gap(matrix: Homography, width: int, height: int) -> Gap:
     """The pixels that a frame does not show under a movement, pixels of the empty scene to pixels of the frame."""
     import cv2
 
-    least, most = np.array([1, 1]), np.array([width - 2, height - 2])
-    back = np.asarray(np.linalg.inv(matrix), float)
-    corners = _mapped(back, np.array([least, [most[0], least[1]], most, [least[0], most[1]]], float))
-    unseen = cv2.fillConvexPoly(np.ones((height, width), np.uint8), np.rint(corners).astype(np.int32), 0)
-    y, x = np.nonzero(unseen)
-    nearest = _mapped(back, np.clip(_mapped(matrix, np.column_stack([x, y]).astype(float)), least + 1, most - 1))
-    u, v = np.clip(np.rint(nearest), 0, (width - 1, height - 1)).astype(np.intp).T
-    return Gap((y, x), (v, u))
+    corners = np.array([[1, 1], [width - 2, 1], [width - 2, height - 2], [1, height - 2]], float)
+    corners = np.rint(_mapped(np.asarray(np.linalg.inv(matrix), float), corners)).astype(np.int32)
+    unseen = cv2.fillConvexPoly(np.full((height, width), 255, np.uint8), corners, 0)
+    x, y = np.clip(corners, 0, (width - 1, height - 1)).T.tolist()
+    left, top = max(x[0], x[3]), max(y[0], y[1])
+    return Gap(np.asarray(unseen, np.uint8), (top, max(min(y[2], y[3]), top) + 1, left, max(min(x[1], x[2]), left) + 1))
 
 
 def _halved(picture: Floats) -> Floats:
@@ -216,7 +224,7 @@ def _points(picture: Floats, grey: Floats) -> Points | None:
 
 def _searched(points: Points, picture: Floats) -> Homography:
     """The shift under which most points look alike, to a pixel of a reduced picture (H, W)."""
-    from shadowpuppet.silhouette._kernels import shift_costs
+    from shadowpuppet.silhouette.correction._kernels import shift_costs
 
     reach = round(REACH * picture.shape[1])
     cap = np.float32(np.median(np.abs(points.value)))
@@ -257,7 +265,7 @@ def _unlike(points: Points, difference: Floats) -> float:
 
 def _compared(points: Points, picture: Floats, movement: Homography) -> Floats:
     """Differences (N,) of a reduced picture (H, W) and points under a movement; a point outside the picture has a very large one."""
-    from shadowpuppet.silhouette._kernels import point_differences
+    from shadowpuppet.silhouette.correction._kernels import point_differences
 
     out = np.empty(len(points.value), np.float32)
     point_differences(points.xy, points.value, picture, movement.astype(np.float32), np.float32(OUTSIDE), out)

@@ -30,18 +30,20 @@ SHIFTS = 5
 """Steps of the mean shift."""
 NEGLIGIBLE = 0.02
 """Log gain up to which a frame is left unchanged: rounding and codecs alone cause as much."""
-UNEVEN = 0.03
+UNEVEN = 0.04
 """Log gain beyond the mean, anywhere in the picture, from which on light counts as uneven."""
 SPARSE = 4
 """Of so many sampled pixels one is used to find out whether light is uneven."""
-ROUNDS = 8
-"""Weighted fits of a surface; the weights of each are by the differences to the last."""
+ROUNDS = 6
+"""Weighted fits of a surface to some of the sampled pixels; the weights of each are by the differences to the last."""
 SPREAD, PERSON_SPREAD = 0.03, 0.15
 """Standard deviation of a background pixel's log gain about the surface: the least assumed, and the greatest."""
-TILTED = 0.02
+TILTED = 0.005
 """Share of the pixels by which a surface is held level: a corner without informative pixels is not bent away."""
 BLOCKS, MISFIT = (8, 6), 0.07
 """Blocks across and down, and the greatest median of what a surface leaves of their log gain: above, it is no light that has changed."""
+UNIT = 128
+"""A factor of 1 in 8 bits."""
 NODES = 24
 """Number of the surface's nodes across the picture, between which it is interpolated."""
 
@@ -59,14 +61,7 @@ class Light:
         The mode is the background's even if the person covers nearly half of the picture. A channel in which too few pixels
         show a gain, such as red in a blue room, has the mean of the others; all have 1 if no channel shows one.
         """
-        levels, informative = self._sampled
-        step = self._step
-        after = image[::step, ::step].reshape(levels.shape)
-        informative = informative & (after > DARK // 2) & (after < BRIGHT)
-        bins = np.rint((LOG[after] - levels) / BIN).astype(np.intp) + BINS // 2
-        logs = np.array([_mode(bins[use, c]) if use.mean() >= MIN_SHARE else np.nan for c, use in enumerate(informative.T)])
-        known = np.isfinite(logs)
-        return np.exp(np.where(known, logs, logs[known].mean() if known.any() else 0.0))
+        return self._gains(*self._ratios(image))
 
     def normalised(self, image: Image) -> Image:
         """The picture divided by its gains; the picture itself if they are negligible.
@@ -75,47 +70,70 @@ class Light:
         """
         import cv2
 
-        gains = self.gains(image)
-        surface = self.surface(image, gains)
-        if surface is not None:
-            return self._evened(image, surface)
-        if np.abs(np.log(gains)).max() < NEGLIGIBLE:
+        ratios, informative = self._ratios(image)
+        gains = self._gains(ratios, informative)
+        surface = self._surface(ratios, informative, gains)
+        if surface is None and np.abs(np.log(gains)).max() < NEGLIGIBLE:
             return image
         table = np.clip(np.rint(np.arange(256)[:, None] / gains), 0, 255).astype(np.uint8)
         out = np.asarray(cv2.LUT(image, table[None] if image.ndim == 3 else table[:, 0]), np.uint8)
+        if surface is not None:
+            return self._evened(out, gains, surface)
         if gains.max() > 1:
             clipped = cv2.subtract(self.scene, np.append(np.floor(CLIPPED / gains), np.zeros(4 - len(gains))))
             out = np.asarray(cv2.add(out, clipped), np.uint8)
         return out
 
-    def surface(self, image: Image, gains: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Coefficients (6, C) of the log gain over the picture, of `gains` and what differs from them; None if they are even.
+    def surface(self, image: Image) -> NDArray[np.float64] | None:
+        """Coefficients (6, C) of the log gain over the picture, beyond that of `gains`; None if light has changed evenly.
 
         The terms are 1, x, y, x^2, x y, y^2, with x and y from -1 to 1 across the picture's width and its height.
         """
+        ratios, informative = self._ratios(image)
+        return self._surface(ratios, informative, self._gains(ratios, informative))
+
+    def _ratios(self, image: Image) -> tuple[Floats, NDArray[np.bool_]]:
+        """Log ratios of picture to scene at the sampled pixels (n, C), and whether each shows a gain (n, C)."""
         levels, informative = self._sampled
-        step = self._step
-        after = image[::step, ::step].reshape(levels.shape)
-        informative = informative & (after > DARK // 2) & (after < BRIGHT)
-        terms = self._terms
-        some = slice(None, None, SPARSE)
-        if informative[some].sum() < 50 * len(gains):
+        after = image[:: self._step, :: self._step].reshape(levels.shape)
+        return LOG[after] - levels, informative & (after > DARK // 2) & (after < BRIGHT)
+
+    def _gains(self, ratios: Floats, informative: NDArray[np.bool_]) -> NDArray[np.float64]:
+        bins = np.rint(ratios / BIN).astype(np.intp) + BINS // 2
+        logs = np.array([_mode(bins[use, c]) if use.mean() >= MIN_SHARE else np.nan for c, use in enumerate(informative.T)])
+        known = np.isfinite(logs)
+        return np.exp(np.where(known, logs, logs[known].mean() if known.any() else 0.0))
+
+    def _surface(self, ratios: Floats, informative: NDArray[np.bool_], gains: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        some, logs = slice(None, None, SPARSE), np.log(gains).astype(np.float32)
+        terms, few, use = self._terms, ratios[some] - logs, informative[some]
+        if use.sum() < 50 * len(gains):
             return None
-        logs = np.log(gains)
-        beyond = (LOG[after] - levels - logs.astype(np.float32)) * informative
-        quick = _surface(terms[some], beyond[some], informative[some], 1)
+        quick = _fitted(terms[some], few, use, np.zeros(6), 1)
         if np.ptp(NODE_TERMS @ quick) < 2 * UNEVEN:
             return None
-        shared = _surface(terms, beyond, informative, ROUNDS)
-        beyond -= informative * (terms @ shared)[:, None]
-        own = np.column_stack([_surface(terms, beyond[:, c : c + 1], informative[:, c : c + 1], 3) for c in range(len(gains))])
-        if self._misfit(beyond - terms @ own, informative) > MISFIT:
-            return None
-        own += shared[:, None]
-        own[0] += logs
-        return own
+        beyond = ratios - logs
+        shared = _fitted(terms, beyond, informative, _fitted(terms[some], few, use, quick, ROUNDS), 2)
+        beyond -= (terms @ shared.astype(np.float32))[:, None]
+        own = np.column_stack([_fitted(terms, beyond[:, c : c + 1], informative[:, c : c + 1], np.zeros(6), 2) for c in range(len(gains))])
+        return None if self._misfit(beyond - terms @ own.astype(np.float32), informative) > MISFIT else own + shared[:, None]
 
-    def _misfit(self, beyond: Floats, informative: NDArray[np.bool_]) -> float:
+    def _evened(self, image: Image, gains: NDArray[np.float64], surface: NDArray[np.float64]) -> Image:
+        """A picture, divided by its gains, divided by the gain of a surface (6, C)."""
+        import cv2
+
+        def over_picture(nodes: NDArray[np.float64]) -> Image:
+            values = np.clip(np.rint(nodes), 0, 255).astype(np.uint8).reshape(NODES, NODES, -1)
+            return np.asarray(cv2.resize(values, image.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.uint8).reshape(image.shape)
+
+        factors = np.exp(-(NODE_TERMS @ surface))
+        out = np.asarray(cv2.multiply(image, over_picture(UNIT * factors), scale=1 / UNIT), np.uint8)
+        reached = CLIPPED * factors / gains
+        if reached.min() < self.scene.max():
+            out = np.asarray(cv2.add(out, cv2.subtract(self.scene, over_picture(reached))), np.uint8)
+        return out
+
+    def _misfit(self, beyond: NDArray[np.floating], informative: NDArray[np.bool_]) -> float:
         """Median, over blocks of the picture, of the mean log gain (n, C) that is left of informative pixels."""
         import cv2
 
@@ -123,17 +141,6 @@ class Light:
         sums, counts = (cv2.resize(values.reshape(height, width, -1).astype(np.float32), BLOCKS, interpolation=cv2.INTER_AREA)
                         for values in (beyond * informative, informative))  # fmt: skip
         return float(np.median(np.abs(sums / np.maximum(counts, 1e-3))))
-
-    def _evened(self, image: Image, surface: NDArray[np.float64]) -> Image:
-        """A picture divided by the gain of a surface (6, C)."""
-        import cv2
-
-        height, width = image.shape[:2]
-        nodes = np.exp(-(NODE_TERMS @ surface)).reshape(NODES, NODES, -1).astype(np.float32)
-        factor = cv2.resize(nodes, (width, height), interpolation=cv2.INTER_LINEAR).reshape(image.shape)
-        out = cv2.multiply(image, factor, dtype=cv2.CV_8U)
-        clipped = cv2.subtract(self.scene, CLIPPED * factor, dtype=cv2.CV_8U)
-        return np.asarray(cv2.add(out, clipped), np.uint8)
 
     @property
     def _step(self) -> int:
@@ -162,14 +169,17 @@ NODE_TERMS = _terms(np.tile(_MIDDLES, NODES), np.repeat(_MIDDLES, NODES))
 """The terms (NODES * NODES, 6) at the nodes, row by row."""
 
 
-def _surface(terms: Floats, beyond: Floats, informative: NDArray[np.bool_], rounds: int) -> NDArray[np.float64]:
-    """Coefficients (6,) of the surface that most log gains (n, C) of informative pixels lie on; weights are Geman and McClure's."""
-    found = np.zeros(terms.shape[1])
+def _fitted(terms: Floats, beyond: Floats, informative: NDArray[np.bool_], start: NDArray[np.float64], rounds: int) -> NDArray[np.float64]:
+    """Coefficients (6,) of the surface that most log gains (n, C) of informative pixels lie on, from those of `start`.
+
+    The weights of each round are Geman and McClure's.
+    """
+    found = start
     held = TILTED * len(terms) * beyond.shape[1] * np.diag([0, 1, 1, 1, 1, 1])
     for _ in range(rounds):
         apart = np.abs(beyond - (terms @ found.astype(np.float32))[:, None])
         scale = np.clip(1.4826 * np.median(apart[informative]), SPREAD, PERSON_SPREAD)
-        weight = informative / np.square(1 + np.square(apart / (2 * scale)))
+        weight = informative / np.square(1 + np.square(apart / np.float32(2 * scale)))
         weight, moment = weight.sum(1), (weight * beyond).sum(1)
         found = np.linalg.solve((terms * weight[:, None]).T @ terms + held, terms.T @ moment)
     return found

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from shadowpuppet.silhouette.background import Image
 from shadowpuppet.silhouette.cleanup import Window
-from shadowpuppet.silhouette.light import Light
-from shadowpuppet.silhouette.registration import Gap, Registration
+from shadowpuppet.silhouette.correction.light import Light
+from shadowpuppet.silhouette.correction.registration import Gap, Registration
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 
@@ -50,7 +50,7 @@ class Correction:
         if self.light is not None:
             image = self.light.normalised(image)
         if gap is not None:
-            image[gap.unseen] = self.scene[gap.unseen]
+            image = gap.blanked(image, self.scene)
         if self.region is not None:
             blank = self.scene.copy()
             blank[self.region] = image[self.region]
