@@ -14,7 +14,7 @@ TRUNK, LEGS, SKIN, POSTER = (120, 45, 40), (30, 32, 30), (90, 120, 190), (40, 20
 
 
 def standing(wall: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """A person (picture, mask) who stands, sways and breathes by a pixel, and swings both arms; nothing else moves. The picture cuts the legs."""
+    """A person (picture, mask) who stands, sways and breathes by a pixel, and swings both arms. The picture cuts the legs."""
     sway, lift, reach = round(1.5 * np.sin(1.7 * n)), round(np.sin(2.3 * n)), round(30 * np.sin(0.9 * n))
     picture, mask = wall.copy(), np.zeros(SIZE, np.uint8)
 
