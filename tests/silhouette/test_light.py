@@ -75,3 +75,41 @@ def test_silhouettes_are_the_same_under_another_exposure(gain, grey):
     before, after = segmenter(film[0]), segmenter(film[-1])
     assert 0.15 < before.mean() < 0.3
     assert (before & after).sum() > 0.95 * (before | after).sum()
+
+
+def uneven(kind: str) -> np.ndarray:
+    """Gains (H, W, 1) over the picture."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / np.array([[[SIZE[0] - 1]], [[SIZE[1] - 1]]]) * 2 - 1
+    shapes = {"vignetting": 1 - 0.3 * (x**2 + y**2) / 2, "lamp": 1 - 0.4 * np.exp(-1.5 * (x + 1)), "window": 1 + 0.25 * y}
+    return shapes[kind][..., None]
+
+
+@pytest.mark.parametrize("kind", ["vignetting", "lamp", "window"])
+@pytest.mark.parametrize("grey", [False, True])
+def test_silhouettes_are_the_same_under_an_uneven_light(kind, grey):
+    scene = scene_of()
+    empty = [filmed(scene, 1, seed=k) for k in range(6)]
+    film = [filmed(scene, g, 0.25, seed=10 + k) for k, g in enumerate([1, 1, 1, uneven(kind), uneven(kind), uneven(kind)])]
+    if grey:
+        empty, film = [image[..., 1].copy() for image in empty], [image[..., 1].copy() for image in film]
+    segmenter = learn_background(empty, film=film)
+    before, after = segmenter(film[0]), segmenter(film[-1])
+    assert 0.15 < before.mean() < 0.3
+    assert (before & after).sum() > 0.95 * (before | after).sum()
+
+
+@settings(max_examples=20, deadline=None)
+@given(gain=st.floats(0.6, 1.4), share=st.floats(0, 0.4), noise=st.floats(0, 15), seed=st.integers(0, 99))
+def test_an_even_light_has_no_surface(gain, share, noise, seed):
+    scene = scene_of()
+    image, light = filmed(scene, gain, share, noise, seed), Light(scene)
+    assert light.surface(image, light.gains(image)) is None
+
+
+def test_a_noisy_film_keeps_its_silhouettes():
+    scene = scene_of()
+    exact = np.zeros(SIZE, bool)
+    exact[10:, 20 : 20 + round(0.25 * SIZE[1])] = True
+    film = [filmed(scene, 1, 0.25, 20, seed=k) for k in range(4)]
+    mask = learn_background([filmed(scene, 1, seed=k) for k in range(6)], film=film)(film[0])
+    assert (mask & exact).sum() > 0.93 * (mask | exact).sum()

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
+from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.video import Image
 
 
@@ -26,30 +26,30 @@ class Silhouettes:
     """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
     """Rows and columns outside which masks are empty; None for all."""
-    blank: Image | None = None
-    """Image of the empty scene, which replaces the image outside the region."""
+    clutter: Clutter | None = None
+    """What is left out of every mask, because it is not the person."""
     recovered: RecoveredScene | None = None
     """The empty scene if it was recovered from the film."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:
-            return self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
-        return self._within(self.segmenter(self.visible(frame.image)))
+            mask = self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
+        else:
+            mask = self._within(self.segmenter(frame.image))
+        return mask if self.clutter is None else self.clutter.removed(mask)
+
+    def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
+        """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
+        none."""
+        clutter = find_clutter(masks)
+        return self if clutter is None else replace(self, clutter=clutter)
 
     def plain(self, frame: CameraFrame) -> Mask | None:
         """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
         if self.segmenter is None or self.segmenter.background.frames < 2:
             return None
         return self._within(self.segmenter.raw(frame.image))
-
-    def visible(self, image: Image) -> Image:
-        """A copy of an image with the empty scene outside the region, so that nothing there is taken for the person."""
-        if self.region is None or self.blank is None:
-            return image
-        out = self.blank.copy()
-        out[self.region] = image[self.region]
-        return out
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
@@ -72,26 +72,32 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recove
     else:
         recovered = recovered or _recovered(footage, images)
         scene, source = iter([recovered.picture]), f"the film itself (recovered from {recovered.frames} frames)"
-    first, scene = _peeked(scene)
-    silhouettes = Silhouettes(source, None, footage.region, None if footage.region is None else first, recovered)
     covered = recovered.covered if recovered is not None and recovered.covered.any() else None
-    segmenter = learn_background(scene, options.silhouette, film=[silhouettes.visible(image) for image in images], covered=covered)
-    return replace(silhouettes, segmenter=segmenter)
+    segmenter = learn_background(scene, options.silhouette, film=images, region=footage.region, covered=covered)
+    return Silhouettes(source, segmenter, footage.region, recovered=recovered)
 
 
 def _recovered(footage: Footage, sampled: list[Image]) -> RecoveredScene:
     """The empty scene recovered from the whole film, or from the images `sampled` of it if it cannot be sought through."""
     images = max(spread_frames(footage), sampled, key=len)
-    if footage.region is None:
+    if footage.region is None or not images:
         return recover_scene(images)
-    still = Silhouettes("", None, footage.region, images[0]) if images else None  # nothing moves outside the region
-    return recover_scene([still.visible(image) for image in images] if still else [])
+    alike = [images[0].copy() for _ in images]  # nothing moves outside the region
+    for out, image in zip(alike, images):
+        out[footage.region] = image[footage.region]
+    return recover_scene(alike)
 
 
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
-    return map(learn_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+    return map(uncluttered_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+
+
+def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
+    """`learn_silhouettes` without the clutter in the sample's frames."""
+    silhouettes = learn_silhouettes(footage, sample, options)
+    return silhouettes.without_clutter([silhouettes(frame) for frame in sample.frames])
 
 
 def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
@@ -102,7 +108,8 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
         return tracked
-    return learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered)
+    clean_ones = learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered)
+    return replace(clean_ones, clutter=tracked.clutter)
 
 
 def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
@@ -110,12 +117,6 @@ def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
     if asked.method == "averaging":
         return SilhouetteSettings()
     return asked if asked.cleaned else replace(asked, clean=None)
-
-
-def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:
-    """The first of some images, and an iterator over all of them."""
-    first = next(images, None)
-    return first, chain([] if first is None else [first], images)
 
 
 def _short(path: Path | None) -> str:

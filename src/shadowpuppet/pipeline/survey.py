@@ -22,6 +22,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.condition import FilmCondition, film_condition
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
 
@@ -55,6 +56,9 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
     sample = take_sample(footage, options.masks, longest)
     silhouettes = learn_silhouettes(footage, sample, options)
     runs = [[silhouettes(frame) for frame in run] for run in sample.runs]
+    silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
+    if silhouettes.clutter is not None:
+        runs = [[silhouettes.clutter.removed(mask) for mask in run] for run in runs]
     masks = [mask for run in runs for mask in run]
     exact = [ready_mask(frame.ready) for frame in sample.frames if frame.ready is not None and silhouettes.segmenter is not None]
     camera = footage.camera
@@ -63,7 +67,22 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
         "fov": float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))),
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
         "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
+        "left_out": _left_out(silhouettes, footage),
+        "condition": condition_of(silhouettes, sample),
     })  # fmt: skip
+
+
+def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
+    """What is left out of the silhouettes, in words and the film's pixels."""
+    parts = silhouettes.clutter.parts if silhouettes.clutter is not None else ()
+    (width, height), full = footage.camera.size, footage.view.camera.size
+    return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
+
+
+def _told_of_clutter(left_out: Sequence[str]) -> list[str]:
+    if not left_out:
+        return []
+    return [f"{'; '.join(left_out)}: taken for clutter, not for the person, and left out of the silhouettes"]
 
 
 def brief_length(footage: Footage, options: Options) -> int:
@@ -105,7 +124,8 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    return replace(look, doubts=(*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *look.quality.warnings()))
+    doubts = (*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *_told_of_clutter(look.left_out))
+    return replace(look, doubts=(*doubts, *look.quality.warnings()))
 
 
 def _doubted(silhouettes: Silhouettes) -> str | None:
@@ -149,7 +169,7 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
     if look.exact_overlap is not None and look.exact_overlap < GOOD:
         doubts.append(f"the silhouettes overlap the ready ones in masks/ by {look.exact_overlap:.2f} only: try another "
                       "--silhouette.method, or --masks")
-    return doubts
+    return [*doubts, *_poor(look.condition)]
 
 
 # Several cameras
@@ -213,7 +233,8 @@ def _rig_doubts(look: RigLook) -> list[str]:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
                           "try another --silhouette.method, or --masks")
-        doubts += [f"camera {camera.name!r}: {warning}" for warning in camera.quality.warnings()]
+        warnings = (*_poor(camera.condition), *_told_of_clutter(camera.left_out), *camera.quality.warnings())
+        doubts += [f"camera {camera.name!r}: {warning}" for warning in warnings]
         doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
     return doubts
 
@@ -223,6 +244,17 @@ def _rig_doubts(look: RigLook) -> list[str]:
 
 def _share(masks: Sequence[Mask]) -> float:
     return float(np.mean([mask.mean() for mask in masks]))
+
+
+def condition_of(silhouettes: Silhouettes, sample: Sample) -> FilmCondition | None:
+    """The condition of a film in its sampled frames; None for ready silhouettes and an empty film."""
+    if silhouettes.segmenter is None or not sample.frames:
+        return None
+    return film_condition(silhouettes.segmenter, [[(frame.time, frame.image) for frame in run] for run in sample.runs])
+
+
+def _poor(condition: FilmCondition | None) -> tuple[str, ...]:
+    return () if condition is None else condition.warnings()
 
 
 def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ Image = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 SMOOTHING = 0.7
 """Standard deviation (pixels) of the smoothing before classification: it halves the noise. The outline is drawn without it."""
+NOISY, NOISY_SMOOTHING = 3.0, 1.5
+"""Noise of a film after that, grey levels of brightness, from which on it is smoothed by more; a camera in good light and web video have
+less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +121,41 @@ def sample_frames(images: Iterable[Image], count: int) -> list[Image]:
     return kept.kept
 
 
-def film_noise(frames: list[Image], mean: Floats) -> NDArray[np.float64]:
-    """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, about the smoothed background `mean` (H, W, 3).
+def film_noise(frames: list[Image], mean: Floats, smoothing: float = SMOOTHING) -> NDArray[np.float64]:
+    """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, smoothed, about the smoothed background `mean` (H, W, 3).
 
     It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution): a person covering less
     than a third of the picture hardly changes it.
     """
-    differences = [np.abs(smoothed(to_planes(f).astype(np.float32)) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
+    differences = [np.abs(smoothed(to_planes(f).astype(np.float32), smoothing) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
     return np.percentile(np.concatenate(differences), 68, axis=0)
+
+
+class FilmNoise(NamedTuple):
+    """Noise of a film, and the smoothing that it asks for."""
+
+    smoothing: float
+    """Standard deviation of the smoothing before classification, pixels."""
+    sigma: NDArray[np.float64]
+    """Standard deviation (3,) of the smoothed Y, Cr, Cb about the empty scene, grey levels."""
+    share: NDArray[np.float64]
+    """The same (3,) over that after the least smoothing."""
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the film is smoothed by more than a clean one."""
+        return self.smoothing > SMOOTHING
+
+
+def measured_noise(frames: list[Image], mean: Floats) -> FilmNoise:
+    """The noise of a film's frames about the background `mean` (H, W, 3); none without frames."""
+    if not frames:
+        return FilmNoise(SMOOTHING, np.zeros(3), np.ones(3))
+    least = film_noise(frames, smoothed(mean))
+    if least[0] < NOISY:
+        return FilmNoise(SMOOTHING, least, np.ones(3))
+    more = film_noise(frames, smoothed(mean, NOISY_SMOOTHING), NOISY_SMOOTHING)
+    return FilmNoise(NOISY_SMOOTHING, more, np.minimum(more / np.maximum(least, 1e-3), 1))
 
 
 def picture_of(background: Background) -> Image:
@@ -154,11 +185,12 @@ def to_brightness(image: Image) -> Image:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def smoothed(planes: np.ndarray) -> np.ndarray:
-    """Planes (H, W, 3) smoothed by a small Gaussian against pixel noise."""
+def smoothed(planes: np.ndarray, smoothing: float = SMOOTHING) -> np.ndarray:
+    """Planes (H, W, 3) smoothed by a small Gaussian, standard deviation `smoothing` (pixels), against pixel noise."""
     import cv2
 
-    return np.asarray(cv2.GaussianBlur(planes, (3, 3), SMOOTHING), planes.dtype)
+    side = 2 * max(1, round(2 * smoothing - 0.4)) + 1
+    return np.asarray(cv2.GaussianBlur(planes, (side, side), smoothing), planes.dtype)
 
 
 def check_image(image: np.ndarray, name: str) -> None:
