@@ -34,6 +34,8 @@ COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
 """Weight of a colour's log likelihood ratio, and its limit."""
 CALM_WEIGHT = 0.02
 """Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
+CALM_SHARE = 0.25
+"""Least area of a part of such pixels over that of the largest."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
 CONNECTED = 0.8
@@ -193,10 +195,23 @@ def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.
     scene = np.concatenate([still, modes.colour[uncovered, labels[uncovered]]])
     passing = modes.share[uncovered]
     passing[np.arange(len(uncovered)), labels[uncovered]] = 0
-    calm = (labels == COUNT) & field.movement.enclosed[field.movement.region]
+    calm = _calm(field, labels)
     weights = np.concatenate([passing.reshape(-1), np.full(np.count_nonzero(calm), CALM_WEIGHT)])
     person = colour_model(np.concatenate([modes.colour[uncovered].reshape(-1, 3), modes.colour[calm, 0]]), weights)
     return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene)))).clip(-GREATEST_RATIO, GREATEST_RATIO)
+
+
+def _calm(field: _Field, labels: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Of the region's pixels (M,) those that are covered and enclosed, in large parts: trunk and legs."""
+    import cv2
+
+    parts = np.zeros(field.movement.region.shape, np.uint8)
+    parts[field.movement.region] = labels == COUNT
+    parts &= field.movement.enclosed
+    _, numbers, stats, _ = cv2.connectedComponentsWithStats(parts, connectivity=4)
+    areas = stats[:, cv2.CC_STAT_AREA] * (np.arange(len(stats)) > 0)
+    kept = (areas > 0) & (areas >= CALM_SHARE * areas.max())
+    return kept[np.asarray(numbers, np.intp)][field.movement.region]
 
 
 def _persons_parts(covered: Mask, passing: Mask, region: Mask, ratio: NDArray[np.float64]) -> Mask:
