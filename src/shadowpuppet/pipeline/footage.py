@@ -223,7 +223,7 @@ def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
     if length is None or not np.isfinite(film.rate):
         return []
     wanted = np.unique(np.linspace(0, max(length - 1, 0), number).round())
-    with Seeker(footage.view.video, footage.camera.size, footage.recording.rate) as seeker:
+    with Seeker(Path(str(footage.view.video)), footage.camera.size, footage.recording.rate) as seeker:
         found = (seeker.at(footage.view.start + float(n) / film.rate) for n in wanted)
         return [image for image in found if image is not None]
 

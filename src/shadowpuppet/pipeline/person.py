@@ -164,7 +164,7 @@ def _reference(footage: Footage, silhouettes: Silhouettes, reference: Reference)
     path = reference.image if silhouettes.segmenter is not None or reference.mask is None else reference.mask
     images = (image for image, _ in zip(footage.pictures(path, "a reference"), range(LONGEST_REFERENCE)))
     try:
-        masks = [silhouettes(CameraFrame(0.0, image, image)) for image in images]
+        masks = [silhouettes.elsewhere(CameraFrame(0.0, image, image)) for image in images]
     except SilhouetteError as error:
         raise RecordingError(f"{path}: {error}") from None
     middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # few frames of a film show the person walking in

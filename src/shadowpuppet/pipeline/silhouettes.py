@@ -39,6 +39,12 @@ class Silhouettes:
             mask = self._within(self.segmenter(frame.image))
         return mask if self.clutter is None else self.clutter.removed(mask)
 
+    def elsewhere(self, frame: CameraFrame) -> Mask:
+        """The mask (H, W) in a picture that is none of the film's, so that what the person always covers there need not be covered."""
+        if self.segmenter is None or self.segmenter.covered is None:
+            return self(frame)
+        return replace(self, segmenter=replace(self.segmenter, covered=None))(frame)
+
     def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
         """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
         none."""

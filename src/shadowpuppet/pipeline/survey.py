@@ -143,8 +143,8 @@ def _recovery_doubts(names: Sequence[str], silhouettes: Sequence[Silhouettes]) -
     of = f" of {', '.join(hidden)}" if len(names) > 1 else ""
     never = (f"up to {100 * max(hidden.values()):.1f} % of the picture was never seen without the person, and counts as person in every "
              "frame; ") if any(hidden.values()) else ""  # fmt: skip
-    return [*said, f"no picture of the empty scene{of}: it was recovered from the film; {never}what touches the person and has like colours "
-            "may be taken for it; look at the silhouettes, or give background/<camera>.mp4 or --background"]
+    return [*said, f"no picture of the empty scene{of}: it was recovered from the film; {never}what touches the person and has like "
+            "colours may be taken for it; look at the silhouettes, or give background/<camera>.mp4 or --background"]
 
 
 def known_scale(footage: Footage) -> str:

@@ -78,7 +78,7 @@ def _touching(stirred: NDArray[np.uint8], moved: NDArray[np.uint8]) -> NDArray[n
 
     number, parts = cv2.connectedComponents(stirred)
     found = np.zeros(number, np.uint8)
-    found[np.asarray(parts)[moved > 0]] = 1
+    found[np.asarray(parts, np.intp)[moved > 0]] = 1
     found[0] = 0
     return found[np.asarray(parts, np.intp)]
 

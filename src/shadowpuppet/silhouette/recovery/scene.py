@@ -26,13 +26,16 @@ LEAST_SEEN = 2
 """Least number of frames that show the scene at a pixel."""
 ROUNDS = 3
 """Times that pixels are labelled, each but the first with colour models from the labels before."""
-RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.1, 0.4, 0.8, 0.3
+RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.1, 0.4, 1.5, 0.3
 """Costs of labels: of a scene that is seen rarely, over the logarithm of its share of the frames; of a covered pixel that something moved
-over, and of one whose colour stays the same nevertheless, over the share of frames that have it; gain of a covered pixel that is enclosed."""
+over, and of one whose colour stays the same nevertheless, over the share of frames that have it. Gain of a covered pixel that is
+enclosed."""
 COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
 """Weight of a colour's log likelihood ratio, and its limit."""
-CALM_WEIGHT = 0.1
+CALM_WEIGHT = 0.02
 """Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
+CALM_SHARE = 0.25
+"""Least area of a part of such pixels over that of the largest."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
 CONNECTED = 0.8
@@ -114,7 +117,8 @@ def _reduced(image: Image) -> Image:
     height, width = image.shape[:2]
     if width <= WORKED_WIDTH:
         return image
-    return np.asarray(cv2.resize(image, (WORKED_WIDTH, max(1, round(height * WORKED_WIDTH / width))), interpolation=cv2.INTER_AREA), np.uint8)
+    size = WORKED_WIDTH, max(1, round(height * WORKED_WIDTH / width))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 # Labels
@@ -191,10 +195,23 @@ def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.
     scene = np.concatenate([still, modes.colour[uncovered, labels[uncovered]]])
     passing = modes.share[uncovered]
     passing[np.arange(len(uncovered)), labels[uncovered]] = 0
-    calm = (labels == COUNT) & field.movement.enclosed[field.movement.region]
+    calm = _calm(field, labels)
     weights = np.concatenate([passing.reshape(-1), np.full(np.count_nonzero(calm), CALM_WEIGHT)])
     person = colour_model(np.concatenate([modes.colour[uncovered].reshape(-1, 3), modes.colour[calm, 0]]), weights)
     return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene)))).clip(-GREATEST_RATIO, GREATEST_RATIO)
+
+
+def _calm(field: _Field, labels: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Of the region's pixels (M,) those that are covered and enclosed, in large parts: trunk and legs."""
+    import cv2
+
+    parts = np.zeros(field.movement.region.shape, np.uint8)
+    parts[field.movement.region] = labels == COUNT
+    parts &= field.movement.enclosed
+    _, numbers, stats, _ = cv2.connectedComponentsWithStats(parts, connectivity=4)
+    areas = stats[:, cv2.CC_STAT_AREA] * (np.arange(len(stats)) > 0)
+    kept = (areas > 0) & (areas >= CALM_SHARE * areas.max())
+    return kept[np.asarray(numbers, np.intp)][field.movement.region]
 
 
 def _persons_parts(covered: Mask, passing: Mask, region: Mask, ratio: NDArray[np.float64]) -> Mask:
@@ -214,7 +231,7 @@ def _persons_parts(covered: Mask, passing: Mask, region: Mask, ratio: NDArray[np
     areas[0] = 0
     largest = int(areas.argmax())
     kept = (areas >= PART_SHARE * areas[largest]) & (evidence > PART_COLOUR * evidence[largest])
-    kept &= _connected(np.asarray(parts), number, largest, passing) >= CONNECTED
+    kept &= _connected(np.asarray(parts, np.int32), number, largest, passing) >= CONNECTED
     kept[largest], kept[0] = True, False
     return kept[np.asarray(parts, np.intp)]
 
@@ -252,7 +269,7 @@ def _at_full_size(frames: Sequence[Image], scene: Floats, covered: Mask, movemen
         sums.add(frame)
         shows = cv2.inRange(np.abs(smoothed(to_planes(frame[window])) - target) / reach, (0, 0, 0), (1, 1, 1))
         seen += shows > 0
-        total.add(frame[window], np.asarray(shows))
+        total.add(frame[window], np.asarray(shows, np.uint8))
     picture = sums.first / len(frames)
     counts = seen if picture.ndim == 2 else seen[..., None]
     picture[window] = np.where(moved[window].reshape(counts.shape) > 0, total.first / np.maximum(counts, 1), picture[window])
