@@ -321,3 +321,15 @@ def test_the_dancer_is_keyed_by_colour(shared):
     # The wall is blue, so what is hardly blue is the dancer.
     blue = [i[..., 0].astype(int) - i[..., 1:].max(axis=2) for i in images]
     assert np.mean([overlap(segmenter(i), b < 85) for i, b in zip(images, blue)]) > 0.93
+
+
+def test_what_is_always_covered_is_person_in_every_frame(rng):
+    wall, mask = scene(rng), figure()
+    covered = np.zeros(SIZE, bool)
+    covered[50:110, 70:90] = True
+    hidden = wall.copy()
+    hidden[covered] = dressed(wall, mask)[covered]  # the scene there is unknown: it has the shirt's colour
+    without, found = (learn_background(empty_shots(rng, hidden), covered=each)(shot(rng, dressed(wall, mask))) for each in (None, covered))
+    assert overlap(without, mask) < 0.9
+    assert overlap(found, mask) > 0.96
+    assert found[covered].all()

@@ -26,7 +26,7 @@ LEAST_SEEN = 2
 """Least number of frames that show the scene at a pixel."""
 ROUNDS = 3
 """Times that pixels are labelled, each but the first with colour models from the labels before."""
-RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.1, 0.4, 1.5, 0.3
+RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.3, 0.4, 1.5, 0.3
 """Costs of labels: of a scene that is seen rarely, over the logarithm of its share of the frames; of a covered pixel that something moved
 over, and of one whose colour stays the same nevertheless, over the share of frames that have it. Gain of a covered pixel that is
 enclosed."""
