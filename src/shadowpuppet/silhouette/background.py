@@ -19,6 +19,9 @@ NOISY, NOISY_SMOOTHING = 3.0, 1.5
 """Noise of a film after that, grey levels of brightness, from which on it is smoothed by more; a camera in good light and web video have
 less."""
 
+UNLIKE = 8.0
+"""Median difference of a frame from the empty scene, over that of the film's better frames, from which on it does not show the scene."""
+
 
 @dataclass(frozen=True, eq=False)
 class Background:
@@ -125,10 +128,12 @@ def film_noise(frames: list[Image], mean: Floats, smoothing: float = SMOOTHING) 
     """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, smoothed, about the smoothed background `mean` (H, W, 3).
 
     It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution): a person covering less
-    than a third of the picture hardly changes it.
+    than a third of the picture hardly changes it. Frames that do not show the scene, black ones for example, are left out.
     """
     differences = [np.abs(smoothed(to_planes(f).astype(np.float32), smoothing) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
-    return np.percentile(np.concatenate(differences), 68, axis=0)
+    typical = np.array([np.median(each[:, 0]) for each in differences])
+    shown = typical <= UNLIKE * max(float(np.percentile(typical, 25)), 1.0)
+    return np.percentile(np.concatenate([each for each, use in zip(differences, shown) if use]), 68, axis=0)
 
 
 class FilmNoise(NamedTuple):
