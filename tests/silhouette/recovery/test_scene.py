@@ -129,3 +129,20 @@ def test_it_needs_a_film(rng):
         recover_scene(empty_shots(rng, scene(rng), 2))
     with pytest.raises(SilhouetteError, match="80 x 60 colour, expected 160 x 120 colour"):
         recover_scene([*empty_shots(rng, scene(rng), 3), np.zeros((60, 80, 3), np.uint8)])
+
+
+def test_a_striped_skirt_belongs_to_the_person_above(rng):
+    """Its stripes stir, and something small in the scene has its colour; what passes over the scene are arms and trunk alone."""
+    wall, colour = scene(rng), np.array((45, 60, 50), np.uint8)
+    wall[5:11, 5:11] = colour
+    frames, masks = film(rng, wall)
+    for n, (frame, mask) in enumerate(zip(frames, masks)):
+        sway = round(1.5 * np.sin(1.7 * n))
+        cloth = np.broadcast_to(colour, frame.shape).copy()
+        cloth[:, sway % 3 :: 3] += np.uint8(12)
+        skirt = np.s_[86:, 62 + sway : 96 + sway]
+        frame[skirt] = shot(rng, cloth)[skirt]
+        mask[skirt] = True
+    always = np.all(masks, axis=0)
+    always[:88] = False
+    assert (recover_scene(frames).covered & always).sum() > 0.9 * always.sum()

@@ -38,6 +38,8 @@ CALM_SHARE = 0.25
 """Least area of a part of such pixels over that of the largest."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
+HEM = 0.05
+"""Height of the lower end of the largest covered part, as a share of its distance from the picture's top."""
 CONNECTED = 0.8
 """Least share of the frames in which another covered part is connected with the largest."""
 MEMBER = 1.2
@@ -140,16 +142,17 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     modes = temporal_modes(planes[:, movement.region], radius_of(movement.noise))
     field = _Field(modes, movement, np.median(planes, axis=0).astype(np.float32), len(planes))
     colour, share = _on_picture(field)
-    labels, ratio = None, np.zeros(0)
+    labels, ratio, below = None, np.zeros(0), np.zeros(0, bool)
     for _ in range(ROUNDS):
-        ratio = _colour_ratio(field, labels)
-        labels = label_pixels(colour, share, _costs(field, ratio), movement.region)[movement.region]
+        below = _below(field, labels)
+        ratio = _colour_ratio(field, labels, below)
+        labels = label_pixels(colour, share, _costs(field, ratio, below), movement.region)[movement.region]
     assert labels is not None
     covered = np.zeros(movement.region.shape, bool)
     covered[movement.region] = labels == COUNT
     passing = (np.abs(planes - _scene(field, labels)) > radius_of(movement.noise)).any(axis=3) & movement.region
     covered = _persons_parts(covered, passing, movement.region, ratio[:, 0])
-    cost = _costs(field, ratio)
+    cost = _costs(field, ratio, below)
     cost[..., COUNT] = np.where(covered, 0, NEVER)
     cost[covered, :COUNT] = NEVER
     return _scene(field, label_pixels(colour, share, cost, movement.region)[movement.region]), covered
@@ -171,28 +174,51 @@ def _on_picture(field: _Field) -> tuple[Floats, Floats]:
     return colour, share
 
 
-def _costs(field: _Field, ratio: NDArray[np.float64]) -> Floats:
-    """The cost (H, W, K + 1) of each label."""
+def _costs(field: _Field, ratio: NDArray[np.float64], below: NDArray[np.bool_]) -> Floats:
+    """The cost (H, W, K + 1) of each label. below: pixels (M,) as `_below` finds them, which cost no more than enclosed ones."""
     region, share = field.movement.region, field.modes.share
     out = np.full((*region.shape, COUNT + 1), NEVER, np.float32)
     out[..., 0] = 0
     scene = COLOUR_WEIGHT * ratio - RARE_COST * np.log(np.maximum(share, 1e-3))
     moved = MOVED_COST + STEADY_COST * share[:, 0]
-    covered = np.where(field.movement.enclosed[region], -ENCLOSED_GAIN, moved)
+    covered = np.where(field.movement.enclosed[region] | below, -ENCLOSED_GAIN, moved)
     seldom = share < (LEAST_SEEN - 0.5) / field.frames
     out[region] = np.column_stack([np.where(seldom, NEVER, scene), covered])
     return out
 
 
-def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.float64]:
-    """Log likelihood ratio (M, K), person to scene, of the modes' colours, by the labels (M,) so far; None: by the still pixels alone."""
+def _below(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.bool_]:
+    """Of the region's pixels (M,) those below the largest covered part by the labels (M,) so far: a person stands on something."""
+    import cv2
+
+    region = field.movement.region
+    if labels is None:
+        return np.zeros(int(region.sum()), bool)
+    covered = np.zeros(region.shape, np.uint8)
+    covered[region] = labels == COUNT
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(covered, connectivity=4)
+    if len(stats) < 2:
+        return np.zeros(int(region.sum()), bool)
+    largest = np.asarray(parts) == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+    last = int(np.flatnonzero(largest.any(axis=1))[-1])
+    below = np.zeros(region.shape, bool)
+    below[last + 1 :] = largest[int((1 - HEM) * last) : last + 1].any(axis=0)
+    return below[region]
+
+
+def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None, below: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Log likelihood ratio (M, K), person to scene, of the modes' colours, by the labels (M,) so far; None: by the still pixels alone.
+
+    Uncovered pixels `below` (M,) are no examples of the scene: they may be the legs.
+    """
     modes = field.modes
     still = field.still[~field.movement.region]
     if labels is None:
         share = known(modes.colour, colour_model(still, np.ones(len(still))))
         return np.where(share > UNKNOWN, -0.5 * np.log(np.maximum(share, UNKNOWN) / UNKNOWN), 0.5).clip(-GREATEST_RATIO, GREATEST_RATIO)
     uncovered = np.flatnonzero(labels < COUNT)
-    scene = np.concatenate([still, modes.colour[uncovered, labels[uncovered]]])
+    sure = np.flatnonzero((labels < COUNT) & ~below)
+    scene = np.concatenate([still, modes.colour[sure, labels[sure]]])
     passing = modes.share[uncovered]
     passing[np.arange(len(uncovered)), labels[uncovered]] = 0
     calm = _calm(field, labels)
