@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.silhouette import learn_background
@@ -113,3 +113,25 @@ def test_a_noisy_film_keeps_its_silhouettes():
     film = [filmed(scene, 1, 0.25, 20, seed=k) for k in range(4)]
     mask = learn_background([filmed(scene, 1, seed=k) for k in range(6)], film=film)(film[0])
     assert (mask & exact).sum() > 0.93 * (mask | exact).sum()
+
+
+@given(seed=st.integers(0, 100), gain=st.floats(0.4, 2.5), noise=st.floats(0, 20))
+@settings(max_examples=25, deadline=None)
+def test_modes_are_those_of_the_plain_computation(seed, gain, noise):
+    rng = np.random.default_rng(seed)
+    scene = rng.integers(0, 256, (60, 80, 3)).astype(np.uint8)
+    frame = np.clip(gain * scene + rng.normal(0, noise, scene.shape), 0, 255).astype(np.uint8)
+    plain = [_plain_mode(before, after) for before, after in zip(scene.reshape(-1, 3).T, frame.reshape(-1, 3).T)]
+    assert Light(scene).gains(frame) == pytest.approx(np.exp(plain), rel=1e-12)
+
+
+def _plain_mode(before, after):
+    use = (before > 40) & (before < 245) & (after > 20) & (after < 245)
+    assume(use.mean() >= 0.25)
+    logs = np.log(np.maximum(np.arange(256), 1)).astype(np.float32)
+    bins = np.clip(np.rint((logs[after[use]] - logs[before[use]]) / np.float32(0.008)).astype(int) + 256, 0, 511)
+    middle = int(np.argmax(np.convolve(np.bincount(bins, minlength=512), np.ones(11), "valid"))) + 5
+    for _ in range(5):
+        near = (bins >= round(middle) - 15) & (bins <= round(middle) + 15)
+        middle = bins[near].mean()
+    return (middle - 256) * 0.008

@@ -1,4 +1,4 @@
-"""Kernels over points: comparison with a reduced picture, one by one and for many shifts."""
+"""Kernels: points compared with a reduced picture, one by one and for many shifts; modes of log gains."""
 
 from __future__ import annotations
 
@@ -43,3 +43,36 @@ def shift_costs(xy, value, picture, reach, cap):
                     number += 1
             out[dy + reach, dx + reach] = total / max(number, 1)
     return out
+
+
+@compiled(nogil=True)
+def modes(pixels, levels, informative, log, bounds, width, least, window, shifts, sums, out):
+    """Fill `out` (C,) with the mode of each channel's log gain, in bins of a histogram, by mean shift from its fullest part; not a number
+    where less than a share `least` of the pixels show a gain.
+
+    pixels (n, C), uint8: of the frame; levels (n, C): log levels of the scene; informative (n, C): whether the scene's pixel may show a
+    gain, which the frame's does if it lies between the two `bounds`; log (256,): logarithms of grey levels; width: of a bin; window: half
+    width, in bins, of the mean shift, and its number of steps, `shifts`; sums (2, bins + 1): work space.
+    """
+    total, moment, bins = sums[0], sums[1], sums.shape[1] - 1
+    for c in range(pixels.shape[1]):
+        sums[:] = 0
+        used = 0
+        for n in range(pixels.shape[0]):
+            level = pixels[n, c]
+            if informative[n, c] and bounds[0] < level < bounds[1]:
+                used += 1
+                place = int(np.rint((log[level] - levels[n, c]) / width)) + bins // 2
+                total[min(max(place, 0), bins - 1) + 1] += 1
+        if used < least * pixels.shape[0]:
+            out[c] = np.nan
+            continue
+        for k in range(bins):
+            moment[k + 1] = moment[k] + k * total[k + 1]
+            total[k + 1] += total[k]
+        narrow = window // 3
+        middle = float(np.argmax(total[2 * narrow + 1 :] - total[: -2 * narrow - 1]) + narrow)
+        for _ in range(shifts):
+            first, last = max(0, round(middle) - window), min(bins, round(middle) + window + 1)
+            middle = (moment[last] - moment[first]) / (total[last] - total[first])
+        out[c] = middle - bins // 2

@@ -61,7 +61,7 @@ class Light:
         The mode is the background's even if the person covers nearly half of the picture. A channel in which too few pixels
         show a gain, such as red in a blue room, has the mean of the others; all have 1 if no channel shows one.
         """
-        return self._gains(*self._ratios(image))
+        return self._gains(self._pixels(image))
 
     def normalised(self, image: Image) -> Image:
         """The picture divided by its gains; the picture itself if they are negligible.
@@ -70,9 +70,9 @@ class Light:
         """
         import cv2
 
-        ratios, informative = self._ratios(image)
-        gains = self._gains(ratios, informative)
-        surface = self._surface(ratios, informative, gains)
+        pixels = self._pixels(image)
+        gains = self._gains(pixels)
+        surface = self._surface(pixels, gains)
         if surface is None and np.abs(np.log(gains)).max() < NEGLIGIBLE:
             return image
         table = np.clip(np.rint(np.arange(256)[:, None] / gains), 0, 255).astype(np.uint8)
@@ -89,29 +89,37 @@ class Light:
 
         The terms are 1, x, y, x^2, x y, y^2, with x and y from -1 to 1 across the picture's width and its height.
         """
-        ratios, informative = self._ratios(image)
-        return self._surface(ratios, informative, self._gains(ratios, informative))
+        pixels = self._pixels(image)
+        return self._surface(pixels, self._gains(pixels))
 
-    def _ratios(self, image: Image) -> tuple[Floats, NDArray[np.bool_]]:
-        """Log ratios of picture to scene at the sampled pixels (n, C), and whether each shows a gain (n, C)."""
+    def _pixels(self, image: Image) -> Image:
+        """The sampled pixels (n, C) of a picture."""
+        return image[:: self._step, :: self._step].reshape(self._sampled[0].shape)
+
+    def _ratios(self, pixels: Image, some: slice = slice(None)) -> tuple[Floats, NDArray[np.bool_]]:
+        """Log ratios of picture to scene at some of its sampled pixels (n, C), and whether each shows a gain (n, C)."""
         levels, informative = self._sampled
-        after = image[:: self._step, :: self._step].reshape(levels.shape)
-        return LOG[after] - levels, informative & (after > DARK // 2) & (after < BRIGHT)
+        after = pixels[some]
+        return LOG[after] - levels[some], informative[some] & (after > DARK // 2) & (after < BRIGHT)
 
-    def _gains(self, ratios: Floats, informative: NDArray[np.bool_]) -> NDArray[np.float64]:
-        bins = np.rint(ratios / BIN).astype(np.intp) + BINS // 2
-        logs = np.array([_mode(bins[use, c]) if use.mean() >= MIN_SHARE else np.nan for c, use in enumerate(informative.T)])
+    def _gains(self, pixels: Image) -> NDArray[np.float64]:
+        from shadowpuppet.silhouette.correction._kernels import modes
+
+        logs, sums = np.empty(pixels.shape[1]), np.zeros((2, BINS + 1))
+        modes(pixels, *self._sampled, LOG, (DARK // 2, BRIGHT), np.float32(BIN), MIN_SHARE, WINDOW, SHIFTS, sums, logs)
         known = np.isfinite(logs)
-        return np.exp(np.where(known, logs, logs[known].mean() if known.any() else 0.0))
+        return np.exp(np.where(known, BIN * logs, BIN * logs[known].mean() if known.any() else 0.0))
 
-    def _surface(self, ratios: Floats, informative: NDArray[np.bool_], gains: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def _surface(self, pixels: Image, gains: NDArray[np.float64]) -> NDArray[np.float64] | None:
         some, logs = slice(None, None, SPARSE), np.log(gains).astype(np.float32)
-        terms, few, use = self._terms, ratios[some] - logs, informative[some]
+        (few, use), terms = self._ratios(pixels, some), self._terms
+        few = few - logs
         if use.sum() < 50 * len(gains):
             return None
         quick = _fitted(terms[some], few, use, np.zeros(6), 1)
         if np.ptp(NODE_TERMS @ quick) < 2 * UNEVEN:
             return None
+        ratios, informative = self._ratios(pixels)
         beyond = ratios - logs
         shared = _fitted(terms, beyond, informative, _fitted(terms[some], few, use, quick, ROUNDS), 2)
         beyond -= (terms @ shared.astype(np.float32))[:, None]
@@ -187,15 +195,3 @@ def _fitted(terms: Floats, beyond: Floats, informative: NDArray[np.bool_], start
 
 LOG = np.log(np.maximum(np.arange(256), 1)).astype(np.float32)
 """Logarithm of each grey level."""
-
-
-def _mode(bins: NDArray[np.intp]) -> float:
-    """The mode of log gains, given as histogram bins; by mean shift from the fullest part of the histogram."""
-    counts = np.bincount(np.clip(bins, 0, BINS - 1), minlength=BINS).astype(float)
-    total, moment = (np.concatenate([[0], np.cumsum(values)]) for values in (counts, counts * np.arange(BINS)))
-    narrow = WINDOW // 3
-    middle = float(np.argmax(total[2 * narrow + 1 :] - total[: -2 * narrow - 1]) + narrow)
-    for _ in range(SHIFTS):
-        first, last = max(0, round(middle) - WINDOW), min(BINS, round(middle) + WINDOW + 1)
-        middle = (moment[last] - moment[first]) / (total[last] - total[first])
-    return (middle - BINS // 2) * BIN
