@@ -26,10 +26,10 @@ LEAST_SEEN = 2
 """Least number of frames that show the scene at a pixel."""
 ROUNDS = 3
 """Times that pixels are labelled, each but the first with colour models from the labels before."""
-RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN = 0.3, 0.4, 1.5, 0.3
+RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN, BELOW_COST = 0.3, 0.4, 1.5, 0.3, 0.3
 """Costs of labels: of a scene that is seen rarely, over the logarithm of its share of the frames; of a covered pixel that something moved
 over, and of one whose colour stays the same nevertheless, over the share of frames that have it. Gain of a covered pixel that is
-enclosed."""
+enclosed, and cost of one below the trunk."""
 COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
 """Weight of a colour's log likelihood ratio, and its limit."""
 CALM_WEIGHT = 0.02
@@ -38,8 +38,8 @@ CALM_SHARE = 0.25
 """Least area of a part of such pixels over that of the largest."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
-HEM = 0.05
-"""Height of the lower end of the largest covered part, as a share of its distance from the picture's top."""
+WAIST = 20
+"""Rows of the largest covered part over those, above its centre, in which its width is that of the trunk."""
 CONNECTED = 0.8
 """Least share of the frames in which another covered part is connected with the largest."""
 MEMBER = 1.2
@@ -175,20 +175,20 @@ def _on_picture(field: _Field) -> tuple[Floats, Floats]:
 
 
 def _costs(field: _Field, ratio: NDArray[np.float64], below: NDArray[np.bool_]) -> Floats:
-    """The cost (H, W, K + 1) of each label. below: pixels (M,) as `_below` finds them, which cost no more than enclosed ones."""
+    """The cost (H, W, K + 1) of each label. below: pixels (M,) as `_below` finds them, in which the person costs less."""
     region, share = field.movement.region, field.modes.share
     out = np.full((*region.shape, COUNT + 1), NEVER, np.float32)
     out[..., 0] = 0
     scene = COLOUR_WEIGHT * ratio - RARE_COST * np.log(np.maximum(share, 1e-3))
     moved = MOVED_COST + STEADY_COST * share[:, 0]
-    covered = np.where(field.movement.enclosed[region] | below, -ENCLOSED_GAIN, moved)
+    covered = np.where(field.movement.enclosed[region], -ENCLOSED_GAIN, np.where(below, BELOW_COST, moved))
     seldom = share < (LEAST_SEEN - 0.5) / field.frames
     out[region] = np.column_stack([np.where(seldom, NEVER, scene), covered])
     return out
 
 
 def _below(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.bool_]:
-    """Of the region's pixels (M,) those below the largest covered part by the labels (M,) so far: a person stands on something."""
+    """Of the region's pixels (M,) those below the trunk, which is the middle of the largest covered part by the labels (M,) so far."""
     import cv2
 
     region = field.movement.region
@@ -200,9 +200,10 @@ def _below(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.bool_]:
     if len(stats) < 2:
         return np.zeros(int(region.sum()), bool)
     largest = np.asarray(parts) == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
-    last = int(np.flatnonzero(largest.any(axis=1))[-1])
+    rows = largest.sum(axis=1)
+    middle = int(np.average(np.arange(len(rows)), weights=rows))
     below = np.zeros(region.shape, bool)
-    below[last + 1 :] = largest[int((1 - HEM) * last) : last + 1].any(axis=0)
+    below[middle:] = largest[middle - np.count_nonzero(rows) // WAIST : middle + 1].any(axis=0)
     return below[region]
 
 
