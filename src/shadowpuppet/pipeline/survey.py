@@ -79,7 +79,7 @@ def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
     return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
 
 
-def _told_of_clutter(left_out: Sequence[str]) -> list[str]:
+def _clutter_warnings(left_out: Sequence[str]) -> list[str]:
     if not left_out:
         return []
     return [f"{'; '.join(left_out)}: taken for clutter, not for the person, and left out of the silhouettes"]
@@ -124,7 +124,7 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    doubts = (*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *_told_of_clutter(look.left_out))
+    doubts = (*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *_clutter_warnings(look.left_out))
     return replace(look, doubts=(*doubts, *look.quality.warnings()))
 
 
@@ -233,7 +233,7 @@ def _rig_doubts(look: RigLook) -> list[str]:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
                           "try another --silhouette.method, or --masks")
-        warnings = (*_poor(camera.condition), *_told_of_clutter(camera.left_out), *camera.quality.warnings())
+        warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *camera.quality.warnings())
         doubts += [f"camera {camera.name!r}: {warning}" for warning in warnings]
         doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
     return doubts

@@ -7,7 +7,7 @@ the person. `find_clutter` finds them in a sample of masks; `Clutter.removed` ta
    forearm with its hand (40 cm). No part of a person is that thin and that long.
 2. A thing: a part of its own that is in nearly every mask at the same pixels, and that the person has stood well aside of.
 
-Thick things that the person never leaves, such as the seat below a person who sits, cannot be told from the person by this.
+Thick things that the person never leaves, such as the seat below a person who sits, cannot be distinguished from the person by this.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The condition of a film: noise, compression, light and movement are told apart, and a good film is not accused."""
+"""The condition of a film: noise, compression, light and movement are distinguished, and a good film is not accused."""
 
 from __future__ import annotations
 

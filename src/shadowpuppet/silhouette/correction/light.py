@@ -33,7 +33,7 @@ NEGLIGIBLE = 0.02
 UNEVEN = 0.04
 """Log gain beyond the mean, anywhere in the picture, from which on light counts as uneven."""
 SPARSE = 4
-"""Of so many sampled pixels one is used to find out whether light is uneven."""
+"""Step over the sampled pixels in the test whether light is uneven."""
 ROUNDS = 6
 """Weighted fits of a surface to some of the sampled pixels; the weights of each are by the differences to the last."""
 SPREAD, PERSON_SPREAD = 0.03, 0.15

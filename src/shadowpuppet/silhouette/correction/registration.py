@@ -22,7 +22,7 @@ Homography = NDArray[np.float64]
 WIDTH = 160
 """Width of the reduced picture, pixels, about."""
 BLOCKS = 8, 6
-"""Number of blocks, across and down, from each of which points are taken."""
+"""Number of blocks across and down; points are taken from each."""
 POINTS = 40
 """Greatest number of points in a block."""
 MIN_SLOPE = 2.5
@@ -55,7 +55,7 @@ STEPS = 8
 ROUGH, SETTLED = 0.3, 0.05
 """Movement of a step, pixels of the frame, at which the refinement in half of the reduced picture, and in all of it, ends."""
 SEARCHED = 3
-"""Of so many points one is compared when shifts are searched."""
+"""Step over the points in the search of shifts."""
 SHIFTS = np.zeros((8, 3))
 SHIFTS[2, 0] = SHIFTS[5, 1] = 1
 SHIFTS[1, 2], SHIFTS[3, 2] = -1, 1

@@ -19,9 +19,9 @@ from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, temp
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
 WORKED_WIDTH = 320
-"""Greatest width, pixels, of the pictures in which the scene is told from the person; its own picture has the frames' size."""
+"""Greatest width, pixels, of the pictures in which scene and person are separated; the scene's own picture has the frames' size."""
 LEAST_FRAMES = 3
-"""Least number of frames: with fewer, what moved cannot be told from what did not."""
+"""Least number of frames: with fewer, moving and still pixels cannot be distinguished."""
 LEAST_SEEN = 2
 """Least number of frames that show the scene at a pixel."""
 ROUNDS = 3
