@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
 from shadowpuppet.silhouette.correction.frame_correction import Correction
+from shadowpuppet.silhouette.correction.registration import Homography
 from shadowpuppet.silhouette.segmenter import Segmenter
 
 # Limits of the warnings. Films in good light have a noise of 0.9 to 1.3; sensor noise of sd 15 leaves 5.8, H.264 at crf 32 leaves 3.0.
@@ -95,8 +96,9 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     """The condition of a film's sampled frames, in `runs` of consecutive ones, each with its time (s) and picture (H, W, 3) or (H, W)."""
     correction = segmenter.correction or Correction(np.zeros(segmenter.background.image_shape, np.uint8))
     frames = [frame for run in runs for frame in run]
-    corrected = [[correction(image).image for _, image in run] for run in runs]
-    states = [_state(correction, image) for _, image in frames]
+    each = [[correction(image) for _, image in run] for run in runs]
+    corrected = [[frame.image for frame in run] for run in each]
+    states = [_state(correction, image, frame.movement) for (_, image), frame in zip(frames, itertools.chain(*each))]
     gains = np.concatenate([state.gains for state in states])
     moved = np.array([state.moved for state in states])
     still = np.flatnonzero(moved == 0)
@@ -111,10 +113,9 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     )  # fmt: skip
 
 
-def _state(correction: Correction, image: Image) -> _State:
+def _state(correction: Correction, image: Image, movement: Homography | None) -> _State:
     moved, matched = 0.0, True
     if correction.registration is not None:
-        movement = correction.registration.movement(image)
         matched = correction.registration.matches(image, movement)
         if movement is not None:
             moved, image = correction.registration.pixels(movement), correction.registration.undone(image, movement)[0]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from shadowpuppet.silhouette.background import Image
 from shadowpuppet.silhouette.cleanup import Window
 from shadowpuppet.silhouette.correction.light import Light
-from shadowpuppet.silhouette.correction.registration import Gap, Registration
+from shadowpuppet.silhouette.correction.registration import Gap, Homography, Registration
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 
@@ -20,6 +20,8 @@ class Corrected(NamedTuple):
     """Of shape (H, W, 3) or (H, W)."""
     gap: Gap | None
     """Pixels that a moved camera does not show; None if it stands still."""
+    movement: Homography | None
+    """The camera's movement since the empty scene; None if it stands still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,4 +57,4 @@ class Correction:
             blank = self.scene.copy()
             blank[self.region] = image[self.region]
             image = blank
-        return Corrected(image, gap)
+        return Corrected(image, gap, movement)
