@@ -136,7 +136,7 @@ class Session(LiveSession):
         self._learnt(self.scene, self._recent)
         self.fit = fit
         source = str(self.options.person) if self.options.person else "proportions, refined on who stood still"
-        self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source))
+        self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source, 1 / self.timing.interval))
         return Outcome(self._view(images))
 
     def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:

@@ -22,14 +22,18 @@ from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import FALLBACK_RATE
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject
+from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
+from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.unexplained import look_beside, looks_in
 from shadowpuppet.video import Image
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
@@ -50,6 +54,8 @@ POOR = 0.75
 """Overlap with the film's first silhouette below which the body is in doubt; bodies that fit have 0.85 to 0.95."""
 LONGEST_REFERENCE = 60
 """Greatest number of frames read from a reference's film."""
+MOST = 0.75
+"""Share of the first masks in which a part that the body does not explain must be."""
 LOOKED_FOR_IN = 12
 """Number of masks of the first seconds used to fit a person without references."""
 
@@ -63,11 +69,24 @@ class MonocularSubject(TrackedSubject):
     tracker: MonocularTracker
 
     @classmethod
-    def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str) -> MonocularSubject:
-        """A subject from a fit; `source`: where the sizes come from, in words."""
+    def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str, rate: float) -> MonocularSubject:
+        """A subject from a fit, for a film of `rate` frames/s; `source`: where the sizes come from, in words."""
         picture = fit.guess.picture(camera, settings.body)
         person = Person(fit.guess.sizes, round(fit.guess.height, 4), source)
-        return cls(body=picture.body, person=person, fit=fit, tracker=MonocularTracker(picture, settings), summary={})
+        tracker = MonocularTracker(picture, settings, looks=looks_in(settings.patience, rate))
+        return cls(body=picture.body, person=person, fit=fit, tracker=tracker, summary={})
+
+    def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
+        """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""
+        unexplained, looks = None, max(1, round(MOST * len(masks)))
+        pose = None
+        for mask in masks:
+            pose = search_pose(self.picture, mask).pose
+            legs = self.picture.legs(pose) if self.tracker.settings.ignore_legs else None
+            unexplained = look_beside(unexplained, mask, self.picture.mask(pose), looks, legs)
+        if pose is None or unexplained is None or not unexplained.left_out.any():
+            return None
+        return BesideBody(unexplained.left_out, self.picture.mask(pose) | self.picture.legs(pose))
 
     @property
     def picture(self) -> Picture:
@@ -103,6 +122,7 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     """Fit the person's sizes and place, and make the tracker. Raises `TrackingError` if no person is found, `RecordingError` if a reference
     shows another posture, or `FormatError`."""
     for_fit, for_start = rng.spawn(2)
+    rate = survey.look.rate if np.isfinite(survey.look.rate) else FALLBACK_RATE
     (footage,), (clean,), masks = survey.rig.footage, survey.clean, [mask for (mask,) in survey.first.masks if mask is not None]
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
@@ -110,14 +130,15 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
         fit, source = _fitted(footage, masks, clean, options, for_fit)
     except TrackingError as error:
         raise TrackingError(f"{footage.recording.path}: {error}") from None
-    subject = MonocularSubject.of(fit, footage.camera, options.tracker, source)
+    subject = MonocularSubject.of(fit, footage.camera, options.tracker, source, rate / options.every)
     start = subject.tracker.start(for_start, masks[0]).overlap
     other = clean.segmenter.key if clean is not survey.silhouettes[0] and clean.segmenter is not None else None
     guess = fit.guess
     summary = {"source": source, "silhouettes": other, "height": float(guess.height), "distance": float(guess.distance),
                "elevation": float(guess.elevation), "overlaps": dict(fit.overlaps), "start_overlap": start,
                "sizes": dict(zip(guess.sizes.names(), guess.sizes.to_array().tolist()))}
-    return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start)))
+    beside = subject.beside_in(_few(masks)) if options.tracker.patience else None
+    return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start)), beside=(beside,))
 
 
 def _doubts(fit: SizeFit, source: str, start: float) -> list[str]:

@@ -27,9 +27,11 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.subject import Observed, TrackedSubject
+from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.unexplained import Unexplained, looks_in, settled
 from shadowpuppet.video import Image
 
 
@@ -118,12 +120,25 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
         assert isinstance(sizes, BoneSizes)
         spread = size_deviations(sizes, shown=False)
     library = known.poses if len(known.poses) else None
-    person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library)
+    person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
+                            len(first) // 2 if settings.patience else 0)
+    looks = looks_in(settings.patience, rate)
     prior = known.prior if settings.method == "hybrid" else None
     summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                                "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull,
-                            tracker=MultiviewTracker(person.body, tuple(cameras), settings, prior, library))
+    beside = person.unexplained
+    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks,
+                               known=tuple(settled(each, looks) for each in beside))
+    return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
+                            beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
+                                         for each, picture, camera in zip(beside, tracker.views.pictures, cameras)))
+
+
+def _beside(unexplained: Unexplained | None, body: Mask, size: tuple[int, int]) -> BesideBody | None:
+    """What is beside a body, drawn at half size (H, W), in masks of a size (width, height); None if nothing is."""
+    if unexplained is None or not unexplained.left_out.any():
+        return None
+    return BesideBody(*(mask.repeat(2, 0).repeat(2, 1)[: size[1], : size[0]] for mask in (unexplained.left_out, body)))
 
 
 def check_body(options: Options) -> None:

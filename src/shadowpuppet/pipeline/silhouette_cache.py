@@ -84,6 +84,10 @@ class SilhouetteCache:
             self._survey, self._film = make(rig, options), film
         return self._survey
 
+    def keep(self, survey: Survey) -> None:
+        """Keep another survey of the same film, whose silhouettes differ."""
+        self._survey, self._store = survey, MaskStore(self.limit)
+
     def is_complete(self, options: Options) -> bool:
         """Whether all silhouettes of the surveyed recording are kept and can be used; not with an overlay, which needs the images."""
         return self._store.complete and not options.overlay

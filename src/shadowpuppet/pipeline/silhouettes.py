@@ -12,6 +12,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
+from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
 from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.video import Image
 
@@ -30,6 +31,10 @@ class Silhouettes:
     """What is left out of every mask, because it is not the person."""
     recovered: RecoveredScene | None = None
     """The empty scene if it was recovered from the film."""
+    added: AddedParts | None = None
+    """What was added to the empty scene, and belongs to the background since."""
+    before: Segmenter | None = None
+    """The segmenter without what was added."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
@@ -41,9 +46,18 @@ class Silhouettes:
 
     def elsewhere(self, frame: CameraFrame) -> Mask:
         """The mask (H, W) in a picture that is none of the film's, so that what the person always covers there need not be covered."""
-        if self.segmenter is None or self.segmenter.covered is None:
+        segmenter = self.before or self.segmenter
+        if segmenter is None or (segmenter.covered is None and self.before is None):
             return self(frame)
-        return replace(self, segmenter=replace(self.segmenter, covered=None))(frame)
+        return replace(self, segmenter=replace(segmenter, covered=None), before=None)(frame)
+
+    def still_parts(self, frames: Sequence[CameraFrame], masks: Sequence[Mask]) -> StillParts | None:
+        """What never changes in frames and their masks (H, W), in the light of the empty scene; None where there is no empty scene, or the
+        frames are few."""
+        if self.segmenter is None or self.recovered is not None:
+            return None
+        correction = self.segmenter.correction
+        return find_still([frame.image if correction is None else correction(frame.image).image for frame in frames], masks)
 
     def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
         """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
@@ -73,10 +87,12 @@ class Silhouettes:
         return out
 
 
-def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recovered: RecoveredScene | None = None) -> Silhouettes:
+def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recovered: RecoveredScene | None = None,
+                      added: AddedParts | None = None) -> Silhouettes:
     """Silhouettes with a learnt background, or the ready ones. Raises `SilhouetteError` or `SettingsError`.
 
-    recovered: the empty scene as it was recovered from the same film before; None to do so where the recording has none.
+    recovered: the empty scene as it was recovered from the same film before; None to do so where the recording has none. added: what is
+    to be put into the pictures of the empty scene.
     """
     if options.masks:
         return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes", None, footage.region)
@@ -86,9 +102,12 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recove
     else:
         recovered = recovered or _recovered(footage, images)
         scene, source = iter([recovered.picture]), f"the film itself (recovered from {recovered.frames} frames)"
+    if added is not None:
+        scene = added.into(scene)
     covered = recovered.covered if recovered is not None and recovered.covered.any() else None
     segmenter = learn_background(scene, options.silhouette, film=images, region=footage.region, covered=covered)
-    return Silhouettes(source, segmenter, footage.region, recovered=recovered)
+    before = None if added is None else learn_silhouettes(footage, sample, options).segmenter
+    return Silhouettes(source, segmenter, footage.region, recovered=recovered, added=added, before=before)
 
 
 def _recovered(footage: Footage, sampled: list[Image]) -> RecoveredScene:
@@ -122,7 +141,7 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
         return tracked
-    clean_ones = learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered)
+    clean_ones = learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered, tracked.added)
     return replace(clean_ones, clutter=tracked.clutter)
 
 

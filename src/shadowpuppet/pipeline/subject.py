@@ -19,6 +19,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.video import Image
 
 
@@ -66,6 +67,8 @@ class TrackedSubject(ABC):
     """How the person was fitted, as plain values: the entry `person` of look.json."""
     doubts: tuple[str, ...] = ()
     """Doubts about the fit, a sentence each."""
+    beside: tuple[BesideBody | None, ...] = ()
+    """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
 
     @abstractmethod
     def observe(self, masks: Sequence[Mask | None]) -> Any:

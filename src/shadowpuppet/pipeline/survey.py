@@ -22,6 +22,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.added import AddedParts, SceneHint, always_alike, find_added, find_nobody
 from shadowpuppet.silhouette.correction.condition import FilmCondition, film_condition
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
@@ -34,6 +35,8 @@ OPENING, OPENED = 2.0, 40
 """With several cameras: duration (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
 BRIEFLY = 240
 """With several cameras: greatest number of frames read of each film if its background is not made from the film."""
+MIN_PERSON = 0.2
+"""Least area of the silhouettes without what was added to the scene, over that with it: otherwise it was the person."""
 RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
 
@@ -51,11 +54,12 @@ class FilmSurvey(NamedTuple):
     """The fields that `Look` and `CameraLook` have in common."""
 
 
-def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) -> FilmSurvey:
-    """Examine one camera's first `longest` frames. Raises a `ShadowPuppetError` if something cannot be used."""
+def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hint: SceneHint | None = None) -> FilmSurvey:
+    """Examine one camera's first `longest` frames. `hint`: what is known of its scene from a first look and fit. Raises a
+    `ShadowPuppetError` if something cannot be used."""
     sample = take_sample(footage, options.masks, longest)
-    silhouettes = learn_silhouettes(footage, sample, options)
-    runs = [[silhouettes(frame) for frame in run] for run in sample.runs]
+    silhouettes, runs = _made(footage, sample, options, None if hint is None else hint.added)
+    silhouettes, runs = _with_added(footage, sample, silhouettes, runs, options, hint)
     silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
     if silhouettes.clutter is not None:
         runs = [[silhouettes.clutter.removed(mask) for mask in run] for run in runs]
@@ -72,9 +76,33 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
     })  # fmt: skip
 
 
+def _made(footage: Footage, sample: Sample, options: Options, added: AddedParts | None) -> tuple[Silhouettes, list[list[Mask]]]:
+    """Silhouettes, given what was added to the empty scene, and their masks of the sample's runs."""
+    silhouettes = learn_silhouettes(footage, sample, options, added=added)
+    return silhouettes, [[silhouettes(frame) for frame in run] for run in sample.runs]
+
+
+def _with_added(footage: Footage, sample: Sample, silhouettes: Silhouettes, runs: list[list[Mask]], options: Options,
+                hint: SceneHint | None) -> tuple[Silhouettes, list[list[Mask]]]:
+    """Silhouettes and masks with what more was added to the scene taken for background; as they are if nothing was."""
+    masks, beside = [mask for run in runs for mask in run], None if hint is None else hint.beside
+    if beside is None and not always_alike(masks):
+        return silhouettes, runs
+    parts = silhouettes.still_parts(sample.frames, masks)
+    if parts is None:
+        return silhouettes, runs
+    added = find_nobody(parts, masks) if beside is None else find_added(parts, beside)
+    if added is None:
+        return silhouettes, runs
+    changed, found = _made(footage, sample, options, added.joined(silhouettes.added))
+    area, was = (float(np.median([np.count_nonzero(mask) for run in each for mask in run])) for each in (found, runs))
+    return (changed, found) if area >= MIN_PERSON * was else (silhouettes, runs)
+
+
 def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
     """What is left out of the silhouettes, in words and the film's pixels."""
     parts = silhouettes.clutter.parts if silhouettes.clutter is not None else ()
+    parts = parts if silhouettes.added is None else (*parts, silhouettes.added)
     (width, height), full = footage.camera.size, footage.view.camera.size
     return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
 
@@ -93,10 +121,10 @@ def brief_length(footage: Footage, options: Options) -> int:
 # One camera
 
 
-def survey_camera(rig: Rig, options: Options) -> Survey:
-    """Examine a recording of one camera. Raises a `ShadowPuppetError` if something cannot be used."""
+def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (SceneHint(),)) -> Survey:
+    """Examine a recording of one camera; `hints` as in `survey_film`. Raises a `ShadowPuppetError` if something cannot be used."""
     footage = rig.footage[0]
-    film = survey_film(footage, options)
+    film = survey_film(footage, options, hint=hints[0])
     look = _look(footage, film)
     if look.refusal:
         return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
@@ -175,10 +203,14 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
 # Several cameras
 
 
-def survey_rig(rig: Rig, options: Options) -> Survey:
-    """Examine each camera's film, and the first seconds of all together. Raises a `ShadowPuppetError` if something cannot be used."""
+def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> Survey:
+    """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
+    `ShadowPuppetError` if something cannot be used."""
+    def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
+        return survey_film(footage, options, brief_length(footage, options), hint)
+
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
-        films = list(pool.map(lambda footage: survey_film(footage, options, brief_length(footage, options)), rig.footage))
+        films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
     silhouettes = tuple(film.silhouettes for film in films)
     first = _first_sets(rig, silhouettes, options.masks)
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan

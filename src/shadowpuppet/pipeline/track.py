@@ -36,10 +36,15 @@ from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
+from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
+
+
+LOOKS_AGAIN = 3
+"""Greatest number of times that a recording is surveyed again because of what the fitted body leaves unexplained."""
 
 
 class Kind(NamedTuple):
@@ -49,7 +54,8 @@ class Kind(NamedTuple):
     """Name of the method; {} stands for the number of cameras."""
     settings: str
     """Name of the field of `Options` with the tracker's settings."""
-    survey: Callable[[Rig, Options], Survey]
+    survey: Callable[..., Survey]
+    """Examines a rig with options, and, given what a fitted body left unexplained in each camera's silhouettes, looks for it in the scene."""
     fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject]
     """Measures the person and makes the tracker."""
     look_fits: bool
@@ -124,7 +130,24 @@ def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, ca
     if survey.look.refusal is not None:
         return Prepared(survey, None, survey.look)
     subject = kind.fit(rng, survey, options)
+    for _ in range(LOOKS_AGAIN):
+        again = _looked_again(survey, subject, options, kind)
+        if again is None:
+            break
+        survey, subject = again, kind.fit(rng, again, options)
+        if cache is not None:
+            cache.keep(survey)
     return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
+
+
+def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kind: Kind) -> Survey | None:
+    """The survey in which what the fitted body leaves unexplained, and never moves, belongs to the scene; None if there is no such thing."""
+    if all(each is None for each in subject.beside):
+        return None
+    hints = tuple(SceneHint(beside, each.added) for beside, each in zip(subject.beside, survey.silhouettes, strict=True))
+    again = kind.survey(survey.rig, options, hints)
+    more = any(new.added is not old.added for new, old in zip(again.silhouettes, survey.silhouettes))
+    return again if more and again.look.refusal is None else None
 
 
 def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None) -> Summary:

@@ -33,13 +33,15 @@ class Observation:
         return cls(silhouette | skipped, skipped, also)
 
     @classmethod
-    def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array, also: Cost | None = None) -> Observation:
-        """The observation of a mask (H, W); its pixels in the region where the legs of `pose` (D,) may be are ignored.
+    def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array, also: Cost | None = None,
+                     ignore: ArrayLike | None = None) -> Observation:
+        """The observation of a mask (H, W); its pixels in the region where the legs of `pose` (D,) may be are ignored, and those of `ignore`
+        (H, W).
 
         An upper body ends at the waist. Empty pixels there still count, so that the waist does not grow over them.
         """
-        silhouette = pack(mask)
-        return cls(silhouette, silhouette & picture.leg_bits(pose), also)
+        seen = cls.of(mask, ignore, also)
+        return cls(seen.silhouette, seen.ignore | (seen.silhouette & picture.leg_bits(pose)), also)
 
     @property
     def area(self) -> int:

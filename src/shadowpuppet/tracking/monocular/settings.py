@@ -71,6 +71,8 @@ class MonocularSettings:
     """Keep joint limits."""
     recover: bool = True
     """Search for the person again after a loss or an absence. The papers' filters continue from their last particles."""
+    patience: NonNegative = 1.0
+    """Seconds after which a part of the silhouette that the body does not explain, such as a chair, is left out; 0: never."""
     ignore_legs: bool = True
     """Leave the silhouette below the waist, where the model has no legs, out of the cost; no effect for a whole body."""
 
@@ -89,6 +91,7 @@ PRESETS: dict[str, dict] = {
         "estimate": "best",
         "motion_weight": 0.0,
         "posture_weight": 0.0,
+        "patience": 0.0,
     },
 }
 """Named settings: "default", the best known, and "liu2011", the filter of Table I; values that a preset leaves out are the default's."""

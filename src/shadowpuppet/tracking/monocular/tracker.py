@@ -21,6 +21,7 @@ from shadowpuppet.tracking.recovery import settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
 from shadowpuppet.tracking.status import ABSENT_AREA, status_of
+from shadowpuppet.tracking.unexplained import Unexplained, look_beside, without
 
 
 class State(NamedTuple):
@@ -36,6 +37,8 @@ class State(NamedTuple):
     """Intersection over union of the drawn estimate and the silhouette, legs left out."""
     status: str
     """`tracked`, `uncertain`, `lost` or `absent`."""
+    unexplained: Unexplained | None = None
+    """What the silhouettes have beside the body; None if nothing is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +50,24 @@ class MonocularTracker:
     settings: MonocularSettings = field(default_factory=MonocularSettings)
     scheme: Scheme | None = None
     """A resampling scheme of your own, in place of the settings'."""
+    looks: int = 0
+    """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
 
     def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
         `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2. Raises `TrackingError` for a mask of another size than the
         camera's."""
         mask = check_mask(mask, self.picture.camera.size)
-        return track_or_recover(
-            state, is_absent=self.is_absent(mask, state.pose), recover=self.settings.recover, hold=self.absent,
-            cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, mask, also))  # fmt: skip
+        rest = without(mask, state.unexplained)
+        found = track_or_recover(
+            state, is_absent=self.is_absent(rest, state.pose), recover=self.settings.recover, hold=self.absent,
+            cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, rest, also))  # fmt: skip
+        return found._replace(unexplained=self.unexplained(state.unexplained, mask, found)) if self.looks else found
 
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
-        estimate, observation = last, self.observe(mask, last, also)
+        estimate, observation = last, self.observe(mask, last, also, state.unexplained)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
@@ -89,9 +96,20 @@ class MonocularTracker:
             return self.absent(state)
         return settle(state, lambda state: self.cycle(rng, state, mask, also))
 
-    def observe(self, mask: Mask, pose: Array, also: Cost | None = None) -> Observation:
-        """The observation of a mask (H, W); with `ignore_legs` without the region where the legs of `pose` (D,) may be."""
-        return Observation.without_legs(mask, self.picture, pose, also) if self.settings.ignore_legs else Observation.of(mask, also=also)
+    def observe(self, mask: Mask, pose: Array, also: Cost | None = None, unexplained: Unexplained | None = None) -> Observation:
+        """The observation of a mask (H, W) without what is left out beside `pose` (D,); with `ignore_legs` without the region where the
+        legs of that pose may be."""
+        left_out = None if unexplained is None else unexplained.beside(self.picture.mask(pose))
+        if self.settings.ignore_legs:
+            return Observation.without_legs(mask, self.picture, pose, also, left_out)
+        return Observation.of(mask, left_out, also)
+
+    def unexplained(self, last: Unexplained | None, mask: Mask, state: State) -> Unexplained | None:
+        """What a mask (H, W) has beside the body of a new state; `last`: the same of the frame before."""
+        if state.status == "absent":
+            return last
+        legs = self.picture.legs(state.pose) if self.settings.ignore_legs and self.picture.body.hem is not None else None
+        return look_beside(last, mask, self.picture.mask(state.pose), self.looks, legs)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
         """The state of an estimate (D,), with its cost, overlap and status."""

@@ -31,9 +31,13 @@ class BodyInViews:
 class MultiviewObservation:
     """One frame: surface points, and the masks (H, W) that they were made from, one per camera, None for a camera without one."""
 
-    def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None) -> None:
-        """Everything is computed on first use. `also`: a cost of your own (m^2), added to that of the surface."""
-        self.views, self.surface, self.masks, self.also = views, surface, masks, also
+    def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None,
+                 left_out: Sequence[Mask | None] = ()) -> None:
+        """Everything is computed on first use. `also`: a cost of your own (m^2), added to that of the surface. `left_out`: pixels of the
+        views' pictures that are no evidence, one mask per camera or none; surface points there are left out."""
+        self.views, self.masks, self.also = views, masks, also
+        self.left_out = tuple(left_out) or (None,) * len(masks)
+        self.surface = _without(surface, views, self.left_out)
 
     def cloud(self, share: int = 1) -> Cloud:
         """Every `share`-th of the surface points."""
@@ -50,15 +54,19 @@ class MultiviewObservation:
         return self.surface.points.mean(0) if len(self.surface.points) else np.zeros(3)
 
     @cached_property
+    def seen(self) -> tuple[int, ...]:
+        """Indices of the cameras that see a person."""
+        return tuple(n for n, mask in enumerate(self.masks) if mask is not None and may_be_person(mask))
+
+    @cached_property
     def people(self) -> tuple[tuple[Picture, Mask], ...]:
         """Each picture in which a person is visible, and its mask at half size."""
-        return tuple((picture, mask[::2, ::2]) for picture, mask in zip(self.views.pictures, self.masks, strict=True)
-                     if mask is not None and may_be_person(mask))
+        return tuple((self.views.pictures[n], half_size(self.masks[n])) for n in self.seen)
 
     @cached_property
     def silhouettes(self) -> tuple[tuple[Picture, Observation], ...]:
         """The same pictures, with their masks as observations of the silhouette cost."""
-        return tuple((picture, Observation.of(mask)) for picture, mask in self.people)
+        return tuple((picture, Observation.of(mask, self.left_out[n])) for n, (picture, mask) in zip(self.seen, self.people))
 
     @cached_property
     def space(self) -> FreeSpace:
@@ -79,6 +87,27 @@ class MultiviewObservation:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
         overlaps = [observation.cost_and_overlap(picture.draw(pose))[1] for picture, observation in self.silhouettes]
         return float(np.mean(overlaps)) if overlaps else 0.0
+
+
+def half_size(mask: Mask | None) -> Mask:
+    """Every second pixel of every second row of a mask (H, W)."""
+    assert mask is not None
+    return mask[::2, ::2]
+
+
+def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Mask | None]) -> SurfacePoints:
+    """The surface points but those on contours of pixels (H, W) that are left out."""
+    import cv2
+
+    kept = np.ones(len(surface.points), bool)
+    for n, (picture, mask) in enumerate(zip(views.pictures, left_out)):
+        own = np.flatnonzero(surface.cameras == n)
+        if mask is not None and len(own):
+            wide = np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
+            pixels = np.rint(np.nan_to_num(picture.camera.project(surface.points[own])).clip(-1, 1e6)).astype(int)
+            x, y = pixels.clip(0, np.array(mask.shape[::-1]) - 1).T  # points lie on contours, at most a pixel outside
+            kept[own] = wide[y, x] == 0
+    return surface if kept.all() else SurfacePoints(*(values[kept] for values in surface))
 
 
 def _half_size(camera: Camera) -> Camera:

@@ -122,6 +122,8 @@ class MultiviewSettings:
     """Factor of the noise from one cycle to the next."""
     estimate: Literal["best", "mean"] = "best"
     """The estimated pose: that of the particle of greatest weight, or the weighted mean."""
+    patience: NonNegative = 1.0
+    """Seconds after which parts of the silhouettes that the body does not explain, such as a chair, are left out; 0: never."""
     recover: bool = True
     """Search for the person again after a loss, a jump or an absence. The paper's filter continues from its last particles."""
     surface: SurfaceSettings = SurfaceSettings()
@@ -146,6 +148,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "velocity": 1.0,
         "silhouettes": 0.0,
         "posture": 0.0,
+        "patience": 0.0,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
     },
 }

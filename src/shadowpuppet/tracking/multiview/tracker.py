@@ -15,7 +15,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import pose_search
-from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
@@ -26,6 +26,7 @@ from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recove
 from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
 from shadowpuppet.tracking.status import status_of
+from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
 MIN_POINTS, MIN_EXTENT = 50, 0.5
 """Smallest number and smallest extent (m) of the surface points of a person."""
@@ -48,6 +49,8 @@ class MultiviewState(NamedTuple):
     """Intersection over union of the drawn estimate and the silhouettes, mean of all cameras."""
     status: str
     """`tracked`, `uncertain`, `lost` or `absent`."""
+    unexplained: tuple[Unexplained | None, ...] = ()
+    """What each camera's silhouettes, at half size, have beside the body; empty if nothing is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +69,10 @@ class MultiviewTracker:
     """Initial poses (L, D) of a search, for example the training motion's; None: usual postures only."""
     scheme: Scheme | None = None
     """A resampling scheme of your own, in place of the settings'."""
+    looks: int = 0
+    """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
+    known: tuple[Unexplained | None, ...] = ()
+    """What is known from the beginning to be beside the body, by camera; empty if nothing is."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:
@@ -74,20 +81,40 @@ class MultiviewTracker:
         If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
         (N, D) to m^2 (N,), added to that of the surface.
         """
-        observation = MultiviewObservation(self.views, points, masks, also)
-        return track_or_recover(
+        observation = self.observe(state, points, masks, also)
+        found = track_or_recover(
             state, is_absent=not self.is_present(observation), recover=self.settings.recover, drop=OVERLAP_DROP,
             hold=lambda state: state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose)),
             cycle=lambda state: self.cycle(rng, state, observation), search=lambda: self.search(rng, observation))  # fmt: skip
+        return found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
-              also: Cost | None = None) -> MultiviewState:
-        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step`."""
-        observation = MultiviewObservation(self.views, points, masks, also)
+              also: Cost | None = None, known: tuple[Unexplained | None, ...] = ()) -> MultiviewState:
+        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. `known`: what is known to be beside the
+        body, by camera; the other arguments as in `step`."""
+        known = known or self.known
+        left_out = [None if each is None or not each.left_out.any() else each.left_out for each in known]
+        observation = MultiviewObservation(self.views, points, masks, also, left_out)
         if self.is_present(observation):
-            return self.search(rng, observation)
+            return self.search(rng, observation)._replace(unexplained=known)
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
-        return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
+        return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent", known)
+
+    def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
+                also: Cost | None = None) -> MultiviewObservation:
+        """The observation of a frame after `state`, without what is left out beside its pose. Arguments as in `step`."""
+        left_out = [None if each is None else each.beside(picture.mask(state.pose))
+                    for each, picture in zip(state.unexplained, self.views.pictures)]
+        return MultiviewObservation(self.views, points, masks, also, left_out)
+
+    def unexplained(self, last: Sequence[Unexplained | None], masks: Sequence[Mask | None],
+                    state: MultiviewState) -> tuple[Unexplained | None, ...]:
+        """What the masks (H, W) have beside the body of a new state, by camera; `last`: the same of the frame before."""
+        last = tuple(last) or (None,) * len(masks)
+        if state.status == "absent":
+            return last
+        return tuple(before if mask is None else look_beside(before, half_size(mask), picture.mask(state.pose), self.looks)
+                     for before, mask, picture in zip(last, masks, self.views.pictures, strict=True))
 
     def cycle(self, rng: np.random.Generator, state: MultiviewState, observation: MultiviewObservation) -> MultiviewState:
         """The filter's loop body (V-A), `cycles` times; the steps are numbered as in the paper."""
