@@ -33,7 +33,7 @@ from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
-from shadowpuppet.tracking.unexplained import look_beside, looks_in
+from shadowpuppet.tracking.unexplained import left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
@@ -84,9 +84,9 @@ class MonocularSubject(TrackedSubject):
             pose = search_pose(self.picture, mask).pose
             legs = self.picture.legs(pose) if self.tracker.settings.ignore_legs else None
             unexplained = look_beside(unexplained, mask, self.picture.mask(pose), looks, legs)
-        if pose is None or unexplained is None or not unexplained.left_out.any():
+        if pose is None or unexplained is None or not unexplained.stays.any():
             return None
-        return BesideBody(unexplained.left_out, self.picture.mask(pose) | self.picture.legs(pose))
+        return BesideBody(unexplained.stays, self.picture.mask(pose) | self.picture.legs(pose))
 
     @property
     def picture(self) -> Picture:
@@ -104,6 +104,10 @@ class MonocularSubject(TrackedSubject):
         if state is None:
             return self.tracker.start(rng, observation) if observation.any() else None
         return self.tracker.step(rng, state, observation)
+
+    def left_out(self, state: State | None) -> tuple[Mask | None, ...]:
+        """The pixels (H, W) that a state leaves out of the silhouette; None for none."""
+        return (None,) if state is None else (left_out(state.unexplained),)
 
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""

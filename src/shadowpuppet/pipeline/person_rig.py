@@ -31,7 +31,7 @@ from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.unexplained import Unexplained, looks_in, settled
+from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
 from shadowpuppet.video import Image
 
 
@@ -74,6 +74,10 @@ class MultiviewSubject(TrackedSubject):
         if people == 0 or (state is None and people < 2):
             return None
         return self.tracker.start(rng, points, masks) if state is None else self.tracker.step(rng, state, points, masks)
+
+    def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
+        """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""
+        return () if state is None else tuple(map(left_out, state.unexplained))
 
     def unfound(self, observation: HullObservation) -> str:
         """`lost` if a camera still sees a person, else `absent`."""
@@ -122,23 +126,20 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     library = known.poses if len(known.poses) else None
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
                             len(first) // 2 if settings.patience else 0)
-    looks = looks_in(settings.patience, rate)
     prior = known.prior if settings.method == "hybrid" else None
     summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                                "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    beside = person.unexplained
-    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks,
-                               known=tuple(settled(each, looks) for each in beside))
+    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks_in(settings.patience, rate))
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
-                                         for each, picture, camera in zip(beside, tracker.views.pictures, cameras)))
+                                         for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))
 
 
 def _beside(unexplained: Unexplained | None, body: Mask, size: tuple[int, int]) -> BesideBody | None:
     """What is beside a body, drawn at half size (H, W), in masks of a size (width, height); None if nothing is."""
-    if unexplained is None or not unexplained.left_out.any():
+    if unexplained is None or not unexplained.stays.any():
         return None
-    return BesideBody(*(mask.repeat(2, 0).repeat(2, 1)[: size[1], : size[0]] for mask in (unexplained.left_out, body)))
+    return BesideBody(*(mask.repeat(2, 0).repeat(2, 1)[: size[1], : size[0]] for mask in (unexplained.stays, body)))
 
 
 def check_body(options: Options) -> None:

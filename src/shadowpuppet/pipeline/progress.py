@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,6 +13,8 @@ from warnings import warn
 
 import numpy as np
 
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.motion.motion_files import read_truth
@@ -86,6 +88,39 @@ class StageTimer:
             yield item
 
 
+class LeftOut:
+    """What a run leaves out of the cameras' silhouettes because the body does not explain it."""
+
+    def __init__(self, cameras: Sequence[Camera]) -> None:
+        """`cameras`: of the films' size."""
+        self.cameras = cameras
+        self._times: list[list[float]] = [[] for _ in cameras]
+        self._where: list[Mask | None] = [None for _ in cameras]
+
+    def add(self, time: float, left_out: Sequence[Mask | None]) -> None:
+        """Add one frame: its time (s), and for each camera the pixels (H, W) that are left out, or None."""
+        for n, mask in enumerate(left_out):
+            if mask is not None:
+                before = self._where[n]
+                self._times[n].append(time)
+                self._where[n] = mask if before is None else before | mask
+
+    def metrics(self) -> dict[str, Any]:
+        """The entry `left_out` of metrics.json, none if nothing was left out: for each camera the number of frames, the times of the first
+        and the last, seconds, and left, top, right and bottom of the place, the film's pixels."""
+        found = [{"camera": camera.name, "frames": len(times), "from_s": round(times[0], 3), "to_s": round(times[-1], 3),
+                  "box": _box(where, camera.size)}
+                 for camera, times, where in zip(self.cameras, self._times, self._where) if where is not None]
+        return {"left_out": found} if found else {}
+
+
+def _box(mask: Mask, size: tuple[int, int]) -> list[int]:
+    """Left, top, right and bottom of a mask (H, W), pixels of a picture of another size (width, height)."""
+    (height, width), (rows, columns) = mask.shape, (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
+    (x0, x1), (y0, y1) = ((each[0], each[-1] + 1) for each in (columns, rows))
+    return [round(x0 * size[0] / width), round(y0 * size[1] / height), round(x1 * size[0] / width), round(y1 * size[1] / height)]
+
+
 def json_text(value: Any) -> str:
     """Plain values, arrays and dataclasses as JSON; null for numbers that are not finite."""
     return json.dumps(for_json(plain(value, "value")), indent=1, ensure_ascii=False, allow_nan=False)
@@ -114,6 +149,16 @@ def warn_of_losses(motion: Motion) -> None:
     if len(lost) > MANY_LOST * present:
         warn(f"the person is lost in {100 * len(lost) / present:.0f} % of the frames, first at {motion.times[lost[0]]:.2f} s: do their "
              "silhouettes show them, and them alone? --overlay shows it; give a picture of the empty scene, a --region, or better light",
+             ShadowPuppetWarning, stacklevel=3)
+
+
+def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
+    """Warn of parts of the silhouettes that were left out; `found`: the entry of metrics.json."""
+    if found:
+        places = "; ".join(f"camera {one['camera']!r}, {one['frames']} frames from {one['from_s']:.1f} to {one['to_s']:.1f} s, within "
+                           "x {} to {}, y {} to {}".format(one["box"][0], one["box"][2], one["box"][1], one["box"][3]) for one in found)
+        warn(f"parts of the silhouettes that stayed, and that no pose of the body explains, were left out ({places}): a thing, a shadow or "
+             "another person; if it was the person, give --tracker.patience 0 (with several cameras --multiview.patience 0)",
              ShadowPuppetWarning, stacklevel=3)
 
 

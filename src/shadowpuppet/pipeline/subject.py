@@ -89,6 +89,10 @@ class TrackedSubject(ABC):
             observation = self.observe(each.masks)
             yield Observed(each, observation, time.perf_counter() - start)
 
+    def left_out(self, state: Any) -> tuple[Mask | None, ...]:
+        """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
+        return ()
+
     def unfound(self, observation: Any) -> str:
         """Status of a frame without a state: `lost` or `absent`."""
         return "absent"

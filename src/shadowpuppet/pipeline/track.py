@@ -21,6 +21,7 @@ from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
     STAGES,
+    LeftOut,
     Listener,
     StageTimer,
     Summary,
@@ -29,6 +30,7 @@ from shadowpuppet.pipeline.progress import (
     json_text,
     timings,
     tracked,
+    warn_of_left_out,
     warn_of_losses,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
@@ -55,7 +57,7 @@ class Kind(NamedTuple):
     settings: str
     """Name of the field of `Options` with the tracker's settings."""
     survey: Callable[..., Survey]
-    """Examines a rig with options, and, given what a fitted body left unexplained in each camera's silhouettes, looks for it in the scene."""
+    """Examines a rig with options and, after a first fit, with a `SceneHint` for each camera."""
     fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject]
     """Measures the person and makes the tracker."""
     look_fits: bool
@@ -141,7 +143,7 @@ def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, ca
 
 
 def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kind: Kind) -> Survey | None:
-    """The survey in which what the fitted body leaves unexplained, and never moves, belongs to the scene; None if there is no such thing."""
+    """The survey in which what never moves, and the fitted body leaves unexplained, belongs to the scene; None if there is nothing."""
     if all(each is None for each in subject.beside):
         return None
     hints = tuple(SceneHint(beside, each.added) for beside, each in zip(subject.beside, survey.silhouettes, strict=True))
@@ -169,6 +171,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     warn_of_losses(written.motion)
+    warn_of_left_out(metrics.get("left_out", []))
     write_metrics(folder, metrics)
     return Summary(Path(folder), written.motion, metrics, prepared.look)
 
@@ -190,6 +193,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
            cache: SilhouetteCache | None) -> None:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
     subject, survey, timer, state, count = prepared.check(), prepared.survey, StageTimer(), None, 0
+    left_out = LeftOut([footage.view.camera for footage in survey.rig.footage])
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
@@ -204,6 +208,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
+                left_out.add(seen.time, subject.left_out(state))
                 with timer.time("write"):
                     found = motion_frame(subject, seen.time, state, observation)
                     writer.write(found)
@@ -213,3 +218,4 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 listener.advance(count)
     finally:
         writer.metrics |= timings(timer, kind.stages, count, time.perf_counter() - began)
+        writer.metrics |= left_out.metrics()

@@ -25,12 +25,12 @@ MIN_COUNT = 0.5
 """Least number of unexplained pixels of a colour, over that of the body's pixels of this colour: clothes are mostly the body's."""
 MIN_RATIO = 2.0
 """Least likelihood of a pixel's colour as an unexplained one, over that as the body's."""
-MAX_EXPLAINED = 0.4
+MAX_EXPLAINED = 0.6
 """Greatest share of what was added that the body covers: otherwise it is a part of the person that the body's pose misses."""
-MIN_ADDED = 0.03
-"""Least area of what was added, over the person's."""
+MIN_SEED, MIN_ADDED = 0.01, 0.03
+"""Least areas, over the person's, of what is unexplained and still, and of what was added."""
 SAME = 0.95
-"""Least share of a silhouette, and of the pixels around it, that is still if no person is in it."""
+"""Least share of the usual silhouette that is the same, and still, if no person is in it."""
 MIN_FRAMES = 8
 """Least number of frames in which still pixels are looked for."""
 
@@ -100,7 +100,7 @@ def always_alike(masks: Sequence[Mask]) -> bool:
     if len(shown) < MIN_FRAMES:
         return False
     usual = np.mean(shown, axis=0) >= 0.5
-    return bool(np.mean([np.count_nonzero(mask ^ usual) for mask in shown]) <= (1 - SAME) * np.count_nonzero(usual))
+    return bool(np.median([np.count_nonzero(mask ^ usual) for mask in shown]) <= (1 - SAME) * np.count_nonzero(usual))
 
 
 def find_still(images: Sequence[Image], masks: Sequence[Mask]) -> StillParts | None:
@@ -126,16 +126,17 @@ def find_added(parts: StillParts, beside: BesideBody) -> AddedParts | None:
     colours = to_planes(parts.picture).astype(np.float32)
     seed, own = parts.still & beside.unexplained, beside.body & ~beside.unexplained
     seed &= _ratio(colours, seed, own) >= MIN_COUNT * np.count_nonzero(own) / max(np.count_nonzero(seed), 1)
-    if np.count_nonzero(seed) < MIN_ADDED * np.count_nonzero(beside.body):
+    if np.count_nonzero(seed) < max(MIN_SEED * np.count_nonzero(beside.body), 1):
         return None
     alike = parts.still & (_ratio(colours, seed, own) >= MIN_RATIO)
-    grown = cv2.morphologyEx(alike.view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    grown = cv2.morphologyEx(np.asarray(grown, np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
-    _, labels = cv2.connectedComponents(np.asarray(grown, np.uint8), connectivity=8)
+    grown, pair = cv2.morphologyEx(alike.view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.ones((2, 2), np.uint8)
+    grown = cv2.dilate(cv2.erode(grown, pair, anchor=(0, 0)), pair, anchor=(1, 1))  # without bridges of one pixel
+    labels = np.asarray(cv2.connectedComponents(np.asarray(grown, np.uint8), connectivity=8)[1], np.intp)
+    covered = np.bincount(labels.ravel(), beside.body.ravel()) / np.maximum(np.bincount(labels.ravel()), 1)
     found = np.unique(labels[seed])
-    covered = np.bincount(labels.ravel(), beside.body.ravel()) / np.bincount(labels.ravel())
     found = found[(found > 0) & (covered[found] <= MAX_EXPLAINED)]
-    return _added(parts, np.isin(labels, found)) if len(found) else None
+    whole = np.isin(labels, found)
+    return _added(parts, whole) if np.count_nonzero(whole) >= MIN_ADDED * np.count_nonzero(beside.body) else None
 
 
 def _ratio(colours: Floats, thing: Mask, body: Mask) -> NDArray[np.float64]:
@@ -147,19 +148,14 @@ def _ratio(colours: Floats, thing: Mask, body: Mask) -> NDArray[np.float64]:
 def find_nobody(parts: StillParts, masks: Sequence[Mask]) -> AddedParts | None:
     """All of the silhouettes (H, W) if nothing in them ever moves, and so no person is in them; None if something does."""
     shown = [mask for mask in masks if mask.any()]
-    if len(shown) < MIN_FRAMES or any(np.mean(parts.calm[mask]) < SAME for mask in shown):
+    if len(shown) < MIN_FRAMES or np.median([np.mean(parts.calm[mask]) for mask in shown]) < SAME:
         return None
     return _added(parts, np.mean(shown, axis=0) >= STILL_SHARE)
 
 
-def _added(parts: StillParts, mask: NDArray[np.bool_]) -> AddedParts | None:
-    """The parts in a mask (H, W), with their rims."""
+def _added(parts: StillParts, mask: Mask) -> AddedParts | None:
+    """The parts in a mask (H, W), with their rims, but for what else is still: it is the person's."""
     import cv2
 
     wide = np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)), np.uint8) > 0
-    return AddedParts(parts.picture, mask | (wide & parts.calm & ~_own(parts, mask))) if mask.any() else None
-
-
-def _own(parts: StillParts, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Still silhouette outside a mask (H, W): the person's."""
-    return parts.still & ~mask
+    return AddedParts(parts.picture, mask | (wide & parts.calm & ~parts.still)) if mask.any() else None

@@ -35,8 +35,8 @@ class Observation:
     @classmethod
     def without_legs(cls, mask: ArrayLike, picture: Picture, pose: Array, also: Cost | None = None,
                      ignore: ArrayLike | None = None) -> Observation:
-        """The observation of a mask (H, W); its pixels in the region where the legs of `pose` (D,) may be are ignored, and those of `ignore`
-        (H, W).
+        """The observation of a mask (H, W); its pixels in the region where the legs of `pose` (D,) may be are ignored, and those of
+        `ignore` (H, W).
 
         An upper body ends at the waist. Empty pixels there still count, so that the waist does not grow over them.
         """

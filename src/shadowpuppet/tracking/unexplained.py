@@ -1,13 +1,12 @@
 """Parts of the silhouettes that the fitted body leaves unexplained for some time: furniture, shadows, other people.
 
-What is silhouette at the same pixels, picture after picture, and lies beside the drawn body is no part of the person: the tracker would have
-moved a limb there. After `looks` pictures it no longer counts as evidence, neither for the person nor for their absence. It counts again
-near the body, and as soon as it is no silhouette any more: a limb that was lost, and left out, is taken back when it moves.
+What is silhouette at the same pixels, picture after picture, and lies beside the drawn body is no part of the person, if the silhouette
+has grown by it: a limb that the tracker lost adds no area. After `looks` pictures it no longer counts as evidence, neither for the person
+nor for their absence. It counts again near the body, and once it is no silhouette any more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,9 @@ LARGE = 0.03
 """Least area of an unexplained part, over the drawn body's."""
 INSIDE = 0.85
 """Least share of the drawn body inside the silhouette: otherwise the body is misplaced, and says nothing of what lies beside it."""
+MORE = 0.25
+"""Least growth of the silhouette's area, in areas of the drawn body, by which something came beside the person: a limb that the body
+misses adds less."""
 FORGET = 5
 """An unexplained part is taken back so many times as fast as it was left out, once it is no silhouette any more."""
 MOST_LOOKS = 250
@@ -34,8 +36,16 @@ class Unexplained(NamedTuple):
 
     counts: NDArray[np.uint8]
     """Number of pictures, at most `looks`, in which each pixel was silhouette and unexplained, of shape (H, W)."""
+    stays: Mask
+    """Pixels (H, W) that have been unexplained for `looks` pictures."""
     left_out: Mask
-    """Pixels (H, W) that are left out of the evidence, unless the body is near."""
+    """The large parts of them, if they came while the body was tracked: left out of the evidence, unless the body is near."""
+    ratio: float = 1.0
+    """Area of the silhouette over that of the drawn body, smoothed over time."""
+    least: float = np.inf
+    """The least of it so far."""
+    seen: int = 0
+    """Number of pictures with a body that lies in the silhouette."""
 
     def beside(self, drawn: Mask) -> Mask | None:
         """Pixels (H, W) that are left out while the body is `drawn` (H, W); None if there are none."""
@@ -59,16 +69,22 @@ def look_beside(last: Unexplained | None, silhouette: Mask, drawn: Mask, looks: 
     `looks`: number of pictures after which a part is left out; `ignored`: pixels (H, W) of which the body says nothing.
     """
     looks = min(max(looks, 1), MOST_LOOKS)
-    counts, left_out = (np.zeros(silhouette.shape, np.uint8), np.zeros(silhouette.shape, bool)) if last is None else last
+    nothing = np.zeros(silhouette.shape, bool)
+    last = last or Unexplained(nothing.astype(np.uint8), nothing, nothing)
     area = int(np.count_nonzero(drawn))
-    counts = np.where(silhouette, counts, np.maximum(counts, FORGET) - FORGET).astype(np.uint8)
+    counts = np.where(silhouette, last.counts, np.maximum(last.counts, FORGET) - FORGET).astype(np.uint8)
+    ratio, least, seen = last.ratio, last.least, last.seen
     if area and np.count_nonzero(drawn & silhouette) >= INSIDE * area:
         explained = near(drawn) if ignored is None else near(drawn) | ignored
         beside = _thick(silhouette & ~explained, area)
         counts = np.where(beside, np.minimum(counts, looks - 1) + 1, counts)
-        counts[explained & silhouette & ~left_out] = 0
-    left_out = (left_out & (counts > 0)) | (counts >= looks)
-    return Unexplained(counts, _large(left_out, area) if left_out.any() else left_out)
+        counts[explained & silhouette & ~last.left_out] = 0
+        now = np.count_nonzero(silhouette if ignored is None else silhouette & ~ignored) / area
+        ratio, seen = ratio + (now - ratio) / min(seen + 1, looks), seen + 1
+        least = min(least, ratio) if seen >= looks else least
+    stays = (last.stays & (counts > 0)) | (counts >= looks)
+    came = ratio >= least + MORE and stays.any()
+    return Unexplained(counts, stays, _large(stays, area) if came else nothing, ratio, least, seen)
 
 
 def _thick(beside: Mask, area: int) -> Mask:
@@ -76,14 +92,17 @@ def _thick(beside: Mask, area: int) -> Mask:
     import cv2
 
     size = max(2, round(THICK * area**0.5))
-    return np.asarray(cv2.morphologyEx(beside.view(np.uint8), cv2.MORPH_OPEN, np.ones((size, size), np.uint8)), np.uint8).view(np.bool_)
+    square = np.ones((size, size), np.uint8)  # its size may be even: the opposite anchors keep the parts where they are
+    thick = cv2.dilate(cv2.erode(beside.view(np.uint8), square, anchor=(0, 0)), square, anchor=(size - 1, size - 1))
+    return np.asarray(thick, np.uint8).view(np.bool_)
 
 
 def _large(parts: Mask, area: int) -> Mask:
     """The connected parts of a mask (H, W) that are large enough beside a body of `area` pixels."""
     import cv2
 
-    _, labels, boxes, _ = cv2.connectedComponentsWithStats(parts.view(np.uint8), connectivity=8)
+    _, found, boxes, _ = cv2.connectedComponentsWithStats(parts.view(np.uint8), connectivity=8)
+    labels = np.asarray(found, np.intp)
     large = boxes[:, cv2.CC_STAT_AREA] >= max(LARGE * area, 1)
     large[0] = False
     return large[labels]
@@ -94,18 +113,11 @@ def looks_in(seconds: float, rate: float) -> int:
     return max(1, round(seconds * rate)) if seconds else 0
 
 
-def settled(unexplained: Unexplained | None, looks: int) -> Unexplained | None:
-    """What is left out now, as it is after `looks` pictures; None if nothing is."""
-    if unexplained is None or not unexplained.left_out.any() or not looks:
-        return None
-    return Unexplained((min(looks, MOST_LOOKS) * unexplained.left_out).astype(np.uint8), unexplained.left_out)
+def left_out(unexplained: Unexplained | None) -> Mask | None:
+    """Pixels (H, W) that are left out; None if there are none."""
+    return None if unexplained is None or not unexplained.left_out.any() else unexplained.left_out
 
 
 def without(mask: Mask, unexplained: Unexplained | None) -> Mask:
     """A mask (H, W) without what is left out."""
     return mask if unexplained is None or not unexplained.left_out.any() else mask & ~unexplained.left_out
-
-
-def any_left_out(unexplained: Sequence[Unexplained | None]) -> bool:
-    """Whether something is left out of any camera's silhouettes."""
-    return any(each is not None and bool(each.left_out.any()) for each in unexplained)

@@ -107,7 +107,8 @@ def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Mask
             pixels = np.rint(np.nan_to_num(picture.camera.project(surface.points[own])).clip(-1, 1e6)).astype(int)
             x, y = pixels.clip(0, np.array(mask.shape[::-1]) - 1).T  # points lie on contours, at most a pixel outside
             kept[own] = wide[y, x] == 0
-    return surface if kept.all() else SurfacePoints(*(values[kept] for values in surface))
+    points, normals, weights, cameras = surface
+    return surface if kept.all() else SurfacePoints(points[kept], normals[kept], weights[kept], cameras[kept])
 
 
 def _half_size(camera: Camera) -> Camera:

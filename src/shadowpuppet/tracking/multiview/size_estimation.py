@@ -21,6 +21,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -83,23 +84,21 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     (K,). `looks`: number of frames after which what the body does not explain is left out; 0: never. Raises `TrackingError` if no person
     is found."""
     plain, sizes, residual = replace(settings, method="hybrid", refinement="gauss_newton"), expected, np.nan
-    known: tuple[Unexplained | None, ...] = ()
     for _ in range(ROUNDS if (spread > 0).any() else 0):
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
-        found = _followed(rng, tracker, first, known)
+        found = _followed(rng, tracker, first)
         if len(found) < MIN_FRAMES:
             break
         chosen = np.unique(np.linspace(0, len(found) - 1, MAX_FRAMES).astype(int))
         poses = np.array([found[i][1].pose for i in chosen])
-        known = found[-1][1].unexplained
-        clouds = [tracker.observe(found[i][1]._replace(unexplained=known), *first[found[i][0]]).cloud(POINT_STRIDE) for i in chosen]
+        clouds = [MultiviewObservation(tracker.views, *first[found[i][0]]).cloud(POINT_STRIDE) for i in chosen]
         pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
         centre, pull = map(np.array, zip(*pulls, strict=True))
         bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
                               worth=INDEPENDENT_POINTS[settings.body])
         sizes, residual = bundle.sizes, bundle.residual
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
-    found = _followed(rng, tracker, first, known)
+    found = _followed(rng, tracker, first)
     if not found:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
@@ -127,15 +126,14 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
 
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
-              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]],
-              known: tuple[Unexplained | None, ...] = ()) -> list[tuple[int, MultiviewState]]:
-    """Indices and states of the frames in which the person is found: tracked, or searched for again if the overlap falls. `known`: what
-    is known to be beside the body."""
+              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> list[tuple[int, MultiviewState]]:
+    """Indices and states of the frames in which the person is found: tracked, or searched for again if the overlap falls."""
     state, found, best = None, [], 0.0
     for n, (points, masks) in enumerate(first):
-        state = tracker.start(rng, points, masks, known=known) if state is None else tracker.step(rng, state, points, masks)
+        state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
         if state.overlap < best - OVERLAP_LOSS and state.status != "absent":
-            state = min(state, tracker.start(rng, points, masks, known=state.unexplained), key=lambda each: each.cost)
+            again = tracker.start(rng, points, masks)._replace(unexplained=state.unexplained)
+            state = min(state, again, key=lambda each: each.cost)
         best = max(best, state.overlap)
         if state.status in ("tracked", "uncertain"):
             found.append((n, state))

@@ -71,8 +71,6 @@ class MultiviewTracker:
     """A resampling scheme of your own, in place of the settings'."""
     looks: int = 0
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
-    known: tuple[Unexplained | None, ...] = ()
-    """What is known from the beginning to be beside the body, by camera; empty if nothing is."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:
@@ -89,16 +87,13 @@ class MultiviewTracker:
         return found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
-              also: Cost | None = None, known: tuple[Unexplained | None, ...] = ()) -> MultiviewState:
-        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. `known`: what is known to be beside the
-        body, by camera; the other arguments as in `step`."""
-        known = known or self.known
-        left_out = [None if each is None or not each.left_out.any() else each.left_out for each in known]
-        observation = MultiviewObservation(self.views, points, masks, also, left_out)
+              also: Cost | None = None) -> MultiviewState:
+        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step`."""
+        observation = MultiviewObservation(self.views, points, masks, also)
         if self.is_present(observation):
-            return self.search(rng, observation)._replace(unexplained=known)
+            return self.search(rng, observation)
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
-        return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent", known)
+        return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
 
     def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
                 also: Cost | None = None) -> MultiviewObservation:
