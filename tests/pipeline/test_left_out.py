@@ -61,7 +61,8 @@ def test_what_the_body_leaves_unexplained_and_never_moves_belongs_to_the_scene(b
     thing = (np.mean(first.masks, axis=0) > 0.9) & ~(exact if exact.ndim == 2 else exact[..., 0]).astype(bool)
     assert thing.any()
     again = survey_film(footage, options, hint=SceneHint(BesideBody(thing, person)))
-    assert again.silhouettes.added is not None and again.silhouettes.before is not None
+    assert again.silhouettes.added is not None
+    assert again.silhouettes.before is not None
     assert np.mean([mask[thing].mean() for mask in again.masks]) < 0.1
     assert np.mean([mask[person].mean() for mask in again.masks]) > 0.9
     assert any("never moves" in said for said in again.values["left_out"])

@@ -39,8 +39,10 @@ def some_of(mask, rows):
 def test_still_parts_are_what_keeps_its_value_and_is_silhouette():
     parts = find_still(*film())
     assert parts is not None
-    assert parts.still[LEGS].mean() > 0.95 and parts.still[CHAIR].mean() > 0.95
-    assert parts.still[TRUNK].mean() < 0.2 and not parts.still[~(TRUNK | LEGS | CHAIR)].any()
+    assert parts.still[LEGS].mean() > 0.95
+    assert parts.still[CHAIR].mean() > 0.95
+    assert parts.still[TRUNK].mean() < 0.2
+    assert not parts.still[~(TRUNK | LEGS | CHAIR)].any()
     assert parts.calm[:5].mean() > 0.9
 
 
@@ -52,14 +54,17 @@ def test_a_chair_is_found_as_a_whole_from_the_part_that_no_body_explains():
     parts = find_still(*film())
     added = find_added(parts, BesideBody(some_of(CHAIR, slice(30, 44)), TRUNK | LEGS))
     assert added is not None
-    assert added.mask[CHAIR].mean() > 0.95 and not added.mask[LEGS].any() and not added.mask[TRUNK].any()
+    assert added.mask[CHAIR].mean() > 0.95
+    assert not added.mask[LEGS].any()
+    assert not added.mask[TRUNK].any()
 
 
 def test_the_chair_is_found_although_an_arm_of_the_body_was_put_on_its_back():
     parts = find_still(*film())
     arm = some_of(CHAIR, slice(16, 22))
     added = find_added(parts, BesideBody(some_of(CHAIR, slice(28, 44)), TRUNK | LEGS | arm))
-    assert added is not None and added.mask[arm].all()
+    assert added is not None
+    assert added.mask[arm].all()
 
 
 def test_a_leg_that_the_body_misses_has_the_colour_of_the_other_and_stays():
@@ -78,7 +83,8 @@ def test_silhouettes_in_which_nothing_moves_are_nobody():
     images, masks = film(person=False)
     assert always_alike(masks)
     found = find_nobody(find_still(images, masks), masks)
-    assert found is not None and found.mask[CHAIR].all()
+    assert found is not None
+    assert found.mask[CHAIR].all()
 
 
 def test_a_person_who_hardly_moves_is_somebody():
@@ -90,14 +96,18 @@ def test_added_parts_are_put_into_each_picture_of_the_scene():
     scene = [np.full((*SIZE, 3), grey, np.uint8) for grey in (10, 20)]
     parts = AddedParts(np.full((*SIZE, 3), 99, np.uint8), CHAIR)
     first, second = parts.into(iter(scene))
-    assert (first[CHAIR] == 99).all() and (first[~CHAIR] == 10).all() and (second[~CHAIR] == 20).all()
+    assert (first[CHAIR] == 99).all()
+    assert (first[~CHAIR] == 10).all()
+    assert (second[~CHAIR] == 20).all()
     assert (scene[0] == 10).all()
 
 
 def test_earlier_findings_stay():
     one, two = (AddedParts(np.full((*SIZE, 3), grey, np.uint8), mask) for grey, mask in ((1, CHAIR), (2, LEGS)))
     both = one.joined(two)
-    assert (both.mask == CHAIR | LEGS).all() and (both.picture[LEGS] == 2).all() and (both.picture[CHAIR] == 1).all()
+    assert (both.mask == CHAIR | LEGS).all()
+    assert (both.picture[LEGS] == 2).all()
+    assert (both.picture[CHAIR] == 1).all()
     assert one.joined(None) is one
 
 

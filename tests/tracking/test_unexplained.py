@@ -31,7 +31,8 @@ def test_a_thing_that_comes_and_stays_is_left_out_after_some_looks():
     before = follow([BODY] * LOOKS + [BODY | BOX] * (LOOKS - 1))
     assert left_out(before) is None
     found = with_box()
-    assert found.left_out[BOX].all() and not found.left_out[~BOX].any()
+    assert found.left_out[BOX].all()
+    assert not found.left_out[~BOX].any()
     assert (without(BODY | BOX, found) == BODY).all()
 
 
@@ -41,7 +42,8 @@ def test_the_body_itself_is_never_left_out_however_long_it_holds_still():
 
 def test_a_limb_that_the_body_misses_from_the_first_picture_on_is_not_left_out():
     found = follow([BODY | ARM] * 40)
-    assert found.stays[ARM].any() and left_out(found) is None
+    assert found.stays[ARM].any()
+    assert left_out(found) is None
 
 
 def test_a_limb_that_is_lost_later_adds_no_area_and_is_not_left_out():
@@ -61,7 +63,8 @@ def test_what_is_left_out_counts_again_near_the_body():
     reaching[34:40, 20:58] = True
     beside = found.beside(reaching)
     assert beside is not None
-    assert not (beside & near(reaching)).any() and beside[46, 66]
+    assert not (beside & near(reaching)).any()
+    assert beside[46, 66]
     covered = np.ones(SIZE, bool)
     assert found.beside(covered) is None
 

@@ -25,7 +25,7 @@ MIN_COUNT = 0.5
 """Least number of unexplained pixels of a colour, over that of the body's pixels of this colour: clothes are mostly the body's."""
 MIN_RATIO = 2.0
 """Least likelihood of a pixel's colour as an unexplained one, over that as the body's."""
-MAX_EXPLAINED = 0.6
+MAX_EXPLAINED = 0.5
 """Greatest share of what was added that the body covers: otherwise it is a part of the person that the body's pose misses."""
 MIN_SEED, MIN_ADDED = 0.01, 0.03
 """Least areas, over the person's, of what is unexplained and still, and of what was added."""
