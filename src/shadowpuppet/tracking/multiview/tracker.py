@@ -97,7 +97,7 @@ class MultiviewTracker:
 
     def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
                 also: Cost | None = None) -> MultiviewObservation:
-        """The observation of a frame after `state`, without what is left out beside its pose. Arguments as in `step`."""
+        """The observation of a frame's masks (H, W) after `state`, without what is left out beside its pose. Arguments as in `step`."""
         left_out = [None if each is None else each.beside(picture.mask(state.pose))
                     for each, picture in zip(state.unexplained, self.views.pictures)]
         return MultiviewObservation(self.views, points, masks, also, left_out)
