@@ -101,11 +101,13 @@ def _large(parts: Mask, area: int) -> Mask:
     """The connected parts of a mask (H, W) that are large enough beside a body of `area` pixels."""
     import cv2
 
-    _, found, boxes, _ = cv2.connectedComponentsWithStats(parts.view(np.uint8), connectivity=8)
-    labels = np.asarray(found, np.intp)
+    x, y, width, height = cv2.boundingRect(parts.view(np.uint8))
+    window, out = (slice(y, y + height), slice(x, x + width)), np.zeros_like(parts)
+    _, found, boxes, _ = cv2.connectedComponentsWithStats(np.ascontiguousarray(parts[window]).view(np.uint8), connectivity=8)
     large = boxes[:, cv2.CC_STAT_AREA] >= max(LARGE * area, 1)
     large[0] = False
-    return large[labels]
+    out[window] = large[np.asarray(found, np.intp)]
+    return out
 
 
 def looks_in(seconds: float, rate: float) -> int:
