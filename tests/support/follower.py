@@ -17,6 +17,7 @@ class Standing(NamedTuple):
     status: str
     cost: float = 0.0
     overlap: float = np.nan
+    unexplained: tuple = ()
 
 
 class Follower:
