@@ -15,7 +15,7 @@ from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, 
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, wrong_posture
 from shadowpuppet.pipeline.rig import open_rig
-from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes, read_masks
 from shadowpuppet.pipeline.survey import _look, quality_of, survey_film
 from shadowpuppet.pipeline.track import MONOCULAR, Prepared, json_text, look_at, prepare, track_recording
 from shadowpuppet.silhouette.quality import mask_quality
@@ -89,6 +89,25 @@ def test_ready_masks_need_no_background(recording, tmp_path):
     assert look.person["overlaps"].keys() == POSTURES.keys()
     with pytest.raises(RecordingError, match=r"no ready silhouettes in it, expected masks/cam.mkv .* leave --masks out"):
         look_at(made.copied(recording, tmp_path / "without", without=["masks"]), Options(masks=True))
+
+
+@pytest.mark.parametrize(("kind", "colour", "lossless"), [("masks", 255, True), ("video", (0, 0, 255), False)])
+def test_a_cable_is_left_out_of_the_silhouettes_and_said(recording, tmp_path, kind, colour, lossless):
+    spoilt = made.copied(recording, tmp_path / "cable")
+    path = spoilt / kind / ("cam.mkv" if lossless else "cam.mp4")
+    images = [image.copy() for image in made.images(path)]
+    x = made.SIZE[0] // 2 + 12
+    for image in images:
+        image[:, x : x + 2] = colour
+    made.write_film(path, images, lossless=lossless)
+    look = look_at(spoilt, Options(masks=kind == "masks"))
+    assert look.left_out
+    assert all(told.startswith("a thin upright line at x = ") for told in look.left_out)
+    assert sum("taken for clutter, not for the person, and left out of the silhouettes" in doubt for doubt in look.doubts) == 1
+    assert look.person["start_overlap"] > 0.8
+    footage = open_footage(spoilt, Options(masks=kind == "masks"))
+    above = [mask[: made.SIZE[1] // 12].sum() for mask in read_masks(footage, Options(masks=kind == "masks"))]
+    assert max(above) == 0
 
 
 def prepared(recording, options) -> Prepared:
@@ -169,8 +188,8 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
     walk = [np.roll(image, shift * (n % 3 - 1), axis=1) for n, image in enumerate(film)]  # the person, and the room, move
     made.write_film(bare / "video" / "cam.mp4", walk)
     look = look_at_masks(bare)
-    assert "the film itself (median)" in look.background
-    assert any("it is the median of the film, so whoever stands still becomes background" in doubt for doubt in look.doubts)
+    assert "the film itself (recovered from" in look.background
+    assert any("no picture of the empty scene: it was recovered from the film" in doubt for doubt in look.doubts)
 
 
 def look_at_masks(recording):

@@ -131,3 +131,16 @@ def test_the_look_as_json_on_the_command_line(recording, capsys):
 def test_an_unknown_camera_is_a_users_mistake(recording, capsys):
     assert run(["info", str(recording), "--camera", "cam1,cam8"]) == 2
     assert "expected one of cam1, cam2, cam3, cam4" in capsys.readouterr().err
+
+
+def test_a_cable_before_one_camera_accuses_none(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "cable")
+    name = made_rig.cameras()[1].name
+    images = [image.copy() for image in made.images(spoilt / "masks" / f"{name}.mkv")]
+    for image in images:
+        image[:, 30:32] = 255
+    made.write_film(spoilt / "masks" / f"{name}.mkv", images, lossless=True)
+    look = looked(spoilt)
+    assert look.agreement.wrong == ()
+    assert [camera.name for camera in look.cameras if camera.left_out] == [name]
+    assert any(doubt.startswith(f"camera {name!r}: a thin upright line at x = 31") for doubt in look.doubts)

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import cv2
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 from silhouette_scenes import CLEANED, SIZE, dressed, empty_shots, figure, grey, scene, shot
 
 from shadowpuppet.errors import SilhouetteError
-from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background
+from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.silhouette._kernels import classify, contrast, far_from_samples
 from shadowpuppet.silhouette.background import FrameSampler, film_noise, learn_statistics, smoothed, to_planes
 from shadowpuppet.silhouette.boundary import LIMB_WIDTH_SHARE, SHARP_WIDTH, EdgeProfile, at_half_contrast, outline_width
@@ -150,30 +148,6 @@ def test_spread_copies(rng):
     kept.add(image)
     image[:] = 9
     assert kept.kept[0].max() == 0
-
-
-def passing(rng: np.random.Generator, wall: np.ndarray, count=30) -> Iterator[np.ndarray]:
-    """A film in which a dark block crosses the picture."""
-    for n in range(count):
-        picture = wall.copy()
-        picture[30:110, 5 * n : 5 * n + 30] = (30, 30, 30)
-        yield shot(rng, picture)
-
-
-def test_background_from_film_sees_behind_who_passes(rng):
-    wall = scene(rng)
-    background = background_from_film(passing(rng, wall))
-    assert background.shape == wall.shape
-    assert background.dtype == np.uint8
-    assert np.abs(background - wall).max() < 6
-    assert background_from_film([grey(i) for i in passing(rng, wall)]).shape == SIZE
-
-
-def test_background_from_film_needs_a_film(rng):
-    with pytest.raises(SilhouetteError, match="2 frames, expected at least 3"):
-        background_from_film(empty_shots(rng, scene(rng), 2))
-    with pytest.raises(SilhouetteError, match="80 x 60 colour, expected 160 x 120 colour"):
-        background_from_film([*empty_shots(rng, scene(rng), 3), np.zeros((60, 80, 3), np.uint8)])
 
 
 @given(st.floats(0.5, 4))

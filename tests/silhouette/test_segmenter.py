@@ -12,7 +12,7 @@ import pytest
 from silhouette_scenes import CLEANED, METHODS, SIZE, dressed, empty_shots, figure, grey, overlap, scene, shot
 
 from shadowpuppet.errors import SettingsError, SilhouetteError
-from shadowpuppet.silhouette import SilhouetteSettings, background_from_film, learn_background, ready_mask
+from shadowpuppet.silhouette import SilhouetteSettings, learn_background, ready_mask, recover_scene
 from shadowpuppet.silhouette.background import to_planes
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile
 from shadowpuppet.silhouette.channels import wardrobe_share
@@ -38,7 +38,7 @@ def test_it_works_from_a_single_picture_and_from_the_film_itself(rng):
     wall, mask = scene(rng), figure()
     away = empty_shots(rng, wall, 8)
     frames = [*away[:4], *(shot(rng, dressed(wall, np.roll(mask, s, 1))) for s in range(-30, 30, 10)), *away[4:]]
-    for background in (shot(rng, wall), background_from_film(frames)):
+    for background in (shot(rng, wall), recover_scene(frames).picture):
         segmenter = learn_background([background], film=frames)
         assert overlap(segmenter(shot(rng, dressed(wall, mask))), mask) > 0.97
 
@@ -321,3 +321,15 @@ def test_the_dancer_is_keyed_by_colour(shared):
     # The wall is blue, so what is hardly blue is the dancer.
     blue = [i[..., 0].astype(int) - i[..., 1:].max(axis=2) for i in images]
     assert np.mean([overlap(segmenter(i), b < 85) for i, b in zip(images, blue)]) > 0.93
+
+
+def test_what_is_always_covered_is_person_in_every_frame(rng):
+    wall, mask = scene(rng), figure()
+    covered = np.zeros(SIZE, bool)
+    covered[50:110, 70:90] = True
+    hidden = wall.copy()
+    hidden[covered] = dressed(wall, mask)[covered]  # the scene there is unknown: it has the shirt's colour
+    without, found = (learn_background(empty_shots(rng, hidden), covered=each)(shot(rng, dressed(wall, mask))) for each in (None, covered))
+    assert overlap(without, mask) < 0.9
+    assert overlap(found, mask) > 0.96
+    assert found[covered].all()

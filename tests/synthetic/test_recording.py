@@ -36,7 +36,8 @@ from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.scene_renderer import SceneRenderer
+from shadowpuppet.synthetic.scene_renderer import Place, SceneRenderer
+from shadowpuppet.synthetic.truth import SOLES
 from shadowpuppet.video import open_frames, read_image
 
 VIEW = Viewpoint(size=(80, 60))
@@ -295,7 +296,7 @@ def test_the_level_posture_is_symmetric_to_the_last_finger():
     assert shot.mask.any(0).sum() > 180
 
 
-def test_the_room_does_not_shine_through_the_person(rng):
+def test_the_room_does_not_shine_through_the_person(rng, monkeypatch):
     spec = small(scene=Scene(noise=0, shadow=0))
     _, figure = perform(spec, rng)
     studio = SceneRenderer(spec, VIEW.camera(), rng)
@@ -303,7 +304,7 @@ def test_the_room_does_not_shine_through_the_person(rng):
     solid = solid & np.roll(solid, 1, 0) & np.roll(solid, -1, 0) & np.roll(solid, 1, 1) & np.roll(solid, -1, 1)
     pictures = []
     for light in (0.0, 1.0):
-        studio.room.picture = np.full_like(studio.room.picture, light)
+        monkeypatch.setattr(studio, "place", lambda _, bright=light: Place(np.full((*VIEW.size[::-1], 3), bright), []))
         pictures.append(studio.take(figure, 5)[0][solid].astype(int))
     assert np.abs(np.subtract(*pictures)).max() <= 2  # the lens blurs a little
 
@@ -331,8 +332,8 @@ def test_noise_and_shadow_do_what_they_say(rng):
     studio = SceneRenderer(spec, VIEW.camera(), rng)
     two = np.stack([studio.empty(), studio.empty()]).astype(float)
     assert 5 < np.diff(two, axis=0).std() / np.sqrt(2) < 8
-    clear = studio.room.picture
-    dark = studio.room.shaded(figure, 0)
+    clear = studio.room.pictures[0]
+    dark = studio.room.shaded(clear, figure, 0)
     assert (dark <= clear + 1e-9).all()
     assert (dark >= 0.5 * clear - 1e-9).all()
     assert (dark < 0.95 * clear).any()
@@ -378,17 +379,19 @@ def test_every_picture_has_a_mask_and_a_truth_at_its_time(made):
     assert len(list(open_frames(made / "background" / "cam.mp4"))) == 2
     np.testing.assert_allclose([frame.time for frame in film], [float(row["time"]) for row in rows], atol=1e-3)
     assert all(set(np.unique(frame.image)) == {0, 255} for frame in masks)
-    assert list(rows[0]) == ["time", *(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")]
+    assert list(rows[0]) == ["time", *(f"{joint}_{axis}" for joint in (*JOINTS, *SOLES) for axis in "xyz"),
+                             *(f"{sole}_contact" for sole in SOLES)]
+    assert all(row[f"{sole}_contact"] == "1" for row in rows for sole in SOLES)  # the feet are planted
 
 
 def test_trc_is_the_csv_in_millimetres(made):
     rows = np.loadtxt(made / "truth.csv", delimiter=",", skiprows=1)
     lines = (made / "truth.trc").read_text(encoding="utf-8").splitlines()
-    assert lines[3].split() == ["Frame#", "Time", *JOINTS]
-    assert lines[2].split()[2:5] == [str(len(rows)), "17", "mm"]
+    assert lines[3].split() == ["Frame#", "Time", *JOINTS, *SOLES]
+    assert lines[2].split()[2:5] == [str(len(rows)), "21", "mm"]
     trc = np.array([[float(v) for v in line.split()] for line in lines[6:]])
     np.testing.assert_array_equal(trc[:, 0], 1 + np.arange(len(rows)))
-    np.testing.assert_allclose(trc[:, 2:], 1000 * rows[:, 1:], atol=0.011)
+    np.testing.assert_allclose(trc[:, 2:], 1000 * rows[:, 1 : 1 + 3 * 21], atol=0.011)
 
 
 def test_reference_postures_are_right(made):
@@ -459,7 +462,7 @@ def test_spec_of_plain_values():
 
 
 @pytest.mark.parametrize(("values", "told"), [
-    ({"bodi": {}}, r"spec: bodi: no such setting; possible are begin, body, cameras, frames, motion, name, rate"),
+    ({"bodi": {}}, r"spec: bodi: no such setting; possible are begin, body, cameras, faults, frames, motion, name, posture, rate"),
     ({"body": {"size": 1}}, r"body\.size: no such setting; possible are arm_length, build, girth"),
     ({"body": {"stature": 3.1}}, r"body\.stature: .*less than or equal to 2.2, found 3.1"),
     ({"body": {"stature": float("nan")}}, r"body\.stature: .*found nan"),
@@ -516,7 +519,8 @@ def test_the_demo_shows_the_papers_motions_and_a_reach():
 @pytest.mark.shared
 def test_truth_has_the_shared_recordings_columns(shared, made):
     theirs = shared / "recordings" / "upper_body"
-    assert list(rows_of(made / "truth.csv")[0]) == list(rows_of(theirs / "truth.csv")[0])
+    columns = list(rows_of(theirs / "truth.csv")[0])
+    assert list(rows_of(made / "truth.csv")[0])[: len(columns)] == columns
     camera = read_calibration(theirs / "calibration.toml")[0]
     np.testing.assert_allclose(demo_spec().cameras[0].camera().T_camera_world, camera.T_camera_world, atol=1e-9)
     assert demo_spec().cameras[0].camera().matrix[0, 0] == pytest.approx(camera.matrix[0, 0], rel=1e-3)

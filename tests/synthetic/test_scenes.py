@@ -275,6 +275,60 @@ def test_the_empty_scene_shows_the_thing_and_its_shadow():
     assert not (dark & ~grown(shadow, 2)).any()
 
 
+def test_an_obstacle_is_there_from_its_entry_until_it_leaves(tmp_path):
+    view, still = replace(VIEW, distance=3.5), Gesture(motion="stand", seconds=2)
+    brought = Obstacle(kind="cabinet", ahead=0.6, left=0.3, enters=0.5, leaves=2.5)
+    spec = replace(with_scene(obstacles=(brought,), crf=0), cameras=(view,), motion=(still,), still=0.0)
+    with_it, without = (synthesize(one, tmp_path / name) for name, one in (("with", spec), ("without", with_scene(spec, obstacles=()))))
+    films = [np.stack([f.image for f in open_frames(folder / kind / "cam.mp4")]).astype(int)
+             for kind in ("video", "background") for folder in (with_it, without)]
+    there = (np.abs(films[0] - films[1]).max(-1) > 20).mean((1, 2)) > 0.02
+    np.testing.assert_array_equal(there, [0, 1, 1, 1, 1, 0, 0, 0])  # at 0, 0.5, 1, ... s
+    np.testing.assert_array_equal(films[2], films[3])
+    seen = [[int((f.image > 0).sum()) for f in open_frames(folder / "masks" / "cam.mkv", grey=True)] for folder in (with_it, without)]
+    np.testing.assert_array_equal(np.less(*seen), there)
+
+
+def test_which_obstacles_are_there():
+    always, late, new = Obstacle(kind="table"), Obstacle(kind="chair", enters=2.0, leaves=3.0), Obstacle(kind="pillar", enters=0)
+    taken = Obstacle(kind="cabinet", leaves=1.0)
+    things = Furniture([always, late, new, taken])
+    assert things.at(None).things == (always, taken)
+    assert things.at(0.0).things == (always, new, taken)
+    assert things.at(1.0).things == things.at(3.0).things == (always, new)
+    assert things.at(2.0).things == (always, late, new)
+    assert [len(now.things) for now in things.arrangements()] == [2, 3, 3, 2]
+    assert [now.things for now in Furniture([always]).arrangements()] == [(always,)]
+
+
+def test_a_scaled_obstacle_is_as_large_as_told():
+    down, high = np.array([0.0, 0.0, -1.0]), np.array([0.0, -0.8, 3.0])
+    for scale in (0.5, 1.0, 1.5):
+        away = Furniture([Obstacle(kind="table", ahead=0.8, scale=scale)]).intersect(high, down[None])[0][0]
+        assert 3.0 - away == pytest.approx(0.74 * scale)
+
+
+def test_the_chair_under_a_seated_person_is_where_they_sit(tmp_path):
+    spec = replace(SMALL, scene=Scene(obstacles=(Obstacle(kind="chair", seat=True, enters=0),), empty_seconds=0), posture="seated",
+                   turn_deg=70, motion=(Gesture(motion="stand", seconds=2),))
+    chair = spec.furniture().things[0]
+    assert chair.turn_deg == 70
+    assert np.hypot(chair.left, chair.ahead) < 0.1
+    folder = synthesize(spec, tmp_path / "made")
+    assert not (folder / "background").exists()
+    assert not (folder / "references").exists()
+    pelvis = read_joints(folder / "truth.csv").select(["pelvis"]).positions[:, 0]
+    np.testing.assert_allclose(pelvis[:, :2], 0, atol=1e-4)
+    assert 0.5 < pelvis[0, 2] < 0.6
+    standing_up = replace(spec, posture="standing", motion=(Gesture(motion="sit_down", seconds=4),))
+    behind = standing_up.furniture().things[0]
+    _, figure = perform(standing_up, np.random.default_rng(0))
+    lowest = figure.joints[figure.joints[:, 0, 2].argmin(), 0]
+    middle = np.array([behind.left, -behind.ahead])
+    assert np.linalg.norm(lowest[:2] - middle) < 0.1
+    assert lowest[2] == pytest.approx(pelvis[0, 2], abs=0.01)
+
+
 # Other people
 
 
@@ -323,8 +377,8 @@ def test_a_bystander_keeps_to_their_place_and_casts_a_shadow(tmp_path):
     assert len(masks) == len(people) == 8
     assert all((b >= a).all() and (b > a).any() for a, b in zip(masks, people))
     room = SceneRenderer(spec, VIEW.camera(), np.random.default_rng(0), figures).room
-    person = standing()
-    assert (room.shaded(person, 0, standing(left=0.9)) <= room.shaded(person, 0) + 1e-12).all()
+    person, bare = standing(), room.pictures[0]
+    assert (room.shaded(bare, person, 0, standing(left=0.9)) <= room.shaded(bare, person, 0) + 1e-12).all()
 
 
 # Light and picture quality
@@ -369,7 +423,7 @@ def test_pictures_are_the_same_whatever_the_number_of_threads_with_everything_in
 def test_backgrounds_differ_as_told():
     def roughness(kind):
         studio = SceneRenderer(with_scene(background=kind, room=5), replace(VIEW, size=(160, 120)).camera(), np.random.default_rng(0))
-        grey = studio.room.picture.mean(-1)
+        grey = studio.room.pictures[0].mean(-1)
         return float(np.abs(np.diff(grey, axis=1)).mean())
 
     rough = {kind: roughness(kind) for kind in ("plain", "room", "textured", "cluttered")}
@@ -381,8 +435,8 @@ def test_backgrounds_differ_as_told():
 def test_two_cameras_at_one_place_see_the_same_room(kind):
     wide, narrow = replace(VIEW, fov_deg=60, size=(120, 90)), replace(VIEW, fov_deg=60, size=(60, 45))
     rooms = [SceneRenderer(with_scene(background=kind), view.camera(), np.random.default_rng(0)).room for view in (wide, narrow)]
-    halved = rooms[0].picture.reshape(45, 2, 60, 2, 3).mean((1, 3))
-    assert np.abs(halved - rooms[1].picture).mean() < 0.03
+    halved = rooms[0].pictures[0].reshape(45, 2, 60, 2, 3).mean((1, 3))
+    assert np.abs(halved - rooms[1].pictures[0]).mean() < 0.03
 
 
 def test_camouflage_dyes_the_clothes():

@@ -31,6 +31,7 @@ from shadowpuppet.synthetic import (
     proving_ground,
     proving_rings,
     read_spec,
+    resting,
     spec_from,
     spec_text,
     synthesize,
@@ -39,6 +40,7 @@ from shadowpuppet.synthetic.movement.gestures import GESTURES
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes, parse_gestures
 from shadowpuppet.synthetic.spec_file import SPEC_HEADER, seed_of
+from shadowpuppet.synthetic.truth import SOLES
 from shadowpuppet.video import open_frames
 
 TINY = ["--size", "64x48", "--rate", "4", "--seconds", "2"]
@@ -102,7 +104,7 @@ def test_a_spec_with_a_ring_comes_back(ring):
 def test_named_specs_are_theirs_by_name_and_can_be_written():
     named = named_specs()
     assert {"demo", "ring_walking", "man_reach"} <= set(named)
-    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(humaneva()) + len(proving_rings())
+    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(humaneva()) + len(proving_rings()) + len(resting())
     for name, spec in named.items():
         assert spec.name == name
         assert spec_from(tomllib.loads(spec_text(spec))) == spec
@@ -139,12 +141,19 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "told"), [
-    ("fog = 1", r"spec\.toml: fog: no such setting; possible are begin, body, cameras, frames, motion"),
+    ("fog = 1", r"spec\.toml: fog: no such setting; possible are begin, body, cameras, faults, frames, motion"),
     ("[scene]\nfog = 1", r"scene\.fog: no such setting; possible are background, bystanders"),
     ("[ring]\nnumber = 3", r"ring\.number: no such setting; possible are count, distortion"),
     ("[[scene.obstacles]]\nkind = 'sofa'", r"scene\.obstacles\.0\.kind: .*'table', 'chair', 'pillar' or 'cabinet', found 'sofa'"),
     ("[[scene.obstacles]]\nkind = 'chair'\nwhere = 1", r"scene\.obstacles\.0\.where: no such setting; possible are ahead, colour"),
     ("[[scene.obstacles]]\nkind = 'chair'\nahead = 0.1", r"scene\.obstacles\.0: ahead, left: found 0.1, 0, where the person stands"),
+    ("[[scene.obstacles]]\nkind = 'chair'\nleaves = 0", r"scene\.obstacles\.0: leaves: found 0 s, expected a time after it enters"),
+    ("[[scene.obstacles]]\nkind = 'table'\nseat = true", r"scene\.obstacles\.0: seat: found a table, expected a chair"),
+    ("[[scene.obstacles]]\nkind = 'chair'\nseat = true", r"scene\.obstacles: found a seat, but the person is not seated"),
+    ("posture = 'seated'\nmotion = [{motion = 'walk'}]", r"posture: found the motion walk of a person who is seated, expected stand"),
+    ("posture = 'lying'\nmotion = [{motion = 'twist'}]", r"posture: found the motion twist of a person who is lying, expected stand"),
+    ("motion = [{motion = 'sit_down'}, {motion = 'walk'}]\n[[scene.obstacles]]\nkind = 'chair'\nseat = true",
+     r"scene\.obstacles: found a seat and the motion walk"),
     ("[[scene.obstacles]]\nkind = 'pillar'\nahead = 2.0", r"scene\.obstacles: found a pillar where the camera 'cam' stands"),
     ("[[scene.bystanders]]\nahead = 1.8\nleft = 0.1", r"scene\.bystanders: found somebody where the camera 'cam' stands"),
     ("[[scene.bystanders]]\nahead = 0.2\nleft = 0.1", r"scene\.bystanders\.0: ahead, left: found 0.2, 0.1, where the person stands"),
@@ -255,6 +264,18 @@ def test_flags_make_a_recording_and_say_how_to_track_it(shell, tmp_path):
     assert len(frames(tmp_path / "made" / "video" / "cam.mp4")) == len(read_joints(tmp_path / "made" / "truth.csv").times) == 15
 
 
+def test_a_flag_makes_faults_and_the_table_names_them(shell, tmp_path):
+    code, out, err = shell("-o", "made", "--faults", "gain 1.3 @1, frozen @2-3, gain 0.9 @3", *TINY)
+    assert (code, err) == (0, "")
+    assert "faults     gain, frozen\n" in out
+    masks = frames(tmp_path / "made" / "masks" / "cam.mkv")
+    assert all(np.array_equal(masks[8], mask) for mask in masks[9:12])
+    assert not np.array_equal(masks[8], masks[12])
+    code, _, err = shell("-o", "other", "--faults", "gain 1.3 @1, freeze", *TINY)
+    assert code != 0
+    assert "faults: found 'freeze', which names no kind of fault; there are: absent, black" in " ".join(err.split())
+
+
 def test_made_recordings_can_be_looked_at_and_tracked(shell):
     assert shell("-o", "made", "--motion", "wave_hands", "--size", "160x120", "--rate", "8", "--seconds", "2", "--quiet") == (0, "", "")
     code, out, _ = shell("made", command="info")
@@ -273,6 +294,21 @@ def test_references_are_whole_or_not_there(tmp_path):
         assert len(made.references) == count
 
 
+def test_flags_seat_a_person_on_a_chair_without_an_empty_scene(shell, tmp_path):
+    code, _, err = shell("-o", "made", "--posture", "seated", "--chair", "new", "--empty-seconds", 0, "--motion", "reach", *TINY)
+    assert (code, err) == (0, "")
+    spec = read_spec(tmp_path / "made" / "spec.toml")
+    assert spec.posture == "seated"
+    assert spec.scene.obstacles == (Obstacle(kind="chair", seat=True, enters=0.0),)
+    recording = read_recording(tmp_path / "made")
+    assert [view.background for view in recording.views] == [None]
+    known = apply_changes(SpecChanges(chair="known"), spec)
+    assert known.scene.obstacles == (Obstacle(kind="chair", seat=True),)  # in place of the other chair
+    code, _, err = shell("-o", "other", "--chair", "new", *TINY)
+    assert code != 0
+    assert "the person is not seated" in err
+
+
 def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
     code, out, err = shell("-o", "ring", "--cameras", 3, "--ring-radius", 3, "--seed", 4, "--motion", "random", *TINY)
     assert (code, err) == (0, "")
@@ -282,8 +318,8 @@ def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
     assert recording.references == ()
     assert recording.training == tmp_path / "ring" / "training.csv"
     truth, training = read_joints(recording.truth), read_joints(recording.training)
-    assert truth.names == training.names
-    assert np.abs(truth.positions - training.positions).max() > 0.05  # another performance
+    assert truth.names == (*training.names, *SOLES)
+    assert np.abs(truth.select(training.names).positions - training.positions).max() > 0.05  # another performance
     upper = [[np.linalg.norm(np.diff(table.select(["left_shoulder", "left_elbow"]).positions, axis=1), axis=-1).mean()]
              for table in (truth, training)]  # fmt: skip
     assert upper[0] == pytest.approx(upper[1], abs=1e-4)  # by the same body

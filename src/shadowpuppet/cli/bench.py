@@ -19,6 +19,10 @@ MONO_ROWS = (
     ("step", "a frame of the filter at Table I", 1e3, "ms", ""),
     ("naive_frame", "  plain NumPy and Python", 1e3, "ms", "mono.ratio_naive_frame"),
     ("default", "a frame of the default filter", 1e3, "ms", ""),
+    ("silhouette", "a frame's silhouette, 640 x 480", 1e3, "ms", ""),
+    ("correct", "  of this, light and movement looked for", 1e3, "ms", "mono.ratio_correction"),
+    ("correct_moved", "  a nudged camera's frame shifted back", 1e3, "ms", "mono.ratio_correction_moved"),
+    ("correct_uneven", "  an uneven change of light undone", 1e3, "ms", "mono.ratio_correction_uneven"),
 )
 MULTI_ROWS = (
     ("hull", "silhouettes to surface points", 1e3, "ms", ""),

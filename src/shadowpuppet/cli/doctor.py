@@ -225,6 +225,15 @@ def _extras() -> Iterator[Finding]:
             yield Finding(f"extra {extra}", "works", f"{purpose}: {', '.join(f'{name} {metadata.version(name)}' for name in names)}")
 
 
+def _external_masks() -> Iterator[Finding]:
+    """What runs the scripts of `masks`."""
+    from shadowpuppet.silhouette.external.environment import cache_folder, uv_path
+
+    uv = uv_path()
+    told = f"scripts of `masks` are run by uv, {uv}" if uv else f"scripts of `masks` run in environments kept in {cache_folder()}"
+    yield Finding("masks", "works", told, "" if uv else "uv (pip install uv) would also bring the version of Python that a script needs")
+
+
 def _browser() -> Iterator[Finding]:
     import shutil
 
@@ -270,6 +279,6 @@ def _writable(folder: Path) -> bool:
 CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
     ("Python", _python, True), ("libraries", _libraries, True), ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
-    ("browser", _browser, False), ("cameras", _cameras, False),
+    ("masks", _external_masks, False), ("browser", _browser, False), ("cameras", _cameras, False),
 )  # fmt: skip
 """Name, function, whether tracking needs it."""

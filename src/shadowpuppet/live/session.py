@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,7 @@ from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
 from shadowpuppet.pipeline.person import MonocularSubject
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_settings
-from shadowpuppet.silhouette import learn_background
+from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
 from shadowpuppet.tracking.status import LOST_OVERLAP
 from shadowpuppet.video import Image
@@ -141,12 +141,13 @@ class Session(LiveSession):
 
     def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
         """Learn the background from `scene`, and, from `film`, pictures with the person, also the blur of outlines."""
-        blank = Silhouettes("live", None, self._region, scene[0] if self._region else None)
-        visible = [blank.visible(image) for image in film] if film else None
         asked, clean = self.options.silhouette, clean_settings(self.options.silhouette)
-        self.scene = scene
-        self._silhouettes = replace(blank, segmenter=learn_background(scene, asked, film=visible))
-        self._clean = self._silhouettes if clean == asked else replace(blank, segmenter=learn_background(scene, clean, film=visible))
+
+        def silhouettes(settings: SilhouetteSettings) -> Silhouettes:
+            return Silhouettes("live", learn_background(scene, settings, film=film or None, region=self._region), self._region)
+
+        self.scene, self._silhouettes = scene, silhouettes(asked)
+        self._clean = self._silhouettes if clean == asked else silhouettes(clean)
         self.phase, self._state = ("tracking" if self.fit else "waiting"), None
 
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:

@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
-from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
 from shadowpuppet.pipeline.survey import brief_length
 from shadowpuppet.threads import usable_cores
 
@@ -119,7 +119,7 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> Silhou
 
 
 def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
-    return learn_silhouettes(footage, take_sample(footage, options.masks, brief_length(footage, options)), options)
+    return uncluttered_silhouettes(footage, take_sample(footage, options.masks, brief_length(footage, options)), options)
 
 
 def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:

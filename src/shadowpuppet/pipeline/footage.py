@@ -16,6 +16,7 @@ from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, 
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
+from shadowpuppet.video.seeking import Seeker
 
 LOOKED_AT = 1500
 """Number of frames, from the film's beginning, that a sample is taken from: examining a film must not take as long as tracking it."""
@@ -25,6 +26,8 @@ ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
 FIRST_SECONDS, FIRST = 8.0, 16
 """Length of the film's beginning (s), and number of its frames that a sample keeps."""
+SPREAD = 60
+"""Number of frames, spread over the whole film, from which an empty scene is recovered."""
 
 
 class CameraFrame(NamedTuple):
@@ -211,6 +214,18 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
             first.append(frame)
             next_first = frame.time + 0.99 * FIRST_SECONDS / FIRST
     return Sample(list(runs.values()), list(runs), first, np.array(times))
+
+
+def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
+    """`number` images spread over the whole film, or all if there are fewer, found by seeking; none if the film does not state its
+    length."""
+    film, length = footage.film(), footage.count
+    if length is None or not np.isfinite(film.rate):
+        return []
+    wanted = np.unique(np.linspace(0, max(length - 1, 0), number).round())
+    with Seeker(Path(str(footage.view.video)), footage.camera.size, footage.recording.rate) as seeker:
+        found = (seeker.at(footage.view.start + float(n) / film.rate) for n in wanted)
+        return [image for image in found if image is not None]
 
 
 def _spread(length: int) -> dict[int, int]:

@@ -10,6 +10,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
 
 
@@ -53,6 +54,10 @@ class Look:
     """The same with the plain rule of eq. 1."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
+    condition: FilmCondition | None = None
+    """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
     person: dict[str, Any] | None = None
     """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
     it was not fitted."""
@@ -89,6 +94,10 @@ class CameraLook:
     """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
+    condition: FilmCondition | None = None
+    """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -139,13 +140,26 @@ def _fitted(footage: Footage, masks: list[Mask], silhouettes: Silhouettes, optio
         known["height"] = known["height"] or person.height
         fit = find_person(rng, footage.camera, _few(masks), sizes=person.sizes, **known)
         return replace(fit, curves={}), str(options.person)
-    references = _references(footage, silhouettes)
-    if references:
-        known["body"] = "rounded" if body in WHOLE else body
-        fit = fit_references(rng, footage.camera, references, **known)
-        _check_postures(footage, references, fit)
-        return as_whole(footage.camera, list(references.values()), fit, body) if body in WHOLE else fit, "references"
-    return find_person(rng, footage.camera, _few(masks), **known), "proportions, refined on the first seconds"
+    source = "proportions, refined on the first seconds"
+    try:
+        if (fit := _by_references(footage, silhouettes, known, rng)) is not None:
+            return fit, "references"
+    except RecordingError:
+        if silhouettes.recovered is None or not silhouettes.recovered.covered.any():
+            raise
+        source += "; the references' silhouettes need a picture of the empty scene"
+    return find_person(rng, footage.camera, _few(masks), **known), source
+
+
+def _by_references(footage: Footage, silhouettes: Silhouettes, known: dict[str, Any], rng: np.random.Generator) -> SizeFit | None:
+    """The fit to the reference postures; None if there are none. Raises `RecordingError` for a silhouette that is not the posture's."""
+    references, body = _references(footage, silhouettes), known["body"]
+    if not references:
+        return None
+    known = {**known, "body": "rounded" if body in WHOLE else body}
+    fit = fit_references(rng, footage.camera, references, **known)
+    _check_postures(footage, references, fit)
+    return as_whole(footage.camera, list(references.values()), fit, body) if body in WHOLE else fit
 
 
 def _few(masks: list[Mask]) -> list[Mask]:
@@ -164,7 +178,7 @@ def _reference(footage: Footage, silhouettes: Silhouettes, reference: Reference)
     path = reference.image if silhouettes.segmenter is not None or reference.mask is None else reference.mask
     images = (image for image, _ in zip(footage.pictures(path, "a reference"), range(LONGEST_REFERENCE)))
     try:
-        masks = [silhouettes(CameraFrame(0.0, image, image)) for image in images]
+        masks = [silhouettes.elsewhere(CameraFrame(0.0, image, image)) for image in images]
     except SilhouetteError as error:
         raise RecordingError(f"{path}: {error}") from None
     middle = sorted(masks, key=np.count_nonzero)[len(masks) // 2]  # few frames of a film show the person walking in

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, take_sample
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.silhouette import Segmenter, SilhouetteSettings, background_from_film, learn_background, ready_mask
+from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
+from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.video import Image
 
 
@@ -26,14 +26,30 @@ class Silhouettes:
     """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
     """Rows and columns outside which masks are empty; None for all."""
-    blank: Image | None = None
-    """Image of the empty scene, which replaces the image outside the region."""
+    clutter: Clutter | None = None
+    """What is left out of every mask, because it is not the person."""
+    recovered: RecoveredScene | None = None
+    """The empty scene if it was recovered from the film."""
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:
-            return self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
-        return self._within(self.segmenter(self.visible(frame.image)))
+            mask = self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
+        else:
+            mask = self._within(self.segmenter(frame.image))
+        return mask if self.clutter is None else self.clutter.removed(mask)
+
+    def elsewhere(self, frame: CameraFrame) -> Mask:
+        """The mask (H, W) in a picture that is none of the film's, so that what the person always covers there need not be covered."""
+        if self.segmenter is None or self.segmenter.covered is None:
+            return self(frame)
+        return replace(self, segmenter=replace(self.segmenter, covered=None))(frame)
+
+    def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
+        """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
+        none."""
+        clutter = find_clutter(masks)
+        return self if clutter is None else replace(self, clutter=clutter)
 
     def plain(self, frame: CameraFrame) -> Mask | None:
         """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
@@ -41,13 +57,13 @@ class Silhouettes:
             return None
         return self._within(self.segmenter.raw(frame.image))
 
-    def visible(self, image: Image) -> Image:
-        """A copy of an image with the empty scene outside the region, so that nothing there is taken for the person."""
-        if self.region is None or self.blank is None:
+    def steadied(self, image: Image) -> Image:
+        """An image as the camera would see it without its movement since the empty scene: it fits the mask."""
+        correction = None if self.segmenter is None else self.segmenter.correction
+        if correction is None or correction.registration is None:
             return image
-        out = self.blank.copy()
-        out[self.region] = image[self.region]
-        return out
+        movement = correction.registration.movement(image)
+        return image if movement is None else correction.registration.undone(image, movement)[0]
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
@@ -57,25 +73,45 @@ class Silhouettes:
         return out
 
 
-def learn_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
-    """Silhouettes with a learnt background, or the ready ones. Raises `SilhouetteError` or `SettingsError`."""
+def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recovered: RecoveredScene | None = None) -> Silhouettes:
+    """Silhouettes with a learnt background, or the ready ones. Raises `SilhouetteError` or `SettingsError`.
+
+    recovered: the empty scene as it was recovered from the same film before; None to do so where the recording has none.
+    """
     if options.masks:
         return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes", None, footage.region)
     images = [frame.image for frame in sample.frames]
-    if footage.view.background is None:
-        scene, source = [background_from_film(images)], "the film itself (median)"
+    if footage.view.background is not None:
+        scene, source, recovered = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background), None
     else:
-        scene, source = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background)
-    first, scene = _peeked(iter(scene))
-    silhouettes = Silhouettes(source, None, footage.region, None if footage.region is None else first)
-    segmenter = learn_background(scene, options.silhouette, film=[silhouettes.visible(image) for image in images])
-    return replace(silhouettes, segmenter=segmenter)
+        recovered = recovered or _recovered(footage, images)
+        scene, source = iter([recovered.picture]), f"the film itself (recovered from {recovered.frames} frames)"
+    covered = recovered.covered if recovered is not None and recovered.covered.any() else None
+    segmenter = learn_background(scene, options.silhouette, film=images, region=footage.region, covered=covered)
+    return Silhouettes(source, segmenter, footage.region, recovered=recovered)
+
+
+def _recovered(footage: Footage, sampled: list[Image]) -> RecoveredScene:
+    """The empty scene recovered from the whole film, or from the images `sampled` of it if it cannot be sought through."""
+    images = max(spread_frames(footage), sampled, key=len)
+    if footage.region is None or not images:
+        return recover_scene(images)
+    alike = [images[0].copy() for _ in images]  # nothing moves outside the region
+    for out, image in zip(alike, images):
+        out[footage.region] = image[footage.region]
+    return recover_scene(alike)
 
 
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
-    return map(learn_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+    return map(uncluttered_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+
+
+def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
+    """`learn_silhouettes` without the clutter in the sample's frames."""
+    silhouettes = learn_silhouettes(footage, sample, options)
+    return silhouettes.without_clutter([silhouettes(frame) for frame in sample.frames])
 
 
 def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
@@ -86,7 +122,8 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
         return tracked
-    return learn_silhouettes(footage, sample, replace(options, silhouette=clean))
+    clean_ones = learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered)
+    return replace(clean_ones, clutter=tracked.clutter)
 
 
 def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
@@ -94,12 +131,6 @@ def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
     if asked.method == "averaging":
         return SilhouetteSettings()
     return asked if asked.cleaned else replace(asked, clean=None)
-
-
-def _peeked(images: Iterator[Image]) -> tuple[Image | None, Iterator[Image]]:
-    """The first of some images, and an iterator over all of them."""
-    first = next(images, None)
-    return first, chain([] if first is None else [first], images)
 
 
 def _short(path: Path | None) -> str:

@@ -22,6 +22,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
+from shadowpuppet.silhouette.correction.condition import FilmCondition, film_condition
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
 
@@ -55,6 +56,9 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
     sample = take_sample(footage, options.masks, longest)
     silhouettes = learn_silhouettes(footage, sample, options)
     runs = [[silhouettes(frame) for frame in run] for run in sample.runs]
+    silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
+    if silhouettes.clutter is not None:
+        runs = [[silhouettes.clutter.removed(mask) for mask in run] for run in runs]
     masks = [mask for run in runs for mask in run]
     exact = [ready_mask(frame.ready) for frame in sample.frames if frame.ready is not None and silhouettes.segmenter is not None]
     camera = footage.camera
@@ -63,7 +67,22 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT) ->
         "fov": float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))),
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
         "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
+        "left_out": _left_out(silhouettes, footage),
+        "condition": condition_of(silhouettes, sample),
     })  # fmt: skip
+
+
+def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
+    """What is left out of the silhouettes, in words and the film's pixels."""
+    parts = silhouettes.clutter.parts if silhouettes.clutter is not None else ()
+    (width, height), full = footage.camera.size, footage.view.camera.size
+    return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
+
+
+def _clutter_warnings(left_out: Sequence[str]) -> list[str]:
+    if not left_out:
+        return []
+    return [f"{'; '.join(left_out)}: taken for clutter, not for the person, and left out of the silhouettes"]
 
 
 def brief_length(footage: Footage, options: Options) -> int:
@@ -101,9 +120,31 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
         recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.film().count,
         looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
         plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
-        refusal=film.values["quality"].refusal(), **film.values,
+        refusal=_doubted(film.silhouettes) or film.values["quality"].refusal(), **film.values,
     )  # fmt: skip
-    return look if look.refusal else replace(look, doubts=tuple(_doubts(look, footage)))
+    if look.refusal:
+        return look
+    doubts = (*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *_clutter_warnings(look.left_out))
+    return replace(look, doubts=(*doubts, *look.quality.warnings()))
+
+
+def _doubted(silhouettes: Silhouettes) -> str | None:
+    """Why the scene cannot be recovered from the film; None if it can be, or need not."""
+    return None if silhouettes.recovered is None else silhouettes.recovered.doubt
+
+
+def _recovery_doubts(names: Sequence[str], silhouettes: Sequence[Silhouettes]) -> list[str]:
+    """What to know of scenes that were recovered from the films of the cameras `names`."""
+    found = {name: each.recovered for name, each in zip(names, silhouettes) if each.recovered is not None}
+    said = [f"camera {name!r}: {scene.doubt}" for name, scene in found.items() if scene.doubt]
+    hidden = {name: float(scene.covered.mean()) for name, scene in found.items() if not scene.doubt}
+    if not hidden:
+        return said
+    of = f" of {', '.join(hidden)}" if len(names) > 1 else ""
+    never = (f"up to {100 * max(hidden.values()):.1f} % of the picture was never seen without the person, and counts as person in every "
+             "frame; ") if any(hidden.values()) else ""  # fmt: skip
+    return [*said, f"no picture of the empty scene{of}: it was recovered from the film; {never}what touches the person and has like "
+            "colours may be taken for it; look at the silhouettes, or give background/<camera>.mp4 or --background"]
 
 
 def known_scale(footage: Footage) -> str:
@@ -123,15 +164,12 @@ def _doubts(look: Look, footage: Footage) -> list[str]:
     elif subject.distance is None and not footage.recording.references:
         doubts.append("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as wrong as "
                       "that; measure it and give --distance, or take references")
-    if footage.view.background is None and look.key != "none":
-        doubts.append("no picture of the empty scene: it is the median of the film, so whoever stands still becomes background; "
-                      "give background/<camera>.mp4 or --background")
     if look.jitter * look.rate > UNEVEN:
         doubts.append(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are kept")
     if look.exact_overlap is not None and look.exact_overlap < GOOD:
         doubts.append(f"the silhouettes overlap the ready ones in masks/ by {look.exact_overlap:.2f} only: try another "
                       "--silhouette.method, or --masks")
-    return [*doubts, *look.quality.warnings()]
+    return [*doubts, *_poor(look.condition)]
 
 
 # Several cameras
@@ -147,7 +185,8 @@ def survey_rig(rig: Rig, options: Options) -> Survey:
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    look = replace(look, refusal=refusal, doubts=() if refusal else tuple(_rig_doubts(look)))
+    doubts = [*_rig_doubts(look), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
     return Survey(rig, silhouettes, silhouettes, first, look)
 
 
@@ -194,7 +233,8 @@ def _rig_doubts(look: RigLook) -> list[str]:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
                           "try another --silhouette.method, or --masks")
-        doubts += [f"camera {camera.name!r}: {warning}" for warning in camera.quality.warnings()]
+        warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *camera.quality.warnings())
+        doubts += [f"camera {camera.name!r}: {warning}" for warning in warnings]
         doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
     return doubts
 
@@ -204,6 +244,17 @@ def _rig_doubts(look: RigLook) -> list[str]:
 
 def _share(masks: Sequence[Mask]) -> float:
     return float(np.mean([mask.mean() for mask in masks]))
+
+
+def condition_of(silhouettes: Silhouettes, sample: Sample) -> FilmCondition | None:
+    """The condition of a film in its sampled frames; None for ready silhouettes and an empty film."""
+    if silhouettes.segmenter is None or not sample.frames:
+        return None
+    return film_condition(silhouettes.segmenter, [[(frame.time, frame.image) for frame in run] for run in sample.runs])
+
+
+def _poor(condition: FilmCondition | None) -> tuple[str, ...]:
+    return () if condition is None else condition.warnings()
 
 
 def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple
@@ -31,8 +31,9 @@ from shadowpuppet.pipeline.progress import (
     tracked,
     warn_of_losses,
 )
-from shadowpuppet.pipeline.rig import Rig, open_rig, read_frames
+from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
+from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.threads import one_blas_thread
@@ -156,6 +157,12 @@ def _write_beside(folder: Path, prepared: Prepared) -> None:
     write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
 
 
+def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
+    """A frame set with the images of cameras that stand still."""
+    images = (None if image is None else each.steadied(image) for each, image in zip(silhouettes, seen.images))
+    return seen._replace(images=tuple(images))
+
+
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
            cache: SilhouetteCache | None) -> None:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
@@ -178,7 +185,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                     found = motion_frame(subject, seen.time, state, observation)
                     writer.write(found)
                     if overlay is not None:
-                        overlay.write(subject.draw(seen, found))
+                        overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
                 count += 1
                 listener.advance(count)
     finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,12 @@ Image = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 SMOOTHING = 0.7
 """Standard deviation (pixels) of the smoothing before classification: it halves the noise. The outline is drawn without it."""
+NOISY, NOISY_SMOOTHING = 3.0, 1.5
+"""Noise of a film after that, grey levels of brightness, from which on it is smoothed by more; a camera in good light and web video have
+less."""
+
+UNLIKE = 8.0
+"""Median difference of a frame from the empty scene, over that of the film's better frames, from which on it does not show the scene."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +66,7 @@ def learn_statistics(images: Iterable[Image], observe: Callable[[Image], object]
         observe(image)
     if sums is None:
         raise SilhouetteError("background: found no frame, expected a picture or film of the empty scene; "
-                              "without one, it is taken from the film itself (background_from_film)")
+                              "without one, it is recovered from the film itself (recover_scene)")
     return sums.statistics()
 
 
@@ -92,24 +99,6 @@ class _Sums:
                           moments(self.smooth)[1].astype(np.float32))
 
 
-def background_from_film(images: Iterable[Image], count: int = 20) -> Image:
-    """The empty scene (H, W, 3) or (H, W) of a film: the median, pixel by pixel, of `count` to 2 * `count` frames spread over it.
-
-    Memory does not grow with the film. A pixel is correct if the person covers it in less than half of the film; a person standing
-    still becomes background. Raises `SilhouetteError` for fewer than 3 frames.
-    """
-    frames = sample_frames(images, count)
-    if len(frames) < 3:
-        raise SilhouetteError(f"background: found a film of {len(frames)} frames, expected at least 3 to tell a person who moves "
-                              "from the scene; give a picture or film of the empty scene")
-    for n, image in enumerate(frames):
-        check_image(image, f"film frame {n}")
-        check_alike(image, frames[0].shape, f"film frame {n}")
-    middle, rows = len(frames) // 2, 32
-    strips = (np.stack([f[y : y + rows] for f in frames]) for y in range(0, len(frames[0]), rows))
-    return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
-
-
 class FrameSampler:
     """Keeps copies of `count` to 2 * `count` of the added frames, evenly spread; all of them if there are fewer."""
 
@@ -135,14 +124,43 @@ def sample_frames(images: Iterable[Image], count: int) -> list[Image]:
     return kept.kept
 
 
-def film_noise(frames: list[Image], mean: Floats) -> NDArray[np.float64]:
-    """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, about the smoothed background `mean` (H, W, 3).
+def film_noise(frames: list[Image], mean: Floats, smoothing: float = SMOOTHING) -> NDArray[np.float64]:
+    """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, smoothed, about the smoothed background `mean` (H, W, 3).
 
     It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution): a person covering less
-    than a third of the picture hardly changes it.
+    than a third of the picture hardly changes it. Frames that do not show the scene, black ones for example, are left out.
     """
-    differences = [np.abs(smoothed(to_planes(f).astype(np.float32)) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
-    return np.percentile(np.concatenate(differences), 68, axis=0)
+    differences = [np.abs(smoothed(to_planes(f).astype(np.float32), smoothing) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
+    typical = np.array([np.median(each[:, 0]) for each in differences])
+    shown = typical <= UNLIKE * max(float(np.percentile(typical, 25)), 1.0)
+    return np.percentile(np.concatenate([each for each, use in zip(differences, shown) if use]), 68, axis=0)
+
+
+class FilmNoise(NamedTuple):
+    """Noise of a film, and the smoothing that it asks for."""
+
+    smoothing: float
+    """Standard deviation of the smoothing before classification, pixels."""
+    sigma: NDArray[np.float64]
+    """Standard deviation (3,) of the smoothed Y, Cr, Cb about the empty scene, grey levels."""
+    share: NDArray[np.float64]
+    """The same (3,) over that after the least smoothing."""
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the film is smoothed by more than a clean one."""
+        return self.smoothing > SMOOTHING
+
+
+def measured_noise(frames: list[Image], mean: Floats) -> FilmNoise:
+    """The noise of a film's frames about the background `mean` (H, W, 3); none without frames."""
+    if not frames:
+        return FilmNoise(SMOOTHING, np.zeros(3), np.ones(3))
+    least = film_noise(frames, smoothed(mean))
+    if least[0] < NOISY:
+        return FilmNoise(SMOOTHING, least, np.ones(3))
+    more = film_noise(frames, smoothed(mean, NOISY_SMOOTHING), NOISY_SMOOTHING)
+    return FilmNoise(NOISY_SMOOTHING, more, np.minimum(more / np.maximum(least, 1e-3), 1))
 
 
 def picture_of(background: Background) -> Image:
@@ -172,11 +190,12 @@ def to_brightness(image: Image) -> Image:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def smoothed(planes: np.ndarray) -> np.ndarray:
-    """Planes (H, W, 3) smoothed by a small Gaussian against pixel noise."""
+def smoothed(planes: np.ndarray, smoothing: float = SMOOTHING) -> np.ndarray:
+    """Planes (H, W, 3) smoothed by a small Gaussian, standard deviation `smoothing` (pixels), against pixel noise."""
     import cv2
 
-    return np.asarray(cv2.GaussianBlur(planes, (3, 3), SMOOTHING), planes.dtype)
+    side = 2 * max(1, round(2 * smoothing - 0.4)) + 1
+    return np.asarray(cv2.GaussianBlur(planes, (side, side), smoothing), planes.dtype)
 
 
 def check_image(image: np.ndarray, name: str) -> None:

@@ -88,6 +88,8 @@ def outline_width(people: Iterable[tuple[Labels, Contrast]]) -> int:
     layers: list[list[NDArray[np.floating]]] = [[] for _ in range(MAX_WIDTH + 1)]
     areas = list[int]()
     for mask, contrast in people:
+        if mask.all():
+            continue
         areas.append(int(np.count_nonzero(mask)))
         highest = cv2.dilate(contrast * mask, np.ones((2 * MAX_WIDTH + 1, 2 * MAX_WIDTH + 1), np.uint8))
         # The person continues outside the picture, so its border is no outline.

@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import SilhouetteError
-from shadowpuppet.silhouette.background import Background, Floats, FrameSampler, Image, smoothed, to_brightness, to_planes
+from shadowpuppet.silhouette.background import (
+    SMOOTHING,
+    Background,
+    Floats,
+    FrameSampler,
+    Image,
+    smoothed,
+    to_brightness,
+    to_planes,
+)
 from shadowpuppet.silhouette.boundary import Labels
 
 if TYPE_CHECKING:
@@ -54,14 +63,18 @@ class ChannelClassifier:
     factor: float
     darkest: float
     """Least share of its brightness that the background keeps in shadow; 1: no pixel counts as shadow."""
+    smoothing: float = SMOOTHING
+    """Standard deviation of the smoothing of frames, pixels."""
+    noise: float = 0.0
+    """Standard deviation of noise in smoothed frames beyond that of a clean film, in assumed standard deviations."""
 
     def __call__(self, image: Image) -> Labels:
         """Labels (H, W) of a picture (H, W, 3) or (H, W)."""
         from shadowpuppet.silhouette.shadows import MAX_SHADE, resolve_shadows
 
-        planes = smoothed(to_planes(image))
+        planes = smoothed(to_planes(image), self.smoothing)
         if self.darkest < 1 and SHADOW_CHANNELS[self.key][0]:
-            return resolve_shadows(self.labels(planes, MAX_SHADE), planes, self.mean, self.inverse_sigma)
+            return resolve_shadows(self.labels(planes, MAX_SHADE), planes, self.mean, self.inverse_sigma, self.noise)
         return self.labels(planes)
 
     def labels(self, planes: Image, asked: float = 0.0) -> Labels:

@@ -6,15 +6,16 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
-from shadowpuppet.silhouette.background import Background, Image
+from shadowpuppet.silhouette.background import Background, FilmNoise, Image
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, disc, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene
-from shadowpuppet.silhouette.cleanup import coarse_person
-from shadowpuppet.silhouette.light import Light
+from shadowpuppet.silhouette.cleanup import Window, coarse_person
+from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
@@ -24,6 +25,8 @@ COLOUR_FLOOR = 0.75
 """Noise floor of colours over that of brightness: codecs average colours over four pixels."""
 NOISE_TAIL_FACTOR = 1.8
 """Factor on the film's measured noise: compression errors have longer tails than a normal distribution."""
+EXCESS_NOISE = 0.4
+"""Standard deviation of a noisy film's noise beyond a clean film's, over the assumed one."""
 FILM_SAMPLE = 12
 """Number of frames in which the film's noise and the blur of its outlines are measured; at most twice as many are used."""
 MIN_EDGE_CONTRAST = 1.5
@@ -35,23 +38,25 @@ MAX_GREY_CHROMA = 2
 
 
 def learn_background(images: Iterable[Image], settings: SilhouetteSettings | None = None, *,
-                     film: Iterable[Image] | None = None) -> Segmenter:
-    """The `Segmenter` learnt from pictures (H, W, 3) or (H, W) of the empty scene: a film, one picture, or that of `background_from_film`.
+                     film: Iterable[Image] | None = None, region: Window | None = None,
+                     covered: NDArray[np.bool_] | None = None) -> Segmenter:
+    """The `Segmenter` learnt from pictures (H, W, 3) or (H, W) of the empty scene: a film, one picture, or that of `recover_scene`.
 
     film: the frames to be segmented, or some spread over them: their noise and the blur of their outlines are measured. Without them the
-    noise is that of `images`, and outlines count as sharp. Raises `SilhouetteError` for pictures that do not fit, and `SettingsError`
-    for a method that this background does not allow.
+    noise is that of `images`, and outlines count as sharp. region: rows and columns outside which nothing is a person. covered: pixels
+    (H, W) that the person covers in every frame, as `recover_scene` finds them. Raises `SilhouetteError` for pictures that do not fit, and
+    `SettingsError` for a method that this background does not allow.
     """
     settings = settings or SilhouetteSettings()
     observer = METHODS[settings.method].observer(settings) if settings.method in METHODS else None
     background = scene.learn_statistics(images, observer.add if observer is not None else lambda image: None)
-    light = Light(scene.picture_of(background)) if settings.follows_light else None
-    frames = [frame if light is None else light.normalised(frame) for frame in _sample(film, background)]
+    correction = Correction.of(scene.picture_of(background), settings, region)
+    frames = [correction(frame).image for frame in _sample(film, background)]
     channels = _channel_classifier(background, frames, settings)
     choice = _choose(background, frames, channels, settings)
     classifier = METHODS[choice.key].build(EmptyScene(background, channels, settings, observer))
     least = MIN_EDGE_CONTRAST * settings.factor / float(channels.inverse_sigma[..., 0].max())
-    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, light)
+    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, correction, covered)
     return replace(segmenter, edge=EdgeProfile(_outline_width(segmenter, frames), least))
 
 
@@ -66,21 +71,21 @@ def _sample(film: Iterable[Image] | None, background: Background) -> list[Image]
 def _channel_classifier(background: Background, frames: list[Image], settings: SilhouetteSettings) -> ChannelClassifier:
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
-    sigma = assumed_sigma(background, frames, settings.noise_floor)
-    return ChannelClassifier("both", scene.smoothed(background.mean), (1 / sigma).astype(np.float32), settings.factor, darkest)
+    noise = scene.measured_noise(frames, background.mean)
+    sigma = assumed_sigma(background, noise, settings.noise_floor)
+    return ChannelClassifier("both", scene.smoothed(background.mean, noise.smoothing), (1 / sigma).astype(np.float32), settings.factor,
+                             darkest, noise.smoothing, EXCESS_NOISE if noise.noisy else 0.0)
 
 
-def assumed_sigma(background: Background, frames: list[Image], noise_floor: float) -> np.ndarray:
+def assumed_sigma(background: Background, noise: FilmNoise, noise_floor: float) -> np.ndarray:
     """Standard deviation (H, W, 3) of Y, Cr, Cb assumed for the empty scene: the greatest of the learnt one, the film's noise and
     the floor, increased at the background's edges."""
     import cv2
 
-    mean = scene.smoothed(background.mean)
-    floor = noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR])
-    if frames:
-        floor = np.maximum(floor, NOISE_TAIL_FACTOR * scene.film_noise(frames, mean))
+    mean = scene.smoothed(background.mean, noise.smoothing)
+    floor = np.maximum(noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR]), NOISE_TAIL_FACTOR * noise.sigma)
     across = cv2.dilate(mean, disc(1)) - cv2.erode(mean, disc(1))
-    return np.hypot(np.maximum(background.smooth_sigma, np.maximum(floor, 1e-3)), EDGE_JITTER * across)
+    return np.hypot(np.maximum(background.smooth_sigma * noise.share, np.maximum(floor, 1e-3)), EDGE_JITTER * across)
 
 
 def _choose(background: Background, frames: list[Image], channels: ChannelClassifier, settings: SilhouetteSettings) -> KeyChoice:

@@ -12,7 +12,7 @@ from shadowpuppet.silhouette.background import Background, Image, check_alike, c
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, Classifier
 from shadowpuppet.silhouette.cleanup import Window, clean
-from shadowpuppet.silhouette.light import Light
+from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 WHOLE_IMAGE: Window = (slice(None), slice(None))
@@ -25,10 +25,11 @@ class Segmenter:
     The steps of a call, in order:
 
     1. Check that the frame has the background's size and channels.
-    2. Divide it by the gain of its exposure and white balance over the empty scene, if the light has changed (`light.Light.normalised`).
+    2. Undo what has changed since the empty scene (`correction.frame_correction.Correction`): the camera's movement
+       (`correction.registration.Registration`), and the gain of exposure, white balance and lamps (`correction.light.Light`).
     3. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
-       its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`). The camera
-       is taken to stand still. `averaging`, `mog2` and `knn` have comparisons of their own.
+       its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`).
+       `averaging`, `mog2` and `knn` have comparisons of their own.
     4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
 
@@ -47,8 +48,10 @@ class Segmenter:
     """Blur of outlines in the film."""
     classifier: Classifier
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
-    light: Light | None = None
-    """The light of the empty scene; None: changes of light are not corrected."""
+    correction: Correction | None = None
+    """Undoes what has changed since the empty scene; None: nothing."""
+    covered: NDArray[np.bool_] | None = None
+    """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if it shows no person.
@@ -56,11 +59,16 @@ class Segmenter:
         Raises `SilhouetteError` for a frame that does not fit the background.
         """
         self._check(image)
-        image = image if self.light is None else self.light.normalised(image)
+        gap = None
+        if self.correction is not None:
+            image, gap, _ = self.correction(image)
         label = self.classifier(image)
+        if self.covered is not None:
+            label[self.covered] = 2
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.edge)
-        return label > 0
+        mask = label > 0 if self.covered is None else (label > 0) | self.covered
+        return mask if gap is None else gap.filled(mask)
 
     def raw(self, image: Image) -> NDArray[np.bool_]:
         """Liu 2011, eq. 1, and nothing else: |I_B - I_t| >= factor * sigma_B, of shape (H, W).

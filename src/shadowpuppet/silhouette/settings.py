@@ -33,6 +33,9 @@ class SilhouetteSettings:
     film, which has no colour. Not used by `averaging`."""
     light: bool | None = None
     """Whether to follow changes of exposure and white balance, frame by frame. By default for every method but `averaging`."""
+    stabilise: bool | None = None
+    """Whether to follow a nudged or shaking camera, frame by frame, so that masks are those of a camera that stands still. By default for
+    every method but `averaging`."""
     clean: bool | None = None
     """Whether to remove specks and small holes, keep only the person, and move the outline to half of the contrast. By default for
     every method but `averaging`."""
@@ -41,6 +44,11 @@ class SilhouetteSettings:
     def follows_light(self) -> bool:
         """Whether changes of light are followed: `light`, or its default."""
         return self.method != "averaging" if self.light is None else self.light
+
+    @property
+    def follows_camera(self) -> bool:
+        """Whether movements of the camera are followed: `stabilise`, or its default."""
+        return self.method != "averaging" if self.stabilise is None else self.stabilise
 
     @property
     def cleaned(self) -> bool:

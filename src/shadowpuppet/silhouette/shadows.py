@@ -37,10 +37,11 @@ OUTWARD_STEP, INWARD_STEP = 2, 1
 """Distances from an edge, pixels, between which light is compared."""
 
 
-def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats) -> Labels:
+def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float = 0.0) -> Labels:
     """Labels (H, W) in which `MAYBE_SHADOW` is replaced by 1, perhaps a person, or 0, background.
 
     planes, mean, inverse_sigma: smoothed Y, Cr, Cb of frame and background and the inverse standard deviation, of shape (H, W, 3).
+    noise: standard deviation of the film's noise beyond that of a clean film, in those standard deviations.
     """
     import cv2
 
@@ -51,7 +52,7 @@ def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: F
     if width * height:
         window = slice(y, y + height), slice(x, x + width)
         number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-        limbs = _limbs(_part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma))
+        limbs = _limbs(_part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma), noise)
         if limbs.any():
             found = np.zeros_like(label)
             found[window] = limbs[np.asarray(parts, np.intp)]
@@ -59,12 +60,14 @@ def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: F
     return label
 
 
-def _limbs(sums: np.ndarray) -> Labels:
-    """1 for each part that is a limb, else 0, of shape (K,); sums: `_part_sums` (K, 11)."""
+def _limbs(sums: np.ndarray, noise: float) -> Labels:
+    """1 for each part that is a limb, else 0, of shape (K,); sums: `_part_sums` (K, 11); noise: see `resolve_shadows`."""
     size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
     spread = np.sqrt(np.maximum(square / inner - light**2, 0)) * sigma / inner
+    if noise:
+        spread = np.sqrt(np.maximum(spread**2 - noise**2, 0))
     sharpness = across / open_edge / np.maximum(1 - light, 1e-3)
     shaded = (spread >= MAX_EVEN_SPREAD) | (np.hypot(cr, cb) / inner >= MAX_NEUTRAL_HUE)
     joined = (touching >= ENCLOSED_CONTACT) | ((touching >= BROAD_CONTACT) & (sharpness >= SHARP_EDGE))

@@ -5,7 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shadowpuppet.synthetic.collection import around, demo_ring_spec, demo_spec, humaneva, named_specs, proving_ground, proving_rings
+from shadowpuppet.synthetic.collection import (
+    around,
+    demo_ring_spec,
+    demo_spec,
+    humaneva,
+    named_specs,
+    proving_ground,
+    proving_rings,
+    resting,
+)
+from shadowpuppet.synthetic.faults.fault import Fault
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
@@ -18,8 +28,9 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-__all__ = ["Bystander", "Gesture", "Mannequin", "Obstacle", "Ring", "Scene", "Spec", "Viewpoint", "around", "demo_ring_spec", "demo_spec",
-           "humaneva", "named_specs", "proving_ground", "proving_rings", "read_spec", "spec_from", "spec_text", "synthesize"]
+__all__ = ["Bystander", "Fault", "Gesture", "Mannequin", "Obstacle", "Ring", "Scene", "Spec", "Viewpoint", "around", "demo_ring_spec",
+           "demo_spec", "humaneva", "named_specs", "proving_ground", "proving_rings", "read_spec", "resting", "spec_from", "spec_text",
+           "synthesize"]
 
 
 def synthesize(

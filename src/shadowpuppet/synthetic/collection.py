@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.synthetic.furniture import Obstacle
+from shadowpuppet.synthetic.movement.resting import PostureName
+from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
 from shadowpuppet.synthetic.spec import Scene, Spec
 from shadowpuppet.synthetic.spec_changes import parse_gestures
@@ -166,6 +169,46 @@ def proving_rings() -> tuple[Spec, ...]:
     )  # fmt: skip
 
 
+RESTING: tuple[tuple[str, Kind, int, PostureName, str, str, int], ...] = (
+    # name, kind and seed of the body, posture, gestures, chair (none, known: in the empty scene too, new: in the film only), cameras
+    ("sits", "man", 61, "seated", "reach 4, wave_hands 3", "known", 1),
+    ("sits_on_new", "man", 61, "seated", "reach 4, wave_hands 3", "new", 1),
+    ("sits_down", "woman", 62, "standing", "sit_down 5", "known", 1),
+    ("kneels", "woman", 63, "kneeling", "wave_hands 3, forearms_up 3", "none", 1),
+    ("rings_sits", "woman", 72, "seated", "stand 2, reach 4", "known", 4),
+    ("rings_sits_on_new", "woman", 72, "seated", "stand 2, reach 4", "new", 4),
+    ("rings_sits_down", "man", 65, "standing", "sit_down 5", "known", 4),
+    ("rings_kneels", "man", 66, "kneeling", "stand 2, wave_hands 3", "none", 4),
+    ("rings_lies", "woman", 67, "lying", "stand 2, reach 4", "none", 4),
+)
+
+
+def resting() -> tuple[Spec, ...]:
+    """Recordings of people who sit, sit down, kneel and lie: the upper body with one camera, the whole body with four; and of one who walks
+    through the picture of one camera to and fro, away for some 3 s between.
+
+    One camera stands level, 2.1 m away, at the height of the shoulders; its picture shows the hips and cuts the legs.
+    """
+    body = _person("man", 68)
+    walk = Gesture(motion="walk", seconds=11, path="line", size=5.0)
+    passes = Spec(name="comes_and_goes", body=body, motion=(walk,), turn_deg=90, scene=Scene(clothing=68, room=68, empty_seconds=2.0),
+                  cameras=(Viewpoint(height=0.9 * body.stature, distance=2.4),), tells="height", seed=(4, len(RESTING)))
+    return (*(_resting(n, *row) for n, row in enumerate(RESTING)), passes)
+
+
+def _resting(n: int, name: str, kind: Kind, seed: int, posture: PostureName, gestures: str, chair: str, cameras: int) -> Spec:
+    body = _person(kind, seed)
+    seat = Obstacle(kind="chair", seat=True, enters=0.0 if chair == "new" else None)
+    look = {"clothing": seed, "room": seed, "empty_seconds": 2.0, "obstacles": (seat,)[: chair != "none"]}
+    spec = Spec(name=name, body=body, posture=posture, motion=parse_gestures(gestures), training=(), scene=Scene(**look), seed=(4, n))
+    if cameras > 1:
+        ring = Ring(count=cameras, radius=3.6, height=1.7, start_deg=25, jitter=0.5, fov_deg=46, seed=n)
+        return replace(spec, ring=ring)
+    height = {"seated": 0.62, "kneeling": 0.62}.get(posture, 0.75) * body.stature
+    return replace(spec, cameras=(Viewpoint(height=height, distance=2.1),))
+
+
 def named_specs() -> dict[str, Spec]:
     """All specs by name."""
-    return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *proving_ground(), *around(), *humaneva(), *proving_rings())}
+    chosen = (*proving_ground(), *around(), *humaneva(), *proving_rings(), *resting())
+    return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *chosen)}

@@ -14,6 +14,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.compositing import FAR, Layer
 
+Seconds = Annotated[float, Field(ge=0, le=3600)]
 Coordinate = Annotated[float, Field(ge=-10, le=10)]
 MIN_DISTANCE = 0.25
 """Least distance of an obstacle from the person's place, metres."""
@@ -21,7 +22,7 @@ MIN_DISTANCE = 0.25
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Obstacle:
-    """An immobile obstacle, present in the film of the empty scene too."""
+    """An obstacle, which does not move; present in the film of the empty scene too, unless it enters later."""
 
     kind: Literal["table", "chair", "pillar", "cabinet"]
     """Kind: a table 74 cm high, a chair with its back 92 cm high, a round pillar, a cabinet 1.05 m high."""
@@ -33,10 +34,24 @@ class Obstacle:
     """Rotation to the left about the vertical, degrees; at 0 its front faces where the person looks."""
     colour: Annotated[int, Field(ge=0)] = 1
     """Seed of its colour."""
+    scale: Annotated[float, Field(ge=0.4, le=2)] = 1.0
+    """Factor on all its lengths."""
+    seat: bool = False
+    """Whether it is the chair on which the person sits: it gets their place, direction and seat height, and `ahead`, `left`, `turn_deg` and
+    `scale` have no effect."""
+    enters: Seconds | None = None
+    """Time of the film at which it appears, from one frame to the next, seconds; 0: there from the first frame on, but not in the film of
+    the empty scene. By default it is there in both."""
+    leaves: Seconds | None = None
+    """Time of the film at which it disappears, seconds; by default it stays."""
 
     def __post_init__(self) -> None:
-        """Check that the obstacle does not stand at the person's place."""
-        if np.hypot(self.ahead, self.left) < MIN_DISTANCE:
+        """Check the times, that only a chair is a seat, and that the obstacle does not stand at the person's place."""
+        if self.leaves is not None and self.leaves <= (self.enters or 0.0):
+            raise ValueError(f"leaves: found {self.leaves:g} s, expected a time after it enters ({self.enters or 0:g} s)")
+        if self.seat and self.kind != "chair":
+            raise ValueError(f"seat: found a {self.kind}, expected a chair")
+        if not self.seat and np.hypot(self.ahead, self.left) < MIN_DISTANCE:
             raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; "
                              f"expected {MIN_DISTANCE} m of distance")
 
@@ -78,6 +93,19 @@ class Furniture:
         """Whether there are obstacles."""
         return bool(self.things)
 
+    def at(self, seconds: float | None) -> Furniture:
+        """The obstacles that are there `seconds` after the film's first frame; None: in the film of the empty scene."""
+        if seconds is None:
+            return Furniture([thing for thing in self.things if thing.enters is None])
+        return Furniture([thing for thing in self.things
+                          if (thing.enters or 0.0) <= seconds and (thing.leaves is None or seconds < thing.leaves)])
+
+    def arrangements(self) -> list[Furniture]:
+        """The different obstacles at a time, each once; first those of the empty scene."""
+        times = [0.0, *(time for thing in self.things for time in (thing.enters, thing.leaves) if time is not None)]
+        found = {now.things: now for now in (self.at(None), *map(self.at, times))}
+        return list(found.values())
+
     def intersect(self, start: Array, rays: Array) -> tuple[Array, Array, Array, Array]:
         """Nearest intersections of rays (..., 3): distances in lengths of the rays (`FAR` if none), normals (..., 3), places in the
         obstacle's frame (..., 3) and the obstacle's index (-1 if none). start: of shape (3,) or (..., 3), metres, world.
@@ -88,7 +116,7 @@ class Furniture:
         for n, thing in enumerate(self.things):
             turn = np.radians(thing.turn_deg)
             frame = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-            eye, ray = (start - np.array([thing.left, -thing.ahead, 0])) @ frame, rays @ frame
+            eye, ray = (start - np.array([thing.left, -thing.ahead, 0])) @ frame / thing.scale, rays @ frame / thing.scale
             for block in SHAPES[thing.kind]:
                 away, normal = (_post if block.round else _box)(eye, ray, block)
                 closer = away < nearest
@@ -122,9 +150,9 @@ class Furniture:
         for thing in self.things:
             turn = np.radians(thing.turn_deg)
             frame = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-            place = (point - np.array([thing.left, -thing.ahead, 0])) @ frame
+            place, near = (point - np.array([thing.left, -thing.ahead, 0])) @ frame / thing.scale, margin / thing.scale
             for block in SHAPES[thing.kind]:
-                if (place > np.array(block.low) - margin).all() and (place < np.array(block.high) + margin).all():
+                if (place > np.array(block.low) - near).all() and (place < np.array(block.high) + near).all():
                     return thing.kind
         return None
 

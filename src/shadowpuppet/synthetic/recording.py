@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from warnings import warn
@@ -13,18 +14,20 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.motion.table import joint_columns
+from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
-from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
-from shadowpuppet.synthetic.spec import Bystander, Spec
+from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
+from shadowpuppet.synthetic.truth import SPEED_STEP, Soles, soles, write_lines, write_truth
 
 Progress = Callable[[int, int], None]
 
 REFERENCES = {"front_t_pose": LEVEL, "side_arms_hanging": HANGING_ARMS | trunk(turn=90), "front_arms_t_pose": LEVEL}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
+FAR_BELOW = 1e5
+"""Place of an absent person, metres below the floor: less than a pixel, and no shadow."""
 
 
 def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Progress | None = None) -> Path:
@@ -32,29 +35,37 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
 
     rng: by default a generator of the spec's seed. tell: called after each frame with the numbers of frames done and in all. The same
     spec and seed give the same frames, masks and truth, whatever the number of threads; `spec.toml` keeps both. After Ctrl-C the frames
-    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written; warns if obstacles hide nothing, and if a
+    made so far are a valid recording. Raises `RecordingError` if the folder cannot be written, `SettingsError` if
+    the motion is too short or a fault is impossible; warns if obstacles hide nothing, and if a
     camera never sees the person.
     """
     folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
     cameras = [view.camera() for view in spec.views()]
-    _folders(folder, "video", "background", "masks", *["people"][: len(spec.scene.bystanders)])
+    _folders(folder, "video", *["background"][: spec.scene.empty_seconds > 0], "masks", *["people"][: len(spec.scene.bystanders)])
     seed = seed_of(rng)
-    for_motion, for_noise, for_training, for_others = rng.spawn(4)
+    for_motion, for_noise, for_training, for_others, for_faults = rng.spawn(5)
     write_spec(folder / SPEC_FILE, spec, seed)
+    same_motion = deepcopy(for_motion)
     times, figure = perform(spec, for_motion)
+    feet = feet_of(spec, times, figure, same_motion)
     company = spec.scene.bystanders
     others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
-    _write_given(folder, spec, cameras, times, figure, for_training)
+    wrong = [CameraFaults(spec.faults, camera, len(times), spec.rate, own, spec.scene.flicker_hz)
+             for camera, own in zip(cameras, for_faults.spawn(len(cameras)))]
+    absent = wrong[0].absent()
+    write_truth(folder / "truth", times, figure.joints, spec.rate, feet, absent)
+    figure = _away(figure, absent)
+    _write_given(folder, spec, cameras, for_training)
     hidden = 0
-    for n, (camera, noise) in enumerate(zip(cameras, for_noise.spawn(len(cameras)))):
-        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others))
+    for n, (camera, noise, faults) in enumerate(zip(cameras, for_noise.spawn(len(cameras)), wrong)):
+        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others), faults)
         hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         hidden += hides
         if not seen:
             warn(f"{folder}: camera {camera.name!r}: sees nothing of the person in any picture", ShadowPuppetWarning, stacklevel=2)
         if len(cameras) == 1:
             _write_references(folder / "references", spec, studio)
-    if spec.scene.obstacles and not hidden:
+    if not (hidden or all(thing.seat for thing in spec.scene.obstacles)):
         warn(f"{folder}: obstacles: nothing of the person is hidden by them in any picture", ShadowPuppetWarning, stacklevel=2)
     return folder
 
@@ -64,25 +75,50 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
 
     Raises `SettingsError` if the motion is shorter than the film.
     """
-    from shadowpuppet.synthetic.movement.sequence import animate, sequence_seconds
+    from shadowpuppet.synthetic.movement.sequence import sequence_seconds
 
     there = int((sequence_seconds(spec.motion) - spec.begin) * spec.rate + 1e-6) + 1
     if there < max(spec.frames or 1, 1):
         raise SettingsError(f"frames: found {spec.frames or 1} pictures at {spec.rate:g} a second after {spec.begin:g} s, expected at most "
                             f"{max(there, 0)}: then the motion is over")
     times = np.arange(spec.frames or there) / spec.rate
-    return times, animate(spec.body, spec.motion, times + spec.begin, rng, spec.still, np.radians(spec.turn_deg))
+    return times, _figure(spec, times + spec.begin, rng)
+
+
+def feet_of(spec: Spec, times: Array, figure: Figure, rng: np.random.Generator) -> Soles:
+    """The soles of `spec`'s figure at times (T,), seconds; rng: in the state before `perform`, so that the motion is the same."""
+    from shadowpuppet.synthetic.movement.sequence import sequence_seconds
+
+    before, after = (np.clip(times + spec.begin + step, 0.0, sequence_seconds(spec.motion)) for step in (-SPEED_STEP, SPEED_STEP))
+    moving = _figure(spec, np.concatenate([before, after]), rng)
+    return soles(spec.body, figure, moving, after - before)
+
+
+def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> Figure:
+    """The figure of `spec` at times `t` (T,) of its motion, seconds."""
+    from shadowpuppet.synthetic.movement.sequence import animate
+
+    return animate(spec.body, spec.motion, t, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
 
 
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
     """The figure of a bystander in `count` frames, at the bystander's place."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
-    always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None)
+    always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None,
+                     posture="standing", scene=Scene())
     _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
+
+
+def _away(figure: Figure, absent: np.ndarray) -> Figure:
+    """The figure out of all cameras' sight in the frames, of shape (T,), in which it is `absent`."""
+    if not absent.any():
+        return figure
+    place = np.where(absent, FAR_BELOW, 0.0)[:, None, None] * np.array([0.0, 0, -1])
+    return figure._replace(joints=figure.joints + place, origin=figure.origin + place)
 
 
 def _wall(figure: Figure, others: list[Figure]) -> float:
@@ -103,14 +139,11 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     """
     from shadowpuppet.video import write_frames
 
-    name, crf, hidden, seen = studio.room.camera.name, spec.scene.crf, 0, 0
-    with write_frames(folder / "background" / f"{name}.mp4", spec.rate, crf=crf) as film:
-        count = max(1, round(spec.scene.empty_seconds * spec.rate))
-        for index in range(count):
-            film.write(studio.empty(index, count))
+    name, crf, hidden, seen = studio.room.camera.name, studio.faults.crf, 0, 0
+    _shoot_empty(folder, spec, studio)
     interrupted = False
     with contextlib.ExitStack() as stack:
-        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf))
+        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=False)))
         kinds = ["masks", *["people"][: len(spec.scene.bystanders)]]
         exact = [stack.enter_context(write_frames(folder / kind / f"{name}.mkv", spec.rate, lossless=True)) for kind in kinds]
         try:
@@ -129,8 +162,21 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     return hidden, seen
 
 
-def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, figure: Figure, rng: np.random.Generator) -> None:
-    """Write everything but films: calibration, the subject's data, truth, and for several cameras a training motion.
+def _shoot_empty(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
+    """Write a camera's film of the empty scene, if the spec has one."""
+    from shadowpuppet.video import write_frames
+
+    if spec.scene.empty_seconds == 0:
+        return
+    crf, path = studio.faults.crf(spec.scene.crf, empty=True), folder / "background" / f"{studio.room.camera.name}.mp4"
+    with write_frames(path, spec.rate, crf=crf) as film:
+        count = max(1, round(spec.scene.empty_seconds * spec.rate))
+        for index in range(count):
+            film.write(studio.empty(index, count))
+
+
+def _write_given(folder: Path, spec: Spec, cameras: list[Camera], rng: np.random.Generator) -> None:
+    """Write what a user knows of a recording: calibration, the subject's data, and for several cameras a training motion.
 
     The training motion is another performance, with other random numbers, of the same or of other gestures by the same body.
     """
@@ -138,37 +184,20 @@ def _write_given(folder: Path, spec: Spec, cameras: list[Camera], times: Array, 
 
     write_calibration(folder / "calibration.toml", cameras)
     _write_subject(folder / "recording.toml", spec)
-    write_truth(folder / "truth", times, figure.joints, spec.rate)
     own = spec.motion if spec.training is None else spec.training
     if len(cameras) > 1 and own and not (own == spec.motion and any(gesture.file for gesture in own)):  # a file plays the same every time
         again, rehearsal = perform(replace(spec, motion=own, frames=spec.training_frames), rng)
         write_truth(folder / "training", again, rehearsal.joints, spec.rate)
 
 
-def write_truth(path: Path, times: Array, joints: Array, rate: float) -> None:
-    """Write `<path>.csv` (metres) and `<path>.trc` (millimetres) of joints (T, 17, 3) at times (T,), seconds."""
-    rows = joints.reshape(len(joints), -1)
-    lines = [",".join(f"{value:.5f}" for value in (t, *row)) for t, row in zip(times, rows)]
-    _write(path.with_suffix(".csv"), [",".join(["time", *joint_columns(JOINTS)]), *lines])
-    count, trc = len(joints), path.with_suffix(".trc")
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{trc.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"{rate:g}\t{rate:g}\t{count}\t{len(JOINTS)}\tmm\t{rate:g}\t1\t{count}",
-        "Frame#\tTime\t" + "\t\t\t".join(JOINTS),
-        "\t\t" + "\t".join(f"{axis}{n}" for n in range(1, len(JOINTS) + 1) for axis in "XYZ"),
-        "",
-    ]
-    lines = ["\t".join([str(n), f"{t:.5f}", *(f"{1000 * value:.2f}" for value in row)]) for n, (t, row) in enumerate(zip(times, rows), 1)]
-    _write(trc, [*head, *lines])
-
-
 def _write_references(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
-    """Write reference pictures with masks and joints; none if an obstacle hides a part, as sizes are fitted to whole silhouettes."""
+    """Write reference pictures with masks and joints; none if an obstacle hides a part, as sizes are fitted to whole silhouettes, or if the
+    person never stands.
+    """
     from shadowpuppet.video import write_image
 
     figures = {name: pose(spec.body, posture(**named)) for name, named in REFERENCES.items()}
-    if any(studio.hides(figure) for figure in figures.values()):
+    if spec.posture != "standing" or any(studio.hides(figure) for figure in figures.values()):
         return
     _folders(folder)
     for name, figure in figures.items():
@@ -187,14 +216,7 @@ def _write_subject(path: Path, spec: Spec) -> None:
     if "distance" in spec.tells and len(views) == 1:
         distance = views[0].distance
         lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
-    _write(path, lines)
-
-
-def _write(path: Path, lines: list[str]) -> None:
-    try:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+    write_lines(path, lines)
 
 
 def _folders(folder: Path, *names: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,8 +37,10 @@ class Room:
     """A floor at z = 0, four walls, one of them behind the person, their texture, and two lamps; all drawn from `rng`."""
 
     def __init__(self, camera: Camera, rng: np.random.Generator, shadow: float, least: float = 0.0, background: walls.WallStyle = "room",
-                 furniture: Furniture | None = None) -> None:
-        """shadow: darkness of shadows, 0 to 1; least: least distance of the wall behind the person, metres."""
+                 arrangements: Sequence[Furniture] = (Furniture(()),)) -> None:
+        """shadow: darkness of shadows, 0 to 1; least: least distance of the wall behind the person, metres; arrangements: obstacles whose
+        shadows are drawn, a picture for each.
+        """
         self.camera, self.shadow = camera, shadow
         self.distance = max(rng.uniform(1.2, 3.5), least)
         side = rng.choice([-1, 1])
@@ -47,7 +50,8 @@ class Room:
         self.lights[0, :3], self.lights[1, :3] = key / np.linalg.norm(key), fill / np.linalg.norm(fill)
         self.lights[:, 3] = rng.uniform(0.45, 0.6), rng.uniform(0.12, 0.22), rng.uniform(0.45, 0.6)
         self.wall_colour = walls.wall_colour(copy.deepcopy(rng))
-        self.picture = self._paint(rng, background, furniture)
+        self.pictures = self._paint(rng, background, arrangements)
+        """The empty room with the shadows of each arrangement, (H, W, 3) each, RGB, 0 to 1."""
         across = np.cross(self.lights[0, :3], [0.0, 0.0, 1.0])
         across /= np.linalg.norm(across)
         self._from_lamp = np.stack([across, np.cross(self.lights[0, :3], across), self.lights[0, :3]], 1)
@@ -67,8 +71,8 @@ class Room:
         along = np.where(met < 2, points[..., 1], points[..., 0]) + np.array([start for *_, start in ends])[met]
         return points, along
 
-    def _paint(self, rng: np.random.Generator, background: walls.WallStyle, furniture: Furniture | None) -> Array:
-        """Picture of the empty room (H, W, 3), RGB, 0 to 1; each pixel is the mean of four rays."""
+    def _paint(self, rng: np.random.Generator, background: walls.WallStyle, arrangements: Sequence[Furniture]) -> list[Array]:
+        """Pictures of the empty room (H, W, 3), RGB, 0 to 1, one for each arrangement; each pixel is the mean of four rays."""
         width, height = self.camera.size
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         points, along = self._points(grid)
@@ -76,23 +80,20 @@ class Room:
         floor = walls.paint_floor(background, points[..., 0], points[..., 1], rng)
         picture = np.where(points[..., 2:] < 1e-9, floor, wall)
         picture *= 0.78 + 0.22 * np.exp(-((points[..., :1] - 0.5) ** 2 + (points[..., 2:] - 1.8) ** 2) / 6)
-        if furniture:
-            import cv2
+        shaded = [picture * (1 - self.shadow * _shadows(furniture, points, self.lights[0, :3])) if furniture else picture
+                  for furniture in arrangements]
+        return [one.reshape(height, 2, width, 2, 3).mean((1, 3)) for one in shaded]
 
-            hidden = cv2.GaussianBlur(furniture.shades(points, self.lights[0, :3]).astype(float), (0, 0), 2.0)
-            picture *= 1 - self.shadow * hidden[..., None]
-        return picture.reshape(height, 2, width, 2, 3).mean((1, 3))
-
-    def shaded(self, figure: Figure, index: int, *others: Figure) -> Array:
-        """The room's picture (H, W, 3) with the shadows of the figure and of `others`."""
+    def shaded(self, picture: Array, figure: Figure, index: int, *others: Figure) -> Array:
+        """One of the room's pictures (H, W, 3) with the shadows of the figure and of `others`."""
         import cv2
 
         if self.shadow == 0:
-            return self.picture
+            return picture
         light = 1 - self.shadow * self._shade([figure.joints[index], *(other.joints[index] for other in others)])
         width, height = self.camera.size
         return (
-            self.picture
+            picture
             * cv2.resize(light, (SHADOW_CELL * light.shape[1], SHADOW_CELL * light.shape[0]), interpolation=cv2.INTER_LINEAR)[
                 :height, :width, None
             ]
@@ -116,6 +117,13 @@ class Room:
         return 1 - clear
 
 
+def _shadows(furniture: Furniture, points: Array, lamp: Array) -> Array:
+    """Share of the key lamp (2H, 2W, 1), in direction `lamp`, that obstacles hide from points (2H, 2W, 3), with soft edges."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(furniture.shades(points, lamp).astype(float), (0, 0), 2.0), float)[..., None]
+
+
 def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
     """Relative brightness of the lamps `seconds` after the film's first frame; negative in the film of the empty scene.
 
@@ -126,15 +134,13 @@ def lamp_brightness(scene: Scene, seconds: float, length: float) -> float:
     return float((1 + drift) * (1 + scene.flicker * np.sin(2 * np.pi * scene.flicker_hz * seconds)))
 
 
-def expose(picture: Array, noise: float, rng: np.random.Generator, brightness: float = 1.0) -> np.ndarray:
+def expose(picture: Array, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The sensor's picture, RGB uint8, of light (H, W, 3), 0 to 1: slight blur of the lens and noise.
 
     noise: standard deviation in grey levels at middle grey; it grows with brightness like photon noise.
     """
     import cv2
 
-    if brightness != 1:
-        picture = brightness * picture
     blurred = cv2.GaussianBlur(picture, (0, 0), 0.4)
     level = 255 * np.clip(blurred, 0, 1)
     if noise > 0:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,7 +13,10 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.faults.fault import Fault
 from shadowpuppet.synthetic.furniture import Coordinate, Furniture, Obstacle
+from shadowpuppet.synthetic.movement.gestures import GESTURES
+from shadowpuppet.synthetic.movement.resting import LYING_GESTURES, PostureName, chair_place
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.viewpoint import Name, Ring, Viewpoint
@@ -54,8 +58,8 @@ class Scene:
     """Darkness of the person's shadow on floor and wall."""
     noise: Annotated[float, Field(ge=0, le=40)] = 2.5
     """Sensor noise: standard deviation in grey levels at middle grey."""
-    empty_seconds: Annotated[float, Field(ge=0.2, le=60)] = 4.0
-    """Length of the film of the empty scene."""
+    empty_seconds: Annotated[float, Field(ge=0, le=60)] = 4.0
+    """Length of the film of the empty scene, seconds; 0: there is no such film."""
     background: WallStyle = "room"
     """Walls and floor: a room with some posters, a plain wall and floor, a wall cluttered with shelves, or textured bricks and planks."""
     camouflage: Annotated[float, Field(ge=0, le=1)] = 0.0
@@ -94,6 +98,10 @@ class Spec:
     """Gestures, performed one after another."""
     training: tuple[Gesture, ...] | None = None
     """Gestures of the training motion, for several cameras only; by default those of `motion` again; an empty list: no training motion."""
+    posture: PostureName = "standing"
+    """Posture from the first frame to the last, in which the person performs gestures of arms and trunk: standing, seated (on nothing
+    visible, unless an obstacle is their `seat`), kneeling upright, or lying on the back, the feet toward a camera in front. All other
+    motions need standing."""
     begin: Annotated[float, Field(ge=0, le=3600)] = 0.0
     """Seconds of the motion, including its 0.8 s of standing, before the film and the training motion begin."""
     frames: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
@@ -106,6 +114,8 @@ class Spec:
     """Cameras around the person, in place of `cameras`."""
     scene: Scene = Scene()
     """Clothes, room and noise."""
+    faults: tuple[Fault, ...] = ()
+    """What is wrong with the films' pictures."""
     rate: Annotated[float, Field(ge=1, le=240)] = 15.0
     """Frames per second."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
@@ -118,13 +128,16 @@ class Spec:
     """Seed of motion and noise if no generator is given: a whole number, or several."""
 
     def __post_init__(self) -> None:
-        """Check that camera names differ, and that no camera is inside an obstacle or a bystander."""
+        """Check that camera names differ, that the posture allows the motions, that no camera is inside an obstacle or a bystander, and
+        that faults name cameras."""
         names = [view.name for view in self.cameras]
         if len(set(names)) < len(names):
             raise ValueError(f"cameras: found the names {', '.join(names)}, each must be used once")
         if self.ring is not None and self.cameras != (Viewpoint(),):
             raise ValueError("ring: found cameras as well, expected one of them")
-        things = Furniture(self.scene.obstacles)
+        _check_posture(self.posture, (*self.motion, *(self.training or ())))
+        _check_seat(self)
+        things = self.furniture()
         for view in self.views() if things else ():
             kind = things.holds(view.camera().centre)
             if kind is not None:
@@ -133,9 +146,41 @@ class Spec:
             if np.hypot(*(view.camera().centre[:2] - (other.left, -other.ahead))) < 0.4:
                 raise ValueError(f"scene.bystanders: found somebody where the camera {view.name!r} stands")
 
+        for n, fault in enumerate(self.faults):
+            known = [view.name for view in self.views()]
+            if (unknown := next((name for name in fault.cameras if name not in known), None)) is not None:
+                raise ValueError(f"faults.{n}: cameras: found {unknown!r}, there are: {', '.join(known)}")
+
     def views(self) -> tuple[Viewpoint, ...]:
         """The cameras: those of `cameras`, or the ring's."""
         return self.cameras if self.ring is None else self.ring.views(self.body.stature)
+
+
+    def furniture(self) -> Furniture:
+        """The obstacles; the chair on which the person sits is at their place."""
+        left, ahead, scale = chair_place(self.body, self.posture, np.radians(self.turn_deg))
+        return Furniture([replace(thing, left=left, ahead=ahead, scale=scale, turn_deg=self.turn_deg) if thing.seat else thing
+                          for thing in self.scene.obstacles])
+
+
+def _check_posture(posture: PostureName, motions: Iterable[Gesture]) -> None:
+    """Raise `ValueError` if one of the motions cannot be performed in the posture."""
+    possible = LYING_GESTURES if posture == "lying" else tuple(GESTURES)
+    for motion in motions if posture != "standing" else ():
+        if motion.motion not in possible:
+            raise ValueError(f"posture: found the motion {motion.motion} of a person who is {posture}, expected {', '.join(possible)}")
+
+
+def _check_seat(spec: Spec) -> None:
+    """Raise `ValueError` if there is a chair to sit on and the person does not sit there."""
+    if not any(thing.seat for thing in spec.scene.obstacles):
+        return
+    motions = [gesture.motion for gesture in spec.motion]
+    away = {"walk", "jog", "turn_around", "mocap"} & set(motions)
+    if spec.posture != "seated" and "sit_down" not in motions:
+        raise ValueError("scene.obstacles: found a seat, but the person is not seated and never sits down (motion sit_down)")
+    if away:
+        raise ValueError(f"scene.obstacles: found a seat and the motion {', '.join(sorted(away))}, after which the person is elsewhere")
 
 
 def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
@@ -169,7 +214,7 @@ def spec_values(spec: Spec) -> dict[str, Any]:
 
 
 TABLES: dict[str, Any] = {"body": Mannequin, "motion": Gesture, "cameras": Viewpoint, "ring": Ring, "scene": Scene, "obstacles": Obstacle,
-                          "bystanders": Bystander}
+                          "bystanders": Bystander, "faults": Fault}
 """The tables of a spec, by name."""
 
 

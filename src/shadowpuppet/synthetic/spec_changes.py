@@ -12,6 +12,8 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.faults.fault import faults_from_text
+from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.movement.script import Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
@@ -37,6 +39,10 @@ class SpecChanges:
     motion capture (.amc)."""
     seconds: Annotated[float, Field(ge=2, le=3600)] | None = None
     """Length of the motion; the film has 0.8 s of standing before and after it."""
+    posture: PostureName | None = None
+    """Posture from the first frame to the last: standing, seated, kneeling or lying."""
+    chair: Literal["known", "new"] | None = None
+    """Chair on which the person sits: known is in the film of the empty scene too, new is not."""
     body: Literal["woman", "man", "child", "random"] | None = None
     """Kind of person: woman, man, child or random; drawn by the seed from published proportions."""
     height: float | None = None
@@ -77,11 +83,16 @@ class SpecChanges:
     """Compression of the films, H.264's crf: 0 the best, 18 the default, 51 the worst."""
     occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
     """Obstacle between the person and the first camera: table, chair, pillar or cabinet."""
+    empty_seconds: float | None = None
+    """Length of the film of the empty scene, seconds; 0: there is none."""
     second_person: Literal["behind", "aside", "passing"] | None = None
     """A second person: standing behind or aside, or passing to and fro behind."""
+    faults: str | None = None
+    """Faults of the pictures: kind, amount, @begin-end in seconds, drift, cameras, such as "gain 1.3 @3-6, nudge 20 @4 cam2, black @5"; all
+    but the kind may be left out."""
 
 
-SCENE_CHANGES = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background")
+SCENE_CHANGES = ("room", "clothing", "camouflage", "shadow", "noise", "flicker", "drift", "crf", "background", "empty_seconds")
 """Changes that are settings of the scene."""
 CAMERA_CHANGES = {"fov": "fov_deg", "camera_height": "height", "fisheye": "fisheye"}
 """Changes that are settings of every camera, and their names there."""
@@ -92,7 +103,7 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
     said = {field.name: value for field in fields(SpecChanges) if (value := getattr(changes, field.name)) is not None}
     values = spec_values(spec)
     values["scene"] |= {name: said[name] for name in SCENE_CHANGES if name in said}
-    values |= {name: said[name] for name in ("rate",) if name in said}
+    values |= {name: said[name] for name in ("rate", "posture") if name in said}
     if {"motion", "seconds"} & set(said):
         values["motion"] = _motion(said.get("motion"), said.get("seconds"), spec, source)
     if "height" in said:
@@ -102,8 +113,14 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
         kind = None if said["body"] == "random" else said["body"]
         values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))
     _place_cameras(values, said, source)
+    if "faults" in said:
+        values["faults"] = faults_from_text(said["faults"], f"{source}: faults")
     if "occluder" in said:
         values["scene"]["obstacles"] = [{"kind": said["occluder"], **OCCLUDERS[said["occluder"]]}]
+    if "chair" in said:
+        chair = {"kind": "chair", "seat": True} | ({"enters": 0.0} if said["chair"] == "new" else {})
+        others = [thing for thing in values["scene"].get("obstacles", ()) if not thing.get("seat")]
+        values["scene"]["obstacles"] = [*others, chair]
     if "second_person" in said:
         values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
     return spec_from(values, source)

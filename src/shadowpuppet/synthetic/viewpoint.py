@@ -72,7 +72,7 @@ class Viewpoint:
         if self.fisheye and corner > 88:
             most = np.floor(self.fov_deg * 88 / corner)
             raise ValueError(f"fov_deg: found {self.fov_deg:g}, expected at most {most:g} for a fisheye of this shape: corners see farther")
-        if (any(self.distortion) or self.fisheye) and not _sees_everywhere(self.camera()):
+        if (any(self.distortion) or self.fisheye) and not sees_everywhere(self.camera()):
             raise ValueError(f"distortion: found {list(self.distortion)}, which bends the picture so far that its border shows nothing")
 
     def camera(self) -> Camera:
@@ -137,7 +137,7 @@ class Ring:
         return tuple(views)
 
 
-def _sees_everywhere(camera: Camera) -> bool:
+def sees_everywhere(camera: Camera) -> bool:
     """Whether every pixel's ray projects back to the pixel: too strong distortion folds the picture."""
     (width, height), slack = camera.size, 0.5 if camera.fisheye else BORDER_SLACK
     pixels = np.stack(np.meshgrid(np.linspace(-slack, width - 1 + slack, 17), np.linspace(-slack, height - 1 + slack, 17)), -1)

@@ -57,6 +57,19 @@ def test_somebody_is_found_whichever_way_they_face(heading, rng):
     np.testing.assert_array_equal(found.poses, of.skeleton.clamp(found.poses))
 
 
+@pytest.mark.parametrize(("hips", "knees", "bow"), [(80, 92, 4), (6, 84, 3), (4, 8, -84), (4, 8, 82)])
+@pytest.mark.parametrize("heading", [0.3, 2.2])
+def test_a_person_who_sits_kneels_or_lies_is_found_facing_where_they_face(hips, knees, bow, heading, rng):
+    """Their front and back differ little: from standing postures alone one is found turned round, at nearly the same cost."""
+    skeleton = actor.body().skeleton
+    pose = actor.stance(skeleton, 0.0, heading)
+    legs = skeleton.dof_indices(["left_hip_y", "right_hip_y", "left_knee_flexion", "right_knee_flexion", "root_bow"])
+    pose[legs] = np.radians([-hips, -hips, knees, knees, bow])
+    of, found = found_in(pose, rng)
+    assert actor.apart(of, found.best, pose)[0] < 0.03
+    assert abs(np.angle(np.exp(1j * (found.best[3] - heading)))) < 0.3
+
+
 def test_cylinders_are_found_too(rng):
     pose = actor.stance(actor.body("cylinders").skeleton, 0.3, 0.8)
     of, found = found_in(pose, rng, name="cylinders")

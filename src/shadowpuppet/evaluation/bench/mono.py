@@ -10,6 +10,7 @@ from shadowpuppet.evaluation.bench import naive_mono
 from shadowpuppet.evaluation.bench.chain import WAVING, chain_figures, measure_chain, start_times
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase, MonoFollower
 from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
+from shadowpuppet.evaluation.bench.silhouette_cases import SilhouetteCase
 from shadowpuppet.evaluation.bench.timing import Contender, Figures, Times, in_turns
 from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.tracking.monocular.settings import make_settings
@@ -22,10 +23,13 @@ NAIVE_PARTICLES = 2
 FIGURES = Figures(
     times={"mono.particle_us": (1e6, "particle"), "mono.arm_us": (1e6, "arm"), "mono.opencv_particle_us": (1e6, "opencv"),
            "mono.opencv_arm_us": (1e6, "opencv_arm"), "mono.boxes_particle_us": (1e6, "boxes"),
-           "mono.naive_frame_ms": (1e3, "naive_frame")},
+           "mono.naive_frame_ms": (1e3, "naive_frame"), "mono.silhouette_ms": (1e3, "silhouette"), "mono.correction_ms": (1e3, "correct"),
+           "mono.correction_moved_ms": (1e3, "correct_moved"), "mono.correction_uneven_ms": (1e3, "correct_uneven")},
     rates={"mono.step_fps": "step", "mono.default_fps": "default"},
     ratios={"mono.ratio_opencv_full": ("opencv", "particle"), "mono.ratio_opencv_arm": ("opencv_arm", "arm"),
-            "mono.ratio_naive_frame": ("naive_frame", "step"), "mono.ratio_boxes": ("boxes", "particle")},
+            "mono.ratio_naive_frame": ("naive_frame", "step"), "mono.ratio_boxes": ("boxes", "particle"),
+            "mono.ratio_correction": ("correct", "silhouette"), "mono.ratio_correction_moved": ("correct_moved", "silhouette"),
+            "mono.ratio_correction_uneven": ("correct_uneven", "silhouette")},
 )  # fmt: skip
 
 
@@ -48,7 +52,7 @@ def contenders() -> dict[str, Contender]:
     full, arm, boxes = MonoCase(), MonoCase(stage="arm"), MonoCase("boxes")
     settings = make_settings("liu2011")
     rng, share = np.random.default_rng(0), NAIVE_PARTICLES / settings.arm.particles
-    paper, default = MonoFollower("liu2011"), MonoFollower("default")
+    paper, default, film = MonoFollower("liu2011"), MonoFollower("default"), SilhouetteCase()
     return {
         "particle": Contender(full.run, full.particles),
         "arm": Contender(arm.run, arm.particles),
@@ -58,4 +62,8 @@ def contenders() -> dict[str, Contender]:
         "step": Contender(paper.run, 10),
         "default": Contender(default.run, 10),
         "naive_frame": Contender(lambda: naive_mono.frame(rng, full.picture, settings, full.pose, full.mask, NAIVE_PARTICLES), share),
+        "silhouette": Contender(film.segment),
+        "correct": Contender(lambda: film.correct("clean")),
+        "correct_moved": Contender(lambda: film.correct("moved")),
+        "correct_uneven": Contender(lambda: film.correct("uneven")),
     }

@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shadowpuppet.synthetic.movement.gait_cycle import Sole
 from shadowpuppet.synthetic.movement.gestures import Keys, Posture, band_noise, both, left, right, trunk
 from shadowpuppet.synthetic.movement.gestures import random as random_keys
 from shadowpuppet.synthetic.movement.keyframes import HALF_STANCE, Hop, KeyframeMotion, Step
+from shadowpuppet.synthetic.movement.resting import BACKWARD, kneeling_knee, seated_pelvis
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 GUARD = both(front=38, side=12, roll=6, elbow=122, supination=10, curl=85, wrist_flex=0)
@@ -91,6 +93,38 @@ def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMo
                                (seconds - 1.0 * pace, lean | half)])  # fmt: skip
 
 
+def sit_down(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
+    """Sitting down on a chair that stands behind the person, and standing up again; a spec's obstacle with `seat` is this chair."""
+    lean = both(front=22, side=10, elbow=45, curl=15, supination=-10) | trunk(pelvis_bow=38, spine_bow=16, head_nod=-14)
+    seat = both(front=rng.uniform(18, 24), side=11, roll=-30, elbow=52, supination=-57, curl=20) | trunk(pelvis_bow=-4, spine_bow=8)
+    leg = body.length("thigh") + body.length("shank")
+    deep = (leg + Sole.of(body).ankle + 0.02 - seated_pelvis(body)) / leg
+    low: Posture = {"drop": deep, "ahead": -BACKWARD}
+    half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
+    pace = min(seconds / 4.0, 1.0)
+    return KeyframeMotion(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
+                               (seconds - 1.0 * pace, lean | half)])  # fmt: skip
+
+
+def kneel(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
+    """Going down on both knees over the tips of the toes, kneeling, and standing up again."""
+    leg, sole, tucked = body.length("thigh") + body.length("shank"), Sole.of(body), np.radians(50)
+    knee = kneeling_knee(body)
+    forward, rise = (float(part) for part in sole.rolled(np.array(-tucked)))
+    ahead = forward + np.sqrt(body.length("shank") ** 2 - (rise - knee) ** 2)
+    deep = (leg + sole.ankle + 0.02 - knee - body.length("thigh")) / leg
+    bend = trunk(pelvis_bow=rng.uniform(14, 20), spine_bow=10, head_nod=-10) | both(front=24, side=14, elbow=30)
+    rest = trunk(pelvis_bow=2, spine_bow=3)
+
+    def down(share: float, forward: float, heels: float) -> Posture:
+        return {"drop": share * deep, "ahead": forward * ahead / leg, "left_heel": heels * tucked, "right_heel": heels * tucked}
+
+    pace = min(seconds / 5.0, 1.0)
+    way = [(0.5, bend | down(0.45, 0.12, 0.55)), (1.1, bend | down(0.93, 0.62, 1.0)), (1.6, rest | down(1.0, 1.0, 1.0))]
+    back = [(seconds - when * pace, posture) for when, posture in reversed(way)]
+    return KeyframeMotion(body, seconds, [*((0.3 * pace + when * pace, posture) for when, posture in way), *back])
+
+
 def march(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
     """Stepping on the spot, knees raised, arms swinging against the legs."""
     period = rng.uniform(0.95, 1.15)
@@ -151,6 +185,6 @@ def random_body(body: Mannequin, seconds: float, rng: np.random.Generator) -> Ke
 
 
 ACTIONS: dict[str, Callable[[Mannequin, float, np.random.Generator], KeyframeMotion]] = {
-    f.__name__: f for f in (box, lift, squat, sit, march, jump, turn_around, random_body)
+    f.__name__: f for f in (box, lift, squat, sit, sit_down, kneel, march, jump, turn_around, random_body)
 }
 """All actions by name."""

@@ -21,6 +21,7 @@ from shadowpuppet.synthetic.movement.gestures import (
     key_postures,
 )
 from shadowpuppet.synthetic.movement.involuntary import involuntary_motion
+from shadowpuppet.synthetic.movement.resting import PostureName, resting_stance
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, Figure, Stance, planted_stance, pose, pose_over, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
@@ -74,12 +75,12 @@ def sequence_seconds(gestures: Sequence[Gesture]) -> float:
     return duration([(gesture.motion, gesture.seconds) for gesture in gestures])
 
 
-def animate(
-    body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.random.Generator, still: float = 1.0, turn: float = 0.0
-) -> Figure:
+def animate(body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.random.Generator, still: float = 1.0, turn: float = 0.0,
+            posture: PostureName = "standing") -> Figure:
     """The figure of `body` at times `t` (T,), s; it stands for `LEAD_SECONDS` before the first of `gestures`.
 
     still: factor on sway and tremor. turn: initial heading, rad to the left of -Y. The area covered in walking is centred at the origin.
+    posture: the one in which the person performs gestures of arms and trunk; all other motions begin and end standing.
     A motion from a file cannot be combined with others (see `mocap.animate_mocap`).
     """
     if any(gesture.motion == "mocap" for gesture in gestures):
@@ -89,6 +90,8 @@ def animate(
     if all(gesture.motion in GESTURES for gesture in gestures):
         postures = gesture_postures([(g.motion, g.seconds) for g in gestures], t, rng, still)
         postures[:, CHANNELS.index("turn")] += turn
+        if posture != "standing":
+            return pose_over(body, *resting_stance(body, posture, postures))
         return pose(body, postures)
     parts = _parts(body, gestures, rng)
     postures, stance = _joined(parts, t, turn)

@@ -19,8 +19,10 @@ MAX_PENALTY = 9.0
 
 ARMS = ((8, 5, 10), (0, 90, 0), (90, 10, 5), (170, 10, 10), (20, 20, 95), (-30, 20, 60))
 """Usual arms: shoulder flexion and abduction, elbow flexion, degrees."""
-LEGS = (((3, 5), (3, 5), 0), ((25, 10), (-15, 20), 0), ((-15, 20), (25, 10), 0), ((85, 90), (85, 90), 25), ((70, 10), (70, 10), 60))
-"""Usual legs: flexion of left hip and knee, of right hip and knee, bow of the pelvis, degrees: standing, two strides, a squat, a bow."""
+LEGS = (((3, 5), (3, 5), 0), ((25, 10), (-15, 20), 0), ((-15, 20), (25, 10), 0), ((85, 90), (85, 90), 25), ((70, 10), (70, 10), 60),
+        ((88, 85), (88, 85), 0), ((0, 90), (0, 90), 0), ((5, 5), (5, 5), -90), ((5, 5), (5, 5), 90))
+"""Usual legs: flexion of left hip and knee, of right hip and knee, bow of the pelvis, degrees: standing, two strides, a squat, a bow;
+seated, kneeling, lying on the back and on the front."""
 
 
 @dataclass(frozen=True, eq=False)

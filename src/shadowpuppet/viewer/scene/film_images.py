@@ -13,7 +13,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetWarning, SilhouetteError, VideoError
 from shadowpuppet.pipeline.footage import LOOKED_AT, CameraFrame, Footage, take_sample
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image
@@ -80,7 +80,7 @@ class FilmImages:
     @cached_property
     def _silhouettes(self) -> Silhouettes:
         longest = LOOKED_AT if self.footage.view.background is None else SAMPLE
-        return learn_silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
+        return uncluttered_silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
 
 
 def hull_function(cameras: Sequence[SceneCamera], settings: Options):

@@ -1,0 +1,134 @@
+"""Condition of a film beside its empty scene: noise, compression, light and movement of the camera, and what of it is too much."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
+from shadowpuppet.silhouette.correction.frame_correction import Correction
+from shadowpuppet.silhouette.correction.registration import Homography
+from shadowpuppet.silhouette.segmenter import Segmenter
+
+# Limits of the warnings. Films in good light have a noise of 0.9 to 1.3; sensor noise of sd 15 leaves 5.8, H.264 at crf 32 leaves 3.0.
+WARN_NOISE = 6.5
+WARN_ERROR = 3.0
+WARN_GAIN = 1.5
+WARN_UNMATCHED = 0.02
+STEADY = 0.5
+"""Change from frame to frame over the difference to the empty scene, below which that difference is no noise: it stays."""
+COPIED = 0.8
+"""Share of values that a frame has in common with the last from which on a film is compressed: noise and light change most of them."""
+
+
+@dataclass(frozen=True)
+class FilmCondition:
+    """What a film's frames show beside a person: noise, compression, light, movement. `warnings` says what is too much."""
+
+    noise: float
+    """Standard deviation of the film about its empty scene, after correction and smoothing, grey levels of brightness."""
+    change: float | None
+    """Standard deviation of its change from frame to frame, likewise, over the root of 2; None without consecutive frames."""
+    copied: float | None
+    """Share of values that are the same in a frame and the next."""
+    gain: tuple[float, float]
+    """Least and greatest gain of a channel over the empty scene; (1, 1) if light is not followed."""
+    moved: float
+    """Greatest movement of the camera since the empty scene, pixels at the corners of the picture; 0 if it is not followed."""
+    moved_frames: float
+    """Share of the frames with a movement."""
+    moved_since: float | None
+    """Time (s) from which on all frames have a movement; None if the last one has none."""
+    unmatched: float
+    """Share of the frames in which the empty scene was not found, whatever the movement."""
+
+    def warnings(self) -> tuple[str, ...]:
+        """What harms the silhouettes, and the remedy, a sentence each."""
+        return (*self._movement(), *self._light(), *self._noise())
+
+    def _movement(self) -> Iterator[str]:
+        remedy = "its frames are shifted back, and what they do not show of the scene is guessed"
+        if self.moved_since is not None:
+            when = "throughout" if self.moved_frames == 1 else f"from about {self.moved_since:.1f} s on"
+            yield f"the camera is up to {self.moved:.1f} pixels from where it saw the empty scene, {when}: {remedy}; fix the tripod"
+        elif self.moved:
+            yield (f"the camera moves by up to {self.moved:.1f} pixels, in {100 * self.moved_frames:.0f} % of the frames: {remedy}; "
+                   "fix the tripod")
+        if self.unmatched > WARN_UNMATCHED:
+            yield (f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth of the "
+                   "picture, is covered, or films another place; take the empty scene again")
+
+    def _light(self) -> Iterator[str]:
+        least, most = self.gain
+        if max(1 / least, most) > WARN_GAIN:
+            yield (f"the film's light is {least:.2f} to {most:.2f} times the empty scene's: this is followed up to about 1.4; "
+                   "fix exposure and white balance, or take the empty scene again")
+
+    def _noise(self) -> Iterator[str]:
+        lasts = self.change is not None and self.change < STEADY * self.noise
+        if lasts and self.noise > WARN_ERROR and self.copied is not None and self.copied > COPIED:
+            yield (f"the film is compressed too much (its pixels are {self.noise:.1f} grey levels off the empty scene): outlines are "
+                   "blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality")
+        elif lasts and self.noise > WARN_ERROR:
+            yield (f"the film differs from its empty scene by {self.noise:.1f} grey levels in light that no smooth change explains: "
+                   "clothes like the background are missed; take the empty scene again in this light")
+        elif self.noise > WARN_NOISE:
+            yield (f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use more "
+                   "light, or less gain of the camera")
+
+
+class _State(NamedTuple):
+    """Correction of one frame."""
+
+    gains: NDArray[np.float64]
+    """Of the channels (C,)."""
+    moved: float
+    """Pixels."""
+    matched: bool
+
+
+def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Image]]]) -> FilmCondition:
+    """The condition of a film's sampled frames, in `runs` of consecutive ones, each with its time (s) and picture (H, W, 3) or (H, W)."""
+    correction = segmenter.correction or Correction(np.zeros(segmenter.background.image_shape, np.uint8))
+    frames = [frame for run in runs for frame in run]
+    each = [[correction(image) for _, image in run] for run in runs]
+    corrected = [[frame.image for frame in run] for run in each]
+    states = [_state(correction, image, frame.movement) for (_, image), frame in zip(frames, itertools.chain(*each))]
+    gains = np.concatenate([state.gains for state in states])
+    moved = np.array([state.moved for state in states])
+    still = np.flatnonzero(moved == 0)
+    first = int(still[-1]) + 1 if len(still) else 0
+    change, copied = _changes(corrected)
+    noise = film_noise([image for run in corrected for image in run[::2]], smoothed(segmenter.background.mean))
+    return FilmCondition(
+        noise=float(noise[0]), change=change, copied=copied, gain=(float(gains.min()), float(gains.max())),
+        moved=float(moved.max()), moved_frames=float((moved > 0).mean()),
+        moved_since=frames[first][0] if first < len(frames) else None,
+        unmatched=float(np.mean([not state.matched for state in states])),
+    )  # fmt: skip
+
+
+def _state(correction: Correction, image: Image, movement: Homography | None) -> _State:
+    moved, matched = 0.0, True
+    if correction.registration is not None:
+        matched = correction.registration.matches(image, movement)
+        if movement is not None:
+            moved, image = correction.registration.pixels(movement), correction.registration.undone(image, movement)[0]
+    gains = np.ones(1) if correction.light is None else correction.light.gains(image)
+    return _State(gains, moved, matched)
+
+
+def _changes(runs: Sequence[Sequence[Image]]) -> tuple[float | None, float | None]:
+    """Standard deviation of the change from frame to frame (grey levels, over the root of 2), and the share of values
+    that stay."""
+    changes, same = list[float](), list[float]()
+    for run in runs:
+        planes = [smoothed(to_planes(image)[..., :1].astype(np.float32)) for image in run]
+        changes += [float(np.percentile(np.abs(a - b)[::2, ::2], 68)) for a, b in itertools.pairwise(planes)]
+        same += [float(np.mean(a[::2, ::2] == b[::2, ::2])) for a, b in itertools.pairwise(run)]
+    return (float(np.median(changes)) / 2**0.5, float(np.median(same))) if changes else (None, None)

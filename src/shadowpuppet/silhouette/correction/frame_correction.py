@@ -1,0 +1,60 @@
+"""What is undone in a frame before its pixels are compared with the empty scene: movement of the camera, changes of light, the rest of the
+room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from shadowpuppet.silhouette.background import Image
+from shadowpuppet.silhouette.cleanup import Window
+from shadowpuppet.silhouette.correction.light import Light
+from shadowpuppet.silhouette.correction.registration import Gap, Homography, Registration
+from shadowpuppet.silhouette.settings import SilhouetteSettings
+
+
+class Corrected(NamedTuple):
+    """A corrected frame."""
+
+    image: Image
+    """Of shape (H, W, 3) or (H, W)."""
+    gap: Gap | None
+    """Pixels that a moved camera does not show; None if it stands still."""
+    movement: Homography | None
+    """The camera's movement since the empty scene; None if it stands still."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """A frame (H, W, 3) or (H, W) as the camera would see it where and as it stood when it saw the empty scene. It has no state."""
+
+    scene: Image
+    """Mean picture of the empty scene, of shape (H, W, 3) or (H, W)."""
+    registration: Registration | None = None
+    """None: the camera is taken to stand still."""
+    light: Light | None = None
+    """None: changes of light are not corrected."""
+    region: Window | None = None
+    """Rows and columns outside which the frame shows the empty scene; None for all."""
+
+    @classmethod
+    def of(cls, scene: Image, settings: SilhouetteSettings, region: Window | None = None) -> Correction:
+        """The correction that settings ask for."""
+        registration = Registration(scene) if settings.follows_camera else None
+        return cls(scene, registration, Light(scene) if settings.follows_light else None, region)
+
+    def __call__(self, image: Image) -> Corrected:
+        """The corrected frame; the frame itself if nothing is to be corrected. What a moved camera does not show is the empty scene."""
+        movement = None if self.registration is None else self.registration.movement(image)
+        gap = None
+        if self.registration is not None and movement is not None:
+            image, gap = self.registration.undone(image, movement)
+        if self.light is not None:
+            image = self.light.normalised(image)
+        if gap is not None:
+            image = gap.blanked(image, self.scene)
+        if self.region is not None:
+            blank = self.scene.copy()
+            blank[self.region] = image[self.region]
+            image = blank
+        return Corrected(image, gap, movement)

@@ -1,0 +1,318 @@
+"""The empty scene from frames of a film in which a person is always there, and where it was never seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.errors import SilhouetteError
+from shadowpuppet.silhouette.background import Floats, Image, check_alike, check_image, smoothed, to_planes
+from shadowpuppet.silhouette.correction.light import Light
+from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
+from shadowpuppet.silhouette.recovery.filling import filled
+from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels
+from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, temporal_modes
+from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
+
+WORKED_WIDTH = 320
+"""Greatest width, pixels, of the pictures in which scene and person are separated; the scene's own picture has the frames' size."""
+LEAST_FRAMES = 3
+"""Least number of frames: with fewer, moving and still pixels cannot be distinguished."""
+LEAST_SEEN = 2
+"""Least number of frames that show the scene at a pixel."""
+ROUNDS = 3
+"""Times that pixels are labelled, each but the first with colour models from the labels before."""
+RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN, BELOW_COST = 0.3, 0.4, 1.5, 0.3, 0.3
+"""Costs of labels: of a scene that is seen rarely, over the logarithm of its share of the frames; of a covered pixel that something moved
+over, and of one whose colour stays the same nevertheless, over the share of frames that have it. Gain of a covered pixel that is
+enclosed, and cost of one below the trunk."""
+COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
+"""Weight of a colour's log likelihood ratio, and its limit."""
+CALM_WEIGHT = 0.02
+"""Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
+CALM_SHARE = 0.25
+"""Least area of a part of such pixels over that of the largest."""
+PART_SHARE, PART_COLOUR = 0.02, 0.5
+"""Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
+WAIST = 20
+"""Rows of the largest covered part over those, above its centre, in which its width is that of the trunk."""
+CONNECTED = 0.8
+"""Least share of the frames in which another covered part is connected with the largest."""
+MEMBER = 1.2
+"""Distance, over a mode's radius, within which a sample at full size shows it."""
+
+REMEDY = "film the empty scene for a second (background/<camera>.mp4 or --background), or give ready silhouettes (masks/ and --masks)"
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveredScene:
+    """An empty scene recovered from a film."""
+
+    picture: Image
+    """The empty scene, of shape (H, W, 3) or (H, W); where it was never seen it is filled from around."""
+    covered: Mask
+    """Pixels that the person covers in all frames, of shape (H, W)."""
+    frames: int
+    """Number of frames that it was recovered from."""
+    doubt: str | None = None
+    """Why it is no empty scene, and the remedy; None if nothing speaks against it."""
+
+
+def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
+    """The empty scene of frames (H, W, 3) or (H, W) spread over a film, some 60; the person may stand there in all of them.
+
+    1. Changes of the light are taken off, with the frames' median as reference (`light.Light`).
+    2. `movement.find_movement`: pixels that something moved over, and those enclosed by them. All others show the scene.
+    3. `modes.temporal_modes`: the colours that each of these pixels shows, with their shares.
+    4. `labelling.label_pixels`: which mode is the scene's, or whether the person covers the pixel always. The first time the colours of
+       the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene.
+    5. The scene's picture at full size: the mean of the frames that show the mode. Covered pixels are filled from around.
+
+    Raises `SilhouetteError` for fewer than 3 frames, and frames that do not fit together.
+    """
+    check_frames(frames)
+    frames = _in_one_light(frames)
+    planes = np.stack([smoothed(to_planes(_reduced(frame))).astype(np.float32) for frame in frames])
+    movement = find_movement(planes)
+    if doubt := _doubt(movement):
+        return RecoveredScene(_median(frames), np.zeros(frames[0].shape[:2], bool), len(frames), doubt)
+    scene, covered = _labelled(planes, movement)
+    return _at_full_size(frames, scene, covered, movement)
+
+
+def check_frames(frames: Sequence[Image]) -> None:
+    """Raise `SilhouetteError` for too few frames, and frames that are no pictures of one size."""
+    if len(frames) < LEAST_FRAMES:
+        raise SilhouetteError(f"background: found a film of {len(frames)} frames, expected at least {LEAST_FRAMES} to tell a person who "
+                              "moves from the scene; give a picture or film of the empty scene")
+    for n, image in enumerate(frames):
+        check_image(image, f"film frame {n}")
+        check_alike(image, frames[0].shape, f"film frame {n}")
+
+
+def _doubt(movement: Movement) -> str | None:
+    if unsteady(movement):
+        return f"nearly all of the picture changes in the film, as if the camera or the light had moved: {REMEDY}"
+    if not movement.region.any():
+        return f"nothing moves in the film, so the person cannot be told from the scene: {REMEDY}"
+    return None
+
+
+def _in_one_light(frames: Sequence[Image]) -> list[Image]:
+    light = Light(_median(frames))
+    return [light.normalised(frame) for frame in frames]
+
+
+def _median(frames: Sequence[Image]) -> Image:
+    middle, rows = len(frames) // 2, 32
+    strips = (np.stack([f[y : y + rows] for f in frames]) for y in range(0, len(frames[0]), rows))
+    return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
+
+
+def _reduced(image: Image) -> Image:
+    import cv2
+
+    height, width = image.shape[:2]
+    if width <= WORKED_WIDTH:
+        return image
+    size = WORKED_WIDTH, max(1, round(height * WORKED_WIDTH / width))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+# Labels
+
+
+class _Field(NamedTuple):
+    """What the labels are chosen from; M pixels of the picture are in the region."""
+
+    modes: Modes
+    """Modes of the region's pixels."""
+    movement: Movement
+    still: Floats
+    """Median Y, Cr, Cb, of shape (H, W, 3), which is the scene's outside the region."""
+    frames: int
+
+
+def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
+    """The scene's Y, Cr, Cb (h, w, 3), and the pixels (h, w) that are always covered, at the reduced size."""
+    modes = temporal_modes(planes[:, movement.region], radius_of(movement.noise))
+    field = _Field(modes, movement, np.median(planes, axis=0).astype(np.float32), len(planes))
+    colour, share = _on_picture(field)
+    labels, ratio, below = None, np.zeros(0), np.zeros(0, bool)
+    for _ in range(ROUNDS):
+        below = _below(field, labels)
+        ratio = _colour_ratio(field, labels, below)
+        labels = label_pixels(colour, share, _costs(field, ratio, below), movement.region)[movement.region]
+    assert labels is not None
+    covered = np.zeros(movement.region.shape, bool)
+    covered[movement.region] = labels == COUNT
+    passing = (np.abs(planes - _scene(field, labels)) > radius_of(movement.noise)).any(axis=3) & movement.region
+    covered = _persons_parts(covered, passing, movement.region, ratio[:, 0])
+    cost = _costs(field, ratio, below)
+    cost[..., COUNT] = np.where(covered, 0, NEVER)
+    cost[covered, :COUNT] = NEVER
+    return _scene(field, label_pixels(colour, share, cost, movement.region)[movement.region]), covered
+
+
+def _scene(field: _Field, labels: NDArray[np.intp]) -> Floats:
+    """The scene's Y, Cr, Cb (H, W, 3) by labels (M,); the most frequent colour where it is covered."""
+    out = field.still.copy()
+    out[field.movement.region] = field.modes.colour[np.arange(len(labels)), np.where(labels == COUNT, 0, labels)]
+    return out
+
+
+def _on_picture(field: _Field) -> tuple[Floats, Floats]:
+    """Modes (H, W, K, 3) and shares (H, W, K) of all pixels; outside the region there is one."""
+    region = field.movement.region
+    colour, share = np.zeros((*region.shape, COUNT, 3), np.float32), np.zeros((*region.shape, COUNT), np.float32)
+    colour[..., 0, :], share[..., 0] = field.still, 1
+    colour[region], share[region] = field.modes.colour, field.modes.share
+    return colour, share
+
+
+def _costs(field: _Field, ratio: NDArray[np.float64], below: NDArray[np.bool_]) -> Floats:
+    """The cost (H, W, K + 1) of each label. below: pixels (M,) as `_below` finds them, in which the person costs less."""
+    region, share = field.movement.region, field.modes.share
+    out = np.full((*region.shape, COUNT + 1), NEVER, np.float32)
+    out[..., 0] = 0
+    scene = COLOUR_WEIGHT * ratio - RARE_COST * np.log(np.maximum(share, 1e-3))
+    moved = MOVED_COST + STEADY_COST * share[:, 0]
+    covered = np.where(field.movement.enclosed[region], -ENCLOSED_GAIN, np.where(below, BELOW_COST, moved))
+    seldom = share < (LEAST_SEEN - 0.5) / field.frames
+    out[region] = np.column_stack([np.where(seldom, NEVER, scene), covered])
+    return out
+
+
+def _below(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.bool_]:
+    """Of the region's pixels (M,) those below the trunk, which is the middle of the largest covered part by the labels (M,) so far."""
+    import cv2
+
+    region = field.movement.region
+    if labels is None:
+        return np.zeros(int(region.sum()), bool)
+    covered = np.zeros(region.shape, np.uint8)
+    covered[region] = labels == COUNT
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(covered, connectivity=4)
+    if len(stats) < 2:
+        return np.zeros(int(region.sum()), bool)
+    largest = np.asarray(parts) == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+    rows = largest.sum(axis=1)
+    middle = int(np.average(np.arange(len(rows)), weights=rows))
+    below = np.zeros(region.shape, bool)
+    below[middle:] = largest[middle - np.count_nonzero(rows) // WAIST : middle + 1].any(axis=0)
+    return below[region]
+
+
+def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None, below: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Log likelihood ratio (M, K), person to scene, of the modes' colours, by the labels (M,) so far; None: by the still pixels alone.
+
+    Uncovered pixels `below` (M,) are no examples of the scene: they may be the legs.
+    """
+    modes = field.modes
+    still = field.still[~field.movement.region]
+    if labels is None:
+        share = known(modes.colour, colour_model(still, np.ones(len(still))))
+        return np.where(share > UNKNOWN, -0.5 * np.log(np.maximum(share, UNKNOWN) / UNKNOWN), 0.5).clip(-GREATEST_RATIO, GREATEST_RATIO)
+    uncovered = np.flatnonzero(labels < COUNT)
+    sure = np.flatnonzero((labels < COUNT) & ~below)
+    scene = np.concatenate([still, modes.colour[sure, labels[sure]]])
+    passing = modes.share[uncovered]
+    passing[np.arange(len(uncovered)), labels[uncovered]] = 0
+    calm = _calm(field, labels)
+    weights = np.concatenate([passing.reshape(-1), np.full(np.count_nonzero(calm), CALM_WEIGHT)])
+    person = colour_model(np.concatenate([modes.colour[uncovered].reshape(-1, 3), modes.colour[calm, 0]]), weights)
+    return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene)))).clip(-GREATEST_RATIO, GREATEST_RATIO)
+
+
+def _calm(field: _Field, labels: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Of the region's pixels (M,) those that are covered and enclosed, in large parts: trunk and legs."""
+    import cv2
+
+    parts = np.zeros(field.movement.region.shape, np.uint8)
+    parts[field.movement.region] = labels == COUNT
+    parts &= field.movement.enclosed
+    _, numbers, stats, _ = cv2.connectedComponentsWithStats(parts, connectivity=4)
+    areas = stats[:, cv2.CC_STAT_AREA] * (np.arange(len(stats)) > 0)
+    kept = (areas > 0) & (areas >= CALM_SHARE * areas.max())
+    return kept[np.asarray(numbers, np.intp)][field.movement.region]
+
+
+def _persons_parts(covered: Mask, passing: Mask, region: Mask, ratio: NDArray[np.float64]) -> Mask:
+    """The largest covered part (H, W), and others that belong to it; no thin lines.
+
+    Others belong to it if their colours are a person's by their log `ratio` (M,), and if in most frames what passes over the scene,
+    `passing` (N, H, W), connects them with it.
+    """
+    import cv2
+
+    opened = cv2.morphologyEx(covered.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    number, parts, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=4)
+    if number < 2:
+        return np.zeros_like(covered)
+    areas = stats[:, cv2.CC_STAT_AREA].astype(float)
+    evidence = np.bincount(np.asarray(parts)[region], ratio, number) / areas
+    areas[0] = 0
+    largest = int(areas.argmax())
+    kept = (areas >= PART_SHARE * areas[largest]) & (evidence > PART_COLOUR * evidence[largest])
+    kept &= _connected(np.asarray(parts, np.int32), number, largest, passing) >= CONNECTED
+    kept[largest], kept[0] = True, False
+    return kept[np.asarray(parts, np.intp)]
+
+
+def _connected(parts: NDArray[np.int32], number: int, largest: int, passing: Mask) -> NDArray[np.float64]:
+    """Share of the frames in which each of `number` parts (H, W) is connected with the largest by what passes over the scene."""
+    import cv2
+
+    firsts = np.unique(parts, return_index=True)[1]
+    together = np.zeros(number)
+    for frame in passing:
+        near = cv2.dilate((frame | (parts > 0)).astype(np.uint8), np.ones((3, 3), np.uint8))
+        joined = np.asarray(cv2.connectedComponents(near)[1]).reshape(-1)[firsts]
+        together += joined == joined[largest]
+    return together / len(passing)
+
+
+# The picture
+
+
+def _at_full_size(frames: Sequence[Image], scene: Floats, covered: Mask, movement: Movement) -> RecoveredScene:
+    """The scene's picture at the frames' size, from what was found at the reduced size."""
+    import cv2
+
+    height, width = frames[0].shape[:2]
+    hidden = cv2.resize(covered.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR) > 0.5
+    moved = cv2.resize(movement.region.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+    moved = cv2.dilate(moved, np.ones((5, 5), np.uint8))
+    x, y, across, down = cv2.boundingRect(moved)
+    window = slice(y, y + down), slice(x, x + across)
+    target = np.ascontiguousarray(cv2.resize(scene, (width, height), interpolation=cv2.INTER_NEAREST)[window])
+    sums, total, seen = _Sums(frames[0]), _Sums(frames[0][window]), np.zeros(target.shape[:2], np.int32)
+    reach = MEMBER * radius_of(movement.noise)
+    for frame in frames:
+        sums.add(frame)
+        shows = cv2.inRange(np.abs(smoothed(to_planes(frame[window])) - target) / reach, (0, 0, 0), (1, 1, 1))
+        seen += shows > 0
+        total.add(frame[window], np.asarray(shows, np.uint8))
+    picture = sums.first / len(frames)
+    counts = seen if picture.ndim == 2 else seen[..., None]
+    picture[window] = np.where(moved[window].reshape(counts.shape) > 0, total.first / np.maximum(counts, 1), picture[window])
+    unknown = hidden.copy()
+    unknown[window] |= (moved[window] > 0) & (seen == 0)
+    picture = filled(picture.astype(np.float32), ~unknown)
+    return RecoveredScene(np.clip(np.rint(picture), 0, 255).astype(np.uint8), hidden, len(frames))
+
+
+class _Sums:
+    """Sum of pictures like one, each pixel where a mask is set."""
+
+    def __init__(self, image: Image) -> None:
+        self.first = np.zeros(image.shape, np.float32)
+
+    def add(self, image: Image, mask: Image | None = None) -> None:
+        import cv2
+
+        cv2.accumulate(image, self.first, mask=mask)

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import pytest
+from silhouette_scenes import SIZE, empty_shots, grey, overlap, scene, shot
+
+from shadowpuppet.errors import SilhouetteError
+from shadowpuppet.silhouette import learn_background, recover_scene
+
+TRUNK, LEGS, SKIN, POSTER = (120, 45, 40), (30, 32, 30), (90, 120, 190), (40, 200, 90)
+
+
+def standing(wall: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A person (picture, mask) who stands, sways and breathes by a pixel, and swings both arms. The picture cuts the legs."""
+    sway, lift, reach = round(1.5 * np.sin(1.7 * n)), round(np.sin(2.3 * n)), round(30 * np.sin(0.9 * n))
+    picture, mask = wall.copy(), np.zeros(SIZE, np.uint8)
+
+    def draw(x, y, width, height, colour):
+        for image, value in ((picture, colour), (mask, 1)):
+            cv2.rectangle(image, (x, y + lift), (x + width, y + height + lift), value, -1)
+
+    draw(60 + sway, 45, 36, 40, TRUNK)
+    draw(62 + sway, 86, 14, 45, LEGS)
+    draw(82 + sway, 86, 14, 45, LEGS)
+    draw(70 + sway, 20, 16, 24, SKIN)
+    for side, x in ((-1, 60), (1, 96)):
+        for image, colour, end in ((picture, TRUNK, 0.6), (mask, 1, 0.6), (picture, SKIN, 1), (mask, 1, 1)):
+            start = (x + sway, 50) if end == 0.6 else (x + sway + int(side * 18), 50 + int(0.6 * reach))
+            cv2.line(image, start, (x + sway + int(side * 30 * end), 50 + int(reach * end)), colour, 7)
+    return picture, mask > 0
+
+
+def film(rng: np.random.Generator, wall: np.ndarray, count=40) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    shown = [standing(wall, n) for n in range(count)]
+    return [shot(rng, picture) for picture, _ in shown], [mask for _, mask in shown]
+
+
+def with_poster(wall: np.ndarray) -> np.ndarray:
+    """A wall with a poster that the right arm passes over."""
+    out = wall.copy()
+    out[25:60, 110:135] = POSTER
+    return out
+
+
+@pytest.mark.parametrize("furnished", [False, True])
+def test_who_stands_through_the_whole_film_is_found(rng, furnished):
+    wall = with_poster(scene(rng)) if furnished else scene(rng)
+    frames, masks = film(rng, wall)
+    found = recover_scene(frames)
+    assert found.doubt is None
+    assert found.frames == len(frames)
+    always = np.all(masks, axis=0)
+    assert (found.covered & always).sum() > 0.9 * always.sum()
+    assert (found.covered & ~np.any(masks, axis=0)).sum() < 0.03 * always.sum()
+    assert np.abs(found.picture.astype(float) - wall)[~found.covered & (np.mean(masks, axis=0) < 0.8)].mean() < 3
+    segmenter = learn_background([found.picture], film=frames, covered=found.covered)
+    overlaps = [overlap(segmenter(frame), mask) for frame, mask in zip(frames, masks)]
+    assert np.median(overlaps) > 0.93
+    assert min(overlaps) > 0.88
+
+
+def test_the_gap_between_the_legs_is_scene(rng):
+    frames, masks = film(rng, scene(rng))
+    found = recover_scene(frames).covered
+    assert not np.any(masks, axis=0)[110, 79]
+    assert not found[95:118, 79].any()
+
+
+def test_a_grey_film_serves_too(rng):
+    frames, masks = film(rng, scene(rng))
+    found = recover_scene([grey(frame) for frame in frames])
+    assert found.picture.shape == SIZE
+    assert (found.covered & np.all(masks, axis=0)).sum() > 0.7 * np.all(masks, axis=0).sum()
+
+
+def test_it_is_the_same_each_time_and_leaves_the_frames_alone(rng):
+    frames, _ = film(rng, scene(rng), 20)
+    before = [frame.copy() for frame in frames]
+    one, other = recover_scene(frames), recover_scene(frames)
+    assert np.array_equal(one.picture, other.picture)
+    assert np.array_equal(one.covered, other.covered)
+    assert all(np.array_equal(a, b) for a, b in zip(frames, before))
+
+
+def passing(rng: np.random.Generator, wall: np.ndarray, count=30) -> Iterator[np.ndarray]:
+    """A film in which a dark block crosses the picture."""
+    for n in range(count):
+        picture = wall.copy()
+        picture[30:110, 5 * n : 5 * n + 30] = (30, 30, 30)
+        yield shot(rng, picture)
+
+
+def test_behind_who_passes_all_is_seen(rng):
+    wall = scene(rng)
+    found = recover_scene(list(passing(rng, wall)))
+    assert found.picture.shape == wall.shape
+    assert found.picture.dtype == np.uint8
+    assert np.abs(found.picture - wall).max() < 8
+    assert not found.covered.any()
+
+
+def test_changes_of_the_light_are_taken_off(rng):
+    frames, masks = film(rng, scene(rng))
+    lit = [np.clip(frame * (1 + 0.15 * np.sin(n / 6)), 0, 255).astype(np.uint8) for n, frame in enumerate(frames)]
+    found = recover_scene(lit)
+    always = np.all(masks, axis=0)
+    assert (found.covered & always).sum() > 0.9 * always.sum()
+    assert (found.covered & ~np.any(masks, axis=0)).sum() < 0.1 * always.sum()
+
+
+def test_a_film_in_which_nothing_moves_is_doubted(rng):
+    picture, _ = standing(scene(rng), 0)
+    found = recover_scene([shot(rng, picture) for _ in range(20)])
+    assert "nothing moves in the film" in (found.doubt or "")
+    assert "--background" in (found.doubt or "")
+    assert not found.covered.any()
+
+
+def test_a_camera_that_moves_is_doubted(rng):
+    wall = np.clip(cv2.GaussianBlur(rng.normal(0, 60, SIZE), (0, 0), 2)[..., None] * np.full(3, 5) + 128, 0, 255)
+    assert "camera or the light" in (recover_scene([shot(rng, np.roll(wall, 3 * n, 1)) for n in range(20)]).doubt or "")
+
+
+def test_it_needs_a_film(rng):
+    with pytest.raises(SilhouetteError, match="2 frames, expected at least 3"):
+        recover_scene(empty_shots(rng, scene(rng), 2))
+    with pytest.raises(SilhouetteError, match="80 x 60 colour, expected 160 x 120 colour"):
+        recover_scene([*empty_shots(rng, scene(rng), 3), np.zeros((60, 80, 3), np.uint8)])
+
+
+def test_a_striped_skirt_belongs_to_the_person_above(rng):
+    """Its stripes stir, and something small in the scene has its colour; what passes over the scene are arms and trunk alone."""
+    wall, colour = scene(rng), np.array((45, 60, 50), np.uint8)
+    wall[5:11, 5:11] = colour
+    frames, masks = film(rng, wall)
+    for n, (frame, mask) in enumerate(zip(frames, masks)):
+        sway = round(1.5 * np.sin(1.7 * n))
+        cloth = np.broadcast_to(colour, frame.shape).copy()
+        cloth[:, sway % 3 :: 3] += np.uint8(12)
+        skirt = np.s_[86:, 62 + sway : 96 + sway]
+        frame[skirt] = shot(rng, cloth)[skirt]
+        mask[skirt] = True
+    always = np.all(masks, axis=0)
+    always[:88] = False
+    assert (recover_scene(frames).covered & always).sum() > 0.9 * always.sum()
