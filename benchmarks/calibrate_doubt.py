@@ -11,11 +11,13 @@ out: a third at a time is tested with the factors of the others. `--write` write
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import smallest
@@ -27,19 +29,21 @@ from spoiled import SPOILS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.motion.synchronization import at_times
+from shadowpuppet.motion.limbs import limb_of
+from shadowpuppet.motion.metrics import FAR_ERROR
 from shadowpuppet.motion.motion import BLANK, JointTable
+from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
 from shadowpuppet.pipeline.survey import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
-from shadowpuppet.tracking.doubt.monocular import MonocularEvidence
-from shadowpuppet.tracking.doubt.multiview import MultiviewEvidence
+from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
+from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
-RINGS, RING_SECONDS = GROUND.parent / "rings_short", 3.0
+RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
 BUILD = GROUND.parent / "doubt"
 TABLE = GROUND.parent.parent / "src" / "shadowpuppet" / "tracking" / "doubt" / "factors.toml"
 WIDTH = 1.6448536269514722
@@ -129,11 +133,11 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
     for n, (fault, spoil) in enumerate(FAULTS.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
         tracker = MonocularTracker(picture, options.tracker)
-        evidence, state, before, rows, poses = MonocularEvidence(tracker), None, None, [], []
+        doubt, state, before, rows, poses = MonocularDoubt(tracker), None, None, [], []
         for seconds, mask in zip(case.times.tolist(), masks):
             state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask)
-            row, before = evidence.components(state, mask, seconds, before)
-            rows.append(row)
+            found, before = doubt.evidence(state, mask, seconds, before)
+            rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
         errors = _errors(case.truth, names, picture.points_world(np.array(poses))) @ turn.T
         yield Tracked(path.name, fault, names, {name: np.array([row[name] for row in rows]) for name in rows[0]}, errors)
@@ -157,8 +161,9 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
     times, names = [time for time, _ in frames], subject.body.landmark_names
     late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
     for n, (fault, spoil) in enumerate((FAULTS | {"late": late}).items()):
-        spoiled = [spoil(np.random.default_rng([n, m]), film, rate) if m == 0 or fault not in ONE_CAMERA else film for m, film in enumerate(films)]
-        rng, evidence, state, before, rows, poses = np.random.default_rng(1), MultiviewEvidence(subject.tracker), None, None, [], []
+        spoiled = [spoil(np.random.default_rng([n, m]), film, rate) if m == 0 or fault not in ONE_CAMERA else film
+                   for m, film in enumerate(films)]
+        rng, doubt, state, before, rows, poses = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, [], []
         for seconds, masks in zip(times, zip(*spoiled)):
             observation = subject.observe(masks)
             state = subject.next_state(rng, state, observation)
@@ -166,8 +171,8 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
                 poses.append(np.full(len(subject.body.skeleton.dofs), np.nan))
                 rows.append(None)
                 continue
-            row, before = evidence.components(state, observation.points, masks, seconds, before)
-            rows.append(row)
+            found, before = doubt.evidence(state, observation.points, masks, seconds, before)
+            rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
         errors = _errors(at_times(truth, np.array(times)), names, subject.body.points(np.array(poses)))
         some = next(row for row in rows if row is not None)
@@ -175,15 +180,13 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
         yield Tracked(path.name, fault, names, components, errors)
 
 
-def made_rings() -> list[Path]:
-    """The proving ground of several cameras, its first `RING_SECONDS`; made where they are missing."""
-    out = []
-    for n, spec in enumerate(proving_rings(), 1):
-        out.append(RINGS / spec.name)
-        if not (done := out[-1] / "made").exists():
-            synthesize(replace(spec, frames=round(RING_SECONDS * spec.rate)), out[-1], np.random.default_rng([2, n]))
-            done.touch()
-    return out
+def make_ring(path: Path) -> None:
+    """Make a recording of the proving ground of several cameras, its first `RING_SECONDS` at `RING_RATE`, where it is missing."""
+    number, spec = next((n, spec) for n, spec in enumerate(proving_rings()) if spec.name == path.name)
+    if not (done := path / "made").exists():
+        rate = min(spec.rate, RING_RATE)
+        synthesize(replace(spec, rate=rate, frames=round(RING_SECONDS * rate)), path, np.random.default_rng([2, number]))
+        done.touch()
 
 
 def _errors(truth: JointTable, names: Sequence[str], points: Array) -> Array:
@@ -196,17 +199,20 @@ def _errors(truth: JointTable, names: Sequence[str], points: Array) -> Array:
 def collect(kind: str, path: Path, again: bool) -> list[Path]:
     """Files with the runs of a recording, one a fault."""
     folder = BUILD / kind / path.name
+    if path.parent == RINGS:
+        make_ring(path)
     if again or not (folder / "done").exists():
         folder.mkdir(parents=True, exist_ok=True)
         for run in TRACK[kind](path):
-            np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors, names=list(run.components),
-                                components=np.stack(list(run.components.values()), 3).astype(np.float32))
+            np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
+                                names=list(run.components), components=np.stack(list(run.components.values()), 3).astype(np.float32))
         (folder / "done").touch()
     return sorted(folder.glob("*.npz"))
 
 
 TRACK = {"monocular": track_monocular, "multiview": track_multiview}
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), "multiview": made_rings}
+MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND),
+                                             "multiview": lambda: [RINGS / spec.name for spec in proving_rings()]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,32 +223,42 @@ class Errors:
     fault: str
     joint: str
     axis: int
+    names: tuple[str, ...]
+    """Of the F components."""
     lengths: Array
     """Components (n, F), metres."""
     errors: Array
     """Of shape (n,), metres."""
 
 
-def read_errors(files: Iterable[Path]) -> tuple[list[Errors], list[str]]:
-    """Errors of all runs, and the components' names."""
-    found, names = [], []
+def read_runs(files: Iterable[Path]) -> list[Tracked]:
+    """Runs from their files."""
+    found = []
     for file in files:
         data = np.load(file, allow_pickle=False)
-        names = data["names"].tolist()
-        for j, joint in enumerate(data["joints"].tolist()):
-            for axis in range(3):
-                errors = data["errors"][:, j, axis]
-                known = np.isfinite(errors)
-                if known.any():
-                    found.append(Errors(file.parent.name, file.stem, joint, axis, data["components"][known, j, axis].astype(float), errors[known]))
-    return found, names
+        components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
+        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"]))
+    return found
 
 
-def fit(lengths: Array, errors: Array) -> Array:
-    """Factors (F,) of components (n, F) for errors (n,): those of least mean interval score."""
+def errors_of(runs: Iterable[Tracked]) -> list[Errors]:
+    """Errors of all joints and axes where they are known."""
+    found = []
+    for run in runs:
+        lengths, known = np.stack(list(run.components.values()), 3), np.isfinite(run.errors)
+        for j, joint in enumerate(run.joints):
+            found += [Errors(run.recording, run.fault, joint, axis, tuple(run.components), lengths[which, j, axis], run.errors[which, j, axis])
+                      for axis, which in enumerate(known[:, j].T) if which.any()]
+    return found
+
+
+def fit(lengths: Array, errors: Array, least: Array) -> Array:
+    """Factors (F,) of components (n, F) for errors (n,): those of least mean interval score, and not below `least`
+    (F,); 1 of components that do not occur."""
     from scipy.optimize import minimize
 
-    squares, size = lengths**2, np.abs(errors)
+    step = max(1, len(errors) // MOST)  # neighbouring frames tell the same
+    squares, size = lengths[::step] ** 2, np.abs(errors[::step])
 
     def score(logs: Array) -> tuple[float, Array]:
         variances = np.exp(logs)
@@ -251,12 +267,24 @@ def fit(lengths: Array, errors: Array) -> Array:
         slope = (2 * WIDTH - 20 * WIDTH * (beyond > 0)) / (2 * sd)
         return float((2 * WIDTH * sd + 20 * beyond).mean()) * SCALE, (slope[:, None] * squares * variances).mean(0) * SCALE
 
-    start = np.full(lengths.shape[1], np.log(0.05))
-    return np.exp(minimize(score, start, jac=True, method="L-BFGS-B", bounds=[(-9, 9)] * len(start)).x / 2)
+    lowest = np.maximum(2 * np.log(np.maximum(least, 1e-6)), -9)
+    start = np.maximum(lowest, np.log(0.05))
+    found = np.exp(minimize(score, start, jac=True, method="L-BFGS-B", bounds=[(low, 9) for low in lowest]).x / 2)
+    return np.where(squares.any(0), found, 1.0)
 
 
+MOST = 15000
+"""Greatest number of errors, about, that factors are fitted to."""
 SCALE = 100.0
 """Factor on scores (m), for the optimiser's tolerances."""
+LEAST = {"constant": 1.0, "distance": 1.0}
+"""Least factors: made recordings know neither the doubt in where a joint is in a body, nor that in the distance."""
+SILENT = 0.005
+"""Share of the joints that may be over `FAR_ERROR` off in a limb that is vouched for."""
+NEAR = 0.1
+"""Error (m) below which a doubtful joint is a false alarm."""
+PARTS = 3
+"""Number of parts of the recordings, each of which is tested with the factors of the others."""
 NEGLIGIBLE = 0.02
 """Factor below which a component is left out."""
 
@@ -272,12 +300,13 @@ Factors = dict[str, dict[int, Array]]
 
 def fit_all(runs: Sequence[Errors]) -> Factors:
     """Factors of all groups that occur."""
+    least = np.array([LEAST.get(name, 0.0) for name in runs[0].names])
     out: Factors = {}
     for group in GROUPS:
         for axis in range(3):
             own = [run for run in runs if group_of(run.joint) == group and run.axis == axis]
             if own:
-                out.setdefault(group, {})[axis] = fit(np.concatenate([run.lengths for run in own]), np.concatenate([run.errors for run in own]))
+                out.setdefault(group, {})[axis] = fit(*(np.concatenate([getattr(run, name) for run in own]) for name in ("lengths", "errors")), least)
     return out
 
 
@@ -286,31 +315,103 @@ def deviations(factors: Factors, run: Errors) -> Array:
     return np.sqrt(run.lengths**2 @ factors[group_of(run.joint)][run.axis] ** 2)
 
 
-def left_out(runs: Sequence[Errors], parts: int = 3) -> list[tuple[Errors, Array, float]]:
-    """Runs with deviations (n,) by the factors of other recordings, and the best constant one (m) for the joint's axis."""
-    names, out = sorted({run.recording for run in runs}), []
-    for part in range(parts):
-        tested = set(names[part::parts])
-        others = [run for run in runs if run.recording not in tested] or list(runs)
-        factors = fit_all(others)
-        constant = {(joint, axis): float(np.quantile(np.abs(np.concatenate([run.errors for run in others if (run.joint, run.axis) == (joint, axis)])), 0.9)) / WIDTH
-                    for joint, axis in {(run.joint, run.axis) for run in others}}
-        out += [(run, deviations(factors, run), constant[run.joint, run.axis]) for run in runs if run.recording in tested]
+class Tested(NamedTuple):
+    """A run, judged by factors and limits of other recordings."""
+
+    run: Errors
+    sd: Array
+    """Standard deviations (n,), metres."""
+    constant: float
+    """The best constant deviation (m) of the joint along the axis."""
+
+
+def folds(runs: Sequence[Tracked]) -> Iterator[tuple[list[Tracked], list[Tracked]]]:
+    """A third of the recordings at a time, and the others; a recording alone is its own other."""
+    names = sorted({run.recording for run in runs})
+    for part in range(min(PARTS, len(names))):
+        tested = set(names[part::PARTS])
+        yield [run for run in runs if run.recording in tested], [run for run in runs if run.recording not in tested] or list(runs)
+
+
+def left_out(runs: Sequence[Tracked]) -> tuple[list[Tested], list[LimbJoint]]:
+    """Joints and limbs of all runs, judged by factors and limits of other recordings."""
+    joints, limbs = list[Tested](), list[LimbJoint]()
+    for own, others in folds(runs):
+        known = errors_of(others)
+        factors = fit_all(known)
+        by_joint = dict[tuple[str, int], list[Array]]()
+        for run in known:
+            by_joint.setdefault((run.joint, run.axis), []).append(np.abs(run.errors))
+        best = {key: float(np.quantile(np.concatenate(sizes), 0.9)) / WIDTH for key, sizes in by_joint.items()}
+        joints += [Tested(run, deviations(factors, run), best[run.joint, run.axis]) for run in errors_of(own)]
+        limits = fit_limits(limb_joints(others, factors))
+        limbs += [each._replace(limit=limits[each.kind]) for each in limb_joints(own, factors)]
+    return joints, limbs
+
+
+class LimbJoint(NamedTuple):
+    """Errors of one joint in one run, and the deviation of its limb."""
+
+    run: Tracked
+    kind: str
+    """Of the limb: trunk, arm or leg."""
+    errors: Array
+    """Distances (n,), metres."""
+    radius: Array
+    """Greatest deviation (n,), all axes together, of the limb's joints, metres."""
+    limit: float = np.inf
+    """Deviation (m) above which the limb is doubtful."""
+
+
+def limb_joints(runs: Sequence[Tracked], factors: Factors) -> list[LimbJoint]:
+    """All joints with the deviations of their limbs."""
+    found = []
+    for run in runs:
+        lengths = np.stack(list(run.components.values()), 3)
+        rows = np.array([[factors[group_of(joint)][axis] for axis in range(3)] for joint in run.joints])
+        radius, errors = np.sqrt(((lengths * rows) ** 2).sum((2, 3))), np.sqrt((run.errors**2).sum(2))
+        for j, joint in enumerate(run.joints):
+            own = [n for n, name in enumerate(run.joints) if limb_of(name) == limb_of(joint)]
+            known = np.isfinite(errors[:, j])
+            found.append(LimbJoint(run, limb_of(joint).rpartition("_")[2], errors[known, j], radius[known][:, own].max(1)))
+    return found
+
+
+def fit_limits(joints: Sequence[LimbJoint]) -> dict[str, float]:
+    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, with at most `SILENT` of the joints far off and vouched for."""
+    out = {}
+    for kind in dict.fromkeys(each.kind for each in joints):
+        errors, radius = (np.concatenate([getattr(each, name) for each in joints if each.kind == kind]) for name in ("errors", "radius"))
+        order = np.argsort(radius)
+        silent = np.cumsum(errors[order] > FAR_ERROR) / len(errors)
+        out[kind] = min(float(radius[order][min(np.searchsorted(silent, SILENT, "right"), len(errors) - 1)]), FAR_ERROR)
     return out
 
 
-def table(tested: Sequence[tuple[Errors, Array, float]]) -> str:
+def joint_table(tested: Sequence[Tested]) -> str:
     """Coverage, rank correlation and score by group of joints, as Markdown."""
-    lines = ["| joints | covered by 90 % | sd, mm | error, mm | rank correlation | score / best constant |", "|---|---:|---:|---:|---:|---:|"]
+    lines = ["| joints | covered by 90 % | sd, mm | error, mm | rank correlation | score / best constant |", "|---|" + "---:|" * 5]
     for group in [*GROUPS, "all"]:
-        own = [each for each in tested if group in ("all", group_of(each[0].joint))]
+        own = [each for each in tested if group in ("all", group_of(each.run.joint))]
         if not own:
             continue
-        sd, errors = np.concatenate([each[1] for each in own]), np.concatenate([each[0].errors for each in own])
-        constant = np.concatenate([np.full(len(each[1]), each[2]) for each in own])
+        sd, errors = np.concatenate([each.sd for each in own]), np.concatenate([each.run.errors for each in own])
+        constant = np.concatenate([np.full(len(each.sd), each.constant) for each in own])
         covered, ratio = float((np.abs(errors) <= WIDTH * sd).mean()), interval_score(sd, errors) / interval_score(constant, errors)
         lines.append(f"| {group} | {100 * covered:.1f} | {1000 * sd.mean():.0f} | {1000 * np.abs(errors).mean():.0f} | "
                      f"{_rank_correlation(sd, np.abs(errors)):.2f} | {ratio:.2f} |")
+    return "\n".join(lines)
+
+
+def limb_table(tested: Sequence[LimbJoint]) -> str:
+    """Silence and false alarms by kind of limb, as Markdown."""
+    lines = ["| limb | limit, mm | over 300 mm | over 300 mm and vouched for | under 100 mm, called doubtful |", "|---|" + "---:|" * 4]
+    for kind in dict.fromkeys(each.kind for each in tested):
+        own = [each for each in tested if each.kind == kind]
+        errors, doubtful = np.concatenate([each.errors for each in own]), np.concatenate([each.radius > each.limit for each in own])
+        far, near = errors > FAR_ERROR, errors < NEAR
+        lines.append(f"| {kind} | {1000 * np.mean([each.limit for each in own]):.0f} | {100 * far.mean():.1f} % | "
+                     f"{100 * (far & ~doubtful).mean():.2f} % | {100 * (near & doubtful).sum() / max(near.sum(), 1):.0f} % |")
     return "\n".join(lines)
 
 
@@ -320,9 +421,10 @@ def _rank_correlation(one: Array, other: Array) -> float:
     return float(spearmanr(one, other).statistic)  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def factors_text(kind: str, names: Sequence[str], factors: Factors) -> str:
+def factors_text(kind: str, names: Iterable[str], factors: Factors, limits: dict[str, float]) -> str:
     """The table of a kind in factors.toml."""
     lines = [f"[{kind}]", "components = [" + ", ".join(f'"{name}"' for name in names) + "]"]
+    lines.append("limits = { " + ", ".join(f"{limb} = {limit:.3f}" for limb, limit in limits.items()) + " }")
     for group, axes in factors.items():
         rows = {axis: ", ".join(f"{value:.3f}" if value >= NEGLIGIBLE else "0" for value in axes[n]) for n, axis in enumerate("xyz")}
         lines.append(f"{group} = {{ " + ", ".join(f"{axis} = [{row}]" for axis, row in rows.items()) + " }")
@@ -344,18 +446,22 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write the factors into the package")
     parser.add_argument("--again", action="store_true", help="track again what has been tracked")
     parser.add_argument("--workers", type=int, default=2)
-    args, texts = smallest.parse(parser, _smallest), []
+    args, texts = smallest.parse(parser, _smallest), dict[str, str]()
     for kind in args.kind.split(","):
         paths = args.recordings or MADE[kind]()
         with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
             files = [file for found in pool.map(collect, [kind] * len(paths), paths, [args.again] * len(paths)) for file in found]
-        runs, names = read_errors(files)
+        runs = read_runs(files)
         for title, own in (("clean", [run for run in runs if run.fault == "clean"]), ("clean and spoiled", runs)):
-            print(f"\n{kind}, {title}\n\n{table(left_out(own))}", flush=True)
-        texts.append(factors_text(kind, names, fit_all(runs)))
-        print("\n" + texts[-1])
+            joints, limbs = left_out(own)
+            print(f"\n{kind}, {title}\n\n{joint_table(joints)}\n\n{limb_table(limbs)}", flush=True)
+        factors = fit_all(errors_of(runs))
+        texts[kind] = factors_text(kind, runs[0].components, factors, fit_limits(limb_joints(runs, factors)))
+        print("\n" + texts[kind])
     if args.write:
-        TABLE.write_text(HEAD + "\n" + "\n".join(texts), encoding="utf-8")
+        kept = re.split(r"(?m)^(?=\[)", TABLE.read_text("utf-8"))[1:] if TABLE.exists() else []
+        texts = {text[1 : text.index("]")]: text.strip() + "\n" for text in kept} | texts
+        TABLE.write_text(HEAD + "\n" + "\n".join(texts.values()), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject
 from shadowpuppet.silhouette.boundary import disc
+from shadowpuppet.tracking.doubt.doubt import Doubt
+from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
@@ -85,6 +88,14 @@ class MonocularSubject(TrackedSubject):
         if state is None:
             return self.tracker.start(rng, observation) if observation.any() else None
         return self.tracker.step(rng, state, observation)
+
+    def doubt(self, state: State, observation: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of a mask."""
+        return self._doubt(state, observation, seconds, before)
+
+    @cached_property
+    def _doubt(self) -> MonocularDoubt:
+        return MonocularDoubt(self.tracker)
 
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""

@@ -27,6 +27,8 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.subject import Observed, TrackedSubject
+from shadowpuppet.tracking.doubt.doubt import Doubt
+from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -72,6 +74,14 @@ class MultiviewSubject(TrackedSubject):
         if people == 0 or (state is None and people < 2):
             return None
         return self.tracker.start(rng, points, masks) if state is None else self.tracker.step(rng, state, points, masks)
+
+    def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of a frame set."""
+        return self._doubt(state, observation.points, observation.masks, seconds, before)
+
+    @cached_property
+    def _doubt(self) -> MultiviewDoubt:
+        return MultiviewDoubt(self.tracker)
 
     def unfound(self, observation: HullObservation) -> str:
         """`lost` if a camera still sees a person, else `absent`."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,10 @@ from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.doubt.limbs import LIMBS, lever_of, limb_of, limb_of_part
+from shadowpuppet.motion.limbs import LIMBS, limb_of
+from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
+from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
-from shadowpuppet.tracking.doubt.variance import Components
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
 SAMPLES = 24
@@ -27,6 +29,8 @@ SHORTENING = 0.02
 """Uncertainty (m) of a segment's length in the picture, from outline and body shape."""
 THIN = 0.03
 """Half width of what an inaccurate outline may leave over, as a share of the root of the person's area."""
+DISTANCE = 0.02
+"""Standard deviation of the person's distance, over it: who is measured does not stand exactly where it was measured."""
 GOOD_MISFIT = 0.05
 """Share of the pixels that differ though the pose is right."""
 REACH = 1.1
@@ -50,37 +54,50 @@ class Before(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class MonocularEvidence:
-    """Components of doubt about the estimates of a `MonocularTracker`."""
+class MonocularDoubt:
+    """States doubt about the estimates of a `MonocularTracker`."""
 
     tracker: MonocularTracker
 
-    def components(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Components, Before]:
-        """Lengths (L, 3), metres, by name, for the estimate of a mask (H, W) at a time (s); and what the next frame needs.
+    def __call__(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of a mask (H, W) at a time (s); and what the next frame needs."""
+        picture = self.tracker.picture
+        evidence, now = self.evidence(state, mask, seconds, before)
+        R = picture.camera.T_camera_world[:3, :3].T
+        return state_doubt("monocular", evidence, self.names, picture.body.skeleton, picture.points, state.pose, R), now
+
+    def evidence(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Evidence, Before]:
+        """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.
 
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
         turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
         nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; its last step; the
-        misfit of the whole body; how long the silhouette has not changed; and the depth by which the trunk bows.
+        misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the error of the
+        person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), self.levers
         still = before.still + 1 if before is not None and np.array_equal(before.mask, mask) else 0
         spread = self._spread(state, points)
-        found = self._silhouettes(state.pose, at, mask) | {
+        shares = self._shares(state.pose, points, mask)
+        columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
+        found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
             "spread": np.sqrt((spread[:, :2] ** 2).mean(1)),
             "spread_depth": spread[:, 2],
-            "mirrored": np.array([_mirrored(at, name) for name in self.names]),
-            "foreshortened": np.array([_foreshortened(at, name) for name in self.names]),
+            "mirrored": self._chains.mirrored(points),
+            "foreshortened": self._chains.foreshortened(points, at["left_shoulder"] - at["right_shoulder"]),
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
             "step": steps(points, seconds, before),
             "misfit": max(1 - state.overlap - GOOD_MISFIT, 0.0) * lever,
             "still": stillness(still) * lever,
         }
-        return {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}, Before(seconds, points, mask, still)
+        components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
+        components["distance"] = points * (0, 0, DISTANCE)
+        unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
+        return Evidence(components, unseen), Before(seconds, points, mask, still)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -91,6 +108,15 @@ class MonocularEvidence:
     def levers(self) -> Array:
         """The joints' levers (L,), metres."""
         return np.array([lever_of(name) for name in self.names])
+
+    @cached_property
+    def _chains(self) -> Chains:
+        return Chains.of(self.names)
+
+    @cached_property
+    def _limbs(self) -> dict[str, list[int]]:
+        """Indices of each limb's joints."""
+        return {limb: [n for n, name in enumerate(self.names) if limb_of(name) == limb] for limb in LIMBS}
 
     @cached_property
     def _parts(self) -> dict[str, NDArray[np.int64]]:
@@ -108,8 +134,10 @@ class MonocularEvidence:
             poses[:, stage.dofs] = particles.poses[np.random.default_rng(n).permutation(drawn)]  # stages are independent
         return np.sqrt(((self.tracker.picture.points(poses) - points) ** 2).mean(0))
 
-    def _silhouettes(self, pose: Array, at: Mapping[str, Array], mask: Mask) -> dict[str, Array]:
-        """Components (L,) from the drawn limbs of a pose (D,) and the mask (H, W); `at`: the joints in the camera's frame."""
+    def _shares(self, pose: Array, points: Array, mask: Mask) -> dict[str, tuple[float, float, float, float]]:
+        """Of each limb, drawn in a pose (D,), the share that is hidden before or behind others, the silhouette near it that nothing
+        explains over its area, and the shares outside the mask (H, W) and outside the picture. `points` (L, 3): the joints in the
+        camera's frame."""
         import cv2
 
         picture, width = self.tracker.picture, self.tracker.picture.camera.size[0]
@@ -123,37 +151,25 @@ class MonocularEvidence:
             return cv2.morphologyEx(pixels.view(np.uint8), cv2.MORPH_OPEN, square).view(bool)
 
         rows, columns = np.nonzero(thick(mask & ~body & counted))
-        outside, pixels = thick(body & ~mask & counted), self._pixels(at)
+        outside = thick(body & ~mask & counted)
+        R, t = picture.camera.T_camera_world[:3, :3], picture.camera.T_camera_world[:3, 3]
+        pixels = picture.camera.project((points - t) @ R)
+        cut = ~((pixels >= 0) & (pixels < picture.camera.size)).all(1)
         shares = {}
         for limb, own in drawn.items():
             area = max(np.count_nonzero(own), 1)
-            (x, y), reach = self._reach(limb, at, pixels)
+            (x, y), reach = self._reach(limb, points, pixels)
             near = np.count_nonzero((columns - x) ** 2 + (rows - y) ** 2 < reach**2)
             shares[limb] = (np.count_nonzero(own & (times > 1)) / area, min(near / area, MOST_UNEXPLAINED),
-                            np.count_nonzero(own & outside) / area, self._cut(limb, pixels))
-        columns_of = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * self.levers[:, None]
-        return dict(zip(("hidden", "unexplained", "outside", "cut"), columns_of.T))
+                            np.count_nonzero(own & outside) / area, float(cut[self._limbs[limb]].mean()))
+        return shares
 
-    def _pixels(self, at: Mapping[str, Array]) -> dict[str, Array]:
-        """Pixel (2,) of each joint."""
-        camera = self.tracker.picture.camera
-        R, t = camera.T_camera_world[:3, :3], camera.T_camera_world[:3, 3]
-        return dict(zip(at, camera.project((np.array(list(at.values())) - t) @ R)))
-
-    def _reach(self, limb: str, at: Mapping[str, Array], pixels: Mapping[str, Array]) -> tuple[Array, float]:
+    def _reach(self, limb: str, points: Array, pixels: Array) -> tuple[Array, float]:
         """Centre (2,) and radius, pixels, of the region in which a limb may be."""
-        focal = float(self.tracker.picture.camera.matrix[0, 0])
-        if limb == "trunk":
-            return pixels["neck"], TRUNK_REACH * focal / at["neck"][2]
-        joints = [name for name in self.names if limb_of(name) == limb]
-        length = sum(float(np.linalg.norm(at[b] - at[a])) for a, b in zip(joints, joints[1:]))
-        return pixels[joints[0]], REACH * length * focal / at[joints[0]][2]
-
-    def _cut(self, limb: str, pixels: Mapping[str, Array]) -> float:
-        """Share of a limb's joints outside the picture."""
-        size = self.tracker.picture.camera.size
-        joints = np.array([pixels[name] for name in self.names if limb_of(name) == limb])
-        return float(1 - ((joints >= 0) & (joints < size)).all(1).mean())
+        focal, own = float(self.tracker.picture.camera.matrix[0, 0]), self._limbs[limb]
+        root = self.names.index("neck") if limb == "trunk" else own[0]
+        length = TRUNK_REACH if limb == "trunk" else REACH * float(np.sqrt((np.diff(points[own], axis=0) ** 2).sum(1)).sum())
+        return pixels[root], length * focal / points[root, 2]
 
 
 CHAINS = {"elbow": ("shoulder", "elbow"), "wrist": ("shoulder", "elbow", "wrist"), "hand": ("shoulder", "elbow", "wrist"),
@@ -161,28 +177,47 @@ CHAINS = {"elbow": ("shoulder", "elbow"), "wrist": ("shoulder", "elbow", "wrist"
 """Joints from a limb's root on whose directions a joint's place depends."""
 
 
-def _bones(at: Mapping[str, Array], joint: str) -> list[tuple[float, float]]:
-    """Length (m) of each bone from the limb's root to a joint, and its part along the view through its end."""
-    side, _, name = joint.partition("_")
-    chain = [f"{side}_{each}" for each in CHAINS.get(name, ())]
-    bones = [(at[b] - at[a], at[b] / np.linalg.norm(at[b])) for a, b in zip(chain, chain[1:])]
-    return [(float(np.linalg.norm(bone)), float(bone @ view)) for bone, view in bones]
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """The bones from the limbs' roots to their joints."""
+
+    starts: NDArray[np.int64]
+    """Landmark at each bone's beginning (B,)."""
+    ends: NDArray[np.int64]
+    bears: Array
+    """1 where a landmark's place depends on a bone's direction, (L, B)."""
+    sided: NDArray[np.bool_]
+    """Whether a landmark is a limb's, (L,)."""
+
+    @classmethod
+    def of(cls, names: Sequence[str]) -> Chains:
+        """The chains among landmarks, by their names."""
+        chains = []
+        for name in names:
+            side, _, joint = name.partition("_")
+            chains.append([(f"{side}_{a}", f"{side}_{b}") for a, b in pairwise(CHAINS.get(joint, ()))])
+        bones = list(dict.fromkeys(bone for chain in chains for bone in chain))
+        starts, ends = np.array([[names.index(a), names.index(b)] for a, b in bones]).reshape(-1, 2).T
+        bears = np.array([[bone in chain for bone in bones] for chain in chains], float)
+        return cls(starts, ends, bears, np.array([name.partition("_")[0] in SIDES for name in names]))
+
+    def mirrored(self, points: Array) -> Array:
+        """How far in depth (L,), metres, landmarks (L, 3) move if the bones above them point as far to the front as to the back."""
+        return np.sqrt(self.bears @ (2 * self._along(points)[1]) ** 2)
+
+    def foreshortened(self, points: Array, across: Array) -> Array:
+        """Errors of depth (L,), metres, of landmarks (L, 3) if the bones above look longer or shorter by `SHORTENING`, and so half the line
+        of the shoulders, `across` (3,)."""
+        shoulders = _depth_errors(np.array([np.linalg.norm(across) / 2]), across[2:] / 2)
+        return np.sqrt(self.bears @ _depth_errors(*self._along(points)) ** 2 + self.sided * shoulders**2)
+
+    def _along(self, points: Array) -> tuple[Array, Array]:
+        """Each bone's length, and its part along the view through its end (B,), metres."""
+        bones, ends = points[self.ends] - points[self.starts], points[self.ends]
+        return np.sqrt((bones**2).sum(1)), (bones * ends).sum(1) / np.sqrt((ends**2).sum(1))
 
 
-def _mirrored(at: Mapping[str, Array], joint: str) -> float:
-    """How far in depth (m) a joint moves if the bones above it point as far to the front as they do to the back."""
-    return float(np.sqrt(sum((2 * depth) ** 2 for _, depth in _bones(at, joint))))
-
-
-def _foreshortened(at: Mapping[str, Array], joint: str) -> float:
-    """Error of a joint's depth (m) if the bones above it look longer or shorter by `SHORTENING`; the shoulders' line is one of them."""
-    if joint.partition("_")[0] not in SIDES:
-        return 0.0
-    across = at["left_shoulder"] - at["right_shoulder"]
-    bones = [(float(np.linalg.norm(across)) / 2, float(across[2]) / 2), *_bones(at, joint)]
-    return float(np.sqrt(sum(_depth_error(length, depth) ** 2 for length, depth in bones)))
-
-
-def _depth_error(length: float, depth: float) -> float:
-    seen = np.sqrt(max(length**2 - depth**2, 0.0))
-    return float(min(seen * SHORTENING / max(abs(depth), 1e-6), np.sqrt(2 * length * SHORTENING)))
+def _depth_errors(lengths: Array, depths: Array) -> Array:
+    """Errors of depth (B,) of bones that look longer or shorter by `SHORTENING`, from lengths and depths (B,), metres."""
+    seen = np.sqrt(np.maximum(lengths**2 - depths**2, 0))
+    return np.minimum(seen * SHORTENING / np.maximum(np.abs(depths), 1e-6), np.sqrt(2 * lengths * SHORTENING))

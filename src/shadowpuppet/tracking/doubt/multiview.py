@@ -14,9 +14,10 @@ from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.doubt.limbs import LIMBS, lever_of, limb_of, limb_of_part
+from shadowpuppet.motion.limbs import LIMBS, limb_of
+from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
+from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
-from shadowpuppet.tracking.doubt.variance import Components
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.resampling import normalise
@@ -48,15 +49,22 @@ class Before(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class MultiviewEvidence:
-    """Components of doubt about the estimates of a `MultiviewTracker`."""
+class MultiviewDoubt:
+    """States doubt about the estimates of a `MultiviewTracker`."""
 
     tracker: MultiviewTracker
 
-    def components(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
-                   before: Before | None) -> tuple[Components, Before]:
-        """Lengths (L, 3), metres, by name, for the estimate from surface points and masks (H, W) at a time (s); and what the next frame
-        needs.
+    def __call__(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
+                 before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate from surface points and masks (H, W) at a time (s); and what the next frame needs."""
+        body = self.tracker.body
+        evidence, now = self.evidence(state, surface, masks, seconds, before)
+        return state_doubt("multiview", evidence, self.names, body.skeleton, body.points, state.pose, np.eye(3)), now
+
+    def evidence(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
+                 before: Before | None) -> tuple[Evidence, Before]:
+        """What the frame shows about the accuracy of the estimate from surface points and masks (H, W) at a time (s); and what the next
+        frame needs.
 
         Of every joint there are: a constant; the particles' spread; of its limb, the surface near it that no part explains, the share
         outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever; its last step;
@@ -69,22 +77,23 @@ class MultiviewEvidence:
         apart = self._apart(points, seconds, before)
         weights = normalise(state.particles.log_weights)
         spread = np.sqrt(np.einsum("n,nla->la", weights, (body.points(state.particles.poses) - points) ** 2))
-        columns = self._limb_shares(state.pose, surface, masks)
+        shares = self._limb_shares(state.pose, surface, masks)
+        columns = dict(zip(("bare", "unexplained", "outside", "unseen"), shares[self._limbs_of_joints].T * self.levers))
         columns |= {"constant": np.full(len(points), CONSTANT), "misfit": max(1 - state.overlap - GOOD_MISFIT, 0.0) * self.levers,
                     "still": stillness(still) * self.levers, "step": steps(points, seconds, before)}
         found = {name: np.repeat(values[:, None], 3, axis=1) for name, values in columns.items()} | {"spread": spread}
         other = np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]
-        return found | {"swapped": other}, Before(seconds, points, tuple(masks), still, apart)
+        evidence = Evidence(found | {"swapped": other}, dict(zip(LIMBS, shares[:, 0].tolist())))
+        return evidence, Before(seconds, points, tuple(masks), still, apart)
 
-    def _limb_shares(self, pose: Array, surface: SurfacePoints, masks: Sequence[Mask | None]) -> dict[str, Array]:
-        """Components (L,) that limbs share."""
+    def _limb_shares(self, pose: Array, surface: SurfacePoints, masks: Sequence[Mask | None]) -> Array:
+        """For each of `LIMBS`: the share of it without surface points, the points near it that no part explains over those that its
+        surface should have, the share outside a silhouette, and the root of the inverse number of cameras that see it, (5, 4)."""
         T = self.tracker.body.skeleton.forward(pose[None])[0][self._limbs.joints]
         starts, ends = (T[:, :, 3] + (T[:, :, :3] @ places[:, :, None])[..., 0] for places in (self._limbs.starts, self._limbs.ends))
         near, far = self._explained(starts, ends, surface.points[:: max(1, len(surface.points) // POINTS)])
         outside, seen = self._looked_up(starts, ends, masks)
-        shares = np.stack([near, far, outside, seen], 1)
-        shares = np.array([shares[LIMBS.index(limb_of(name))] for name in self.names]) * self.levers[:, None]
-        return dict(zip(("bare", "unexplained", "outside", "unseen"), shares.T))
+        return np.stack([near, far, outside, seen], 1)
 
     def _explained(self, starts: Array, ends: Array, points: Array) -> tuple[Array, Array]:
         """For each of `LIMBS`: the share of it without surface points, and the points near it that no part explains, over those that
@@ -134,6 +143,10 @@ class MultiviewEvidence:
     def levers(self) -> Array:
         """The joints' levers (L,), metres."""
         return np.array([lever_of(name) for name in self.names])
+
+    @cached_property
+    def _limbs_of_joints(self) -> list[int]:
+        return [LIMBS.index(limb_of(name)) for name in self.names]
 
     @cached_property
     def counterparts(self) -> NDArray[np.int64]:

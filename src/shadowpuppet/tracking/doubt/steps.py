@@ -8,8 +8,8 @@ import numpy as np
 
 from shadowpuppet.geometry import Array
 
-CONSTANT = 0.01
-"""The constant component of doubt, metres."""
+CONSTANT = 0.015
+"""The constant component of doubt, metres: bodies differ in where their joints are."""
 PACE = 1 / 15
 """Time (s) in which a step is measured."""
 STILL_ALLOWED, STILL_UNIT = 2, 15

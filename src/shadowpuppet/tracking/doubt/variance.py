@@ -33,6 +33,8 @@ class VarianceModel:
     """Groups of joints, G of them."""
     factors: Array
     """Of shape (G, 3, F), no unit."""
+    limits: Mapping[str, float]
+    """Of each kind of limb, `trunk`, `arm` or `leg`: deviation of a joint, all axes together (m), above which it is doubtful."""
 
     def sd(self, joints: Sequence[str], components: Components) -> Array:
         """Standard deviations (L, 3), metres, of joints along the components' axes."""
@@ -46,7 +48,7 @@ def variance_model(kind: str) -> VarianceModel:
     """The calibrated model of `monocular` or `multiview` tracking."""
     table = tomllib.loads(resources.files(__package__).joinpath(TABLE).read_text("utf-8"))[kind]
     names, groups = tuple(table["components"]), tuple(group for group in GROUPS if group in table)
-    return VarianceModel(names, groups, np.array([[table[group][axis] for axis in "xyz"] for group in groups], float))
+    return VarianceModel(names, groups, np.array([[table[group][axis] for axis in "xyz"] for group in groups], float), table["limits"])
 
 
 def turned(sd: Array, R: Array) -> Array:
