@@ -88,7 +88,7 @@ def test_sizes_camera_look_and_times_lie_beside(recording, run):
     assert look["person"]["sizes"] == pytest.approx(dict(zip(person.sizes.names(), person.sizes.to_array())))
     metrics = json.loads((run.folder / "metrics.json").read_text())
     assert metrics["complete"]
-    assert set(metrics["ms_per_frame"]) == {"decode", "segment", "track", "write"}
+    assert set(metrics["ms_per_frame"]) == {"decode", "segment", "track", "doubt", "write"}
     assert metrics["frames_per_s"] > 0
     assert metrics["errors"]["frames"] == len(run.motion)
     assert (run.folder / "calibration.toml").exists()

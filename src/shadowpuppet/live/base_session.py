@@ -64,7 +64,7 @@ class LiveSession(ABC):
 
     def __post_init__(self) -> None:
         """Set the state before the first picture."""
-        self._began, self._lost_since, self._new, self._state = np.nan, np.nan, False, None
+        self._began, self._lost_since, self._new, self._state, self._before = np.nan, np.nan, False, None, None
         self._measured: Callable[[], Any] = lambda: None
 
     # Input
@@ -173,9 +173,10 @@ class LiveSession(ABC):
         masks = self._masks(shot, images)
         observation = self.subject.observe(masks)
         self._state = self.subject.next_state(self.rng, self._state, observation)
+        seconds = shot.captured - self._began if shot.shown is None else shot.shown
+        frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
         now = self.clock()
         self.timing.done(shot.captured, now, shot.number)
-        frame = motion_frame(self.subject, shot.captured - self._began if shot.shown is None else shot.shown, self._state, observation)
         if frame.status != "lost":
             self._lost_since = np.nan
         elif np.isnan(self._lost_since):
@@ -183,7 +184,7 @@ class LiveSession(ABC):
         return Outcome(self._view(images, masks, frame, now - shot.captured), frame, images)
 
     def _begin_tracking(self, subject: TrackedSubject) -> None:
-        self.subject, self.phase, self._state, self._new = subject, "tracking", None, True
+        self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True
         self.timing.pause()
 
     def _pause(self, trouble: str) -> Outcome:

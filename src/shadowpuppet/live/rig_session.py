@@ -113,7 +113,7 @@ class RigSession(LiveSession):
     def _learnt(self, scenes: list[list[Image]]) -> None:
         self.scene = scenes
         self._silhouettes = [Silhouettes("live", learn_background(scene, self.options.silhouette)) for scene in scenes]
-        self.phase, self._state = ("tracking" if self.subject else "waiting"), None
+        self.phase, self._state, self._before = ("tracking" if self.subject else "waiting"), None, None
 
     def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
         masks = self._masks(shot, images)

@@ -148,7 +148,7 @@ class Session(LiveSession):
 
         self.scene, self._silhouettes = scene, silhouettes(asked)
         self._clean = self._silhouettes if clean == asked else silhouettes(clean)
-        self.phase, self._state = ("tracking" if self.fit else "waiting"), None
+        self.phase, self._state, self._before = ("tracking" if self.fit else "waiting"), None, None
 
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
         return (scaled(shot.image, self.camera),)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import limbs_of
 
 STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
 """Statuses of a frame: tracked; tracked but doubtful; extrapolated without a picture; position unknown; no person visible."""
 BLANK = ("lost", "absent")
 """Statuses of frames without pose and joints."""
-PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status")
+PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status", "limb_status")
 """Fields of a `Motion` with one row a frame."""
 
 
@@ -64,6 +65,8 @@ class MotionFrame(NamedTuple):
     """Pixels with one camera, m^2 with several."""
     overlap: float = np.nan
     """Intersection over union of model and silhouette, 0..1."""
+    limb_status: Sequence[str] | None = None
+    """Of `STATUSES`, one for each of the K limbs that the joints belong to (`motion.limbs`); without: as the frame's."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,6 +95,8 @@ class Motion:
     """Intersection over union of model and silhouette, of shape (T,)."""
     status: NDArray[np.str_]
     """Of `STATUSES`, of shape (T,)."""
+    limb_status: NDArray[np.str_] = field(default_factory=lambda: np.empty((0, 0), str))
+    """Of `STATUSES`, of shape (T, K), for each of `limbs`; without: as the frames'."""
 
     def __post_init__(self) -> None:
         """Check every field and convert it to its type."""
@@ -100,6 +105,9 @@ class Motion:
         T, D, J = len(self.times), len(self.dof_names), len(self.joint_names)
         shapes = {"poses": (T, D), "pose_sd": (T, D), "joints": (T, J, 3), "joint_sd": (T, J, 3), "cost": (T,), "overlap": (T,)}
         _check_shape("status", self.status, (T,))
+        stated = np.size(self.limb_status) > 0
+        _set(self, limb_status=_statuses(self.limb_status if stated else np.repeat(self.status[:, None], len(self.limbs), axis=1)))
+        _check_shape("limb_status", self.limb_status, (T, len(self.limbs)))
         for name, shape in shapes.items():
             _set(self, **{name: np.asarray(getattr(self, name), float)})
             _check_shape(name, getattr(self, name), shape)
@@ -121,6 +129,11 @@ class Motion:
             if len(known):
                 status = self.status[known[0]]
                 raise ShadowPuppetError(f"{name}: found values in frame {known[0]}, which is {status}, expected none")
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """The limbs that the joints belong to, K of them, such as `left_arm`."""
+        return limbs_of(self.joint_names)
 
     @property
     def status_counts(self) -> dict[str, int]:
@@ -145,7 +158,8 @@ class MotionBuilder:
         """Names as in `Motion`."""
         self.body_name = body_name
         self.dof_names, self.joint_names = _names("degrees of freedom", dof_names), _names("joints", joint_names)
-        self._rows, self._status = array("d"), bytearray()
+        self.limbs = limbs_of(self.joint_names)
+        self._rows, self._status, self._limb_status = array("d"), bytearray(), bytearray()
         self._last = -np.inf
 
     def __len__(self) -> int:
@@ -159,6 +173,7 @@ class MotionBuilder:
         self._rows.extend([kept.time, kept.cost, kept.overlap])
         for values in (kept.pose, kept.pose_sd, kept.joints, kept.joint_sd):
             self._rows.frombytes(np.asarray(values).tobytes())
+        self._limb_status.extend(map(STATUSES.index, kept.limb_status or ()))
         self._status.append(STATUSES.index(frame.status))
         self._last = kept.time
         return kept
@@ -168,10 +183,12 @@ class MotionBuilder:
         D, J, T = len(self.dof_names), len(self.joint_names), len(self)
         width = 3 + 2 * D + 6 * J
         rows = np.array(self._rows)[: T * width].reshape(T, width)  # an interrupt may have left a part of a row
+        limbs = np.frombuffer(bytes(self._limb_status), np.uint8)[: T * len(self.limbs)].reshape(T, len(self.limbs))
         poses, pose_sd, joints, joint_sd = np.split(rows[:, 3:], np.cumsum([D, D, 3 * J]), axis=1)
         return Motion(body_name=self.body_name, dof_names=self.dof_names, joint_names=self.joint_names, times=rows[:, 0],
                       cost=rows[:, 1], overlap=rows[:, 2], poses=poses, pose_sd=pose_sd, joints=joints.reshape(T, J, 3),
-                      joint_sd=joint_sd.reshape(T, J, 3), status=np.array(STATUSES)[np.frombuffer(bytes(self._status), np.uint8)])
+                      joint_sd=joint_sd.reshape(T, J, 3), status=np.array(STATUSES)[np.frombuffer(bytes(self._status), np.uint8)],
+                      limb_status=np.array(STATUSES)[limbs])
 
     def _checked(self, frame: MotionFrame) -> MotionFrame:
         _statuses([frame.status])
@@ -185,7 +202,10 @@ class MotionBuilder:
             _check_shape(name, arrays[name], shape)
         for name in ("cost", "overlap"):
             _check_shape(name, np.asarray(getattr(frame, name), float), ())
-        return frame._replace(time=float(frame.time), cost=float(frame.cost), overlap=float(frame.overlap), **arrays)
+        own = frame.limb_status is not None and frame.status not in BLANK
+        limbs = tuple(frame.limb_status or ()) if own else (frame.status,) * len(self.limbs)
+        _check_shape("limb_status", _statuses(limbs), (len(self.limbs),))
+        return frame._replace(time=float(frame.time), cost=float(frame.cost), overlap=float(frame.overlap), limb_status=limbs, **arrays)
 
 
 def _set(target: object, **values: object) -> None:

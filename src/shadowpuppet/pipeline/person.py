@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject
 from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.silhouette.boundary import disc
+from shadowpuppet.tracking.doubt.doubt import Doubt
+from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
@@ -108,6 +111,14 @@ class MonocularSubject(TrackedSubject):
     def left_out(self, state: State | None) -> tuple[Mask | None, ...]:
         """The pixels (H, W) that a state leaves out of the silhouette; None for none."""
         return (None,) if state is None else (left_out(state.unexplained),)
+
+    def doubt(self, state: State, observation: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of a mask."""
+        return self._doubt(state, observation, seconds, before)
+
+    @cached_property
+    def _doubt(self) -> MonocularDoubt:
+        return MonocularDoubt(self.tracker)
 
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""

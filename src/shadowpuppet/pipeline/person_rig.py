@@ -28,6 +28,8 @@ from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.subject import Observed, TrackedSubject
 from shadowpuppet.silhouette.added import BesideBody
+from shadowpuppet.tracking.doubt.doubt import Doubt
+from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -78,6 +80,14 @@ class MultiviewSubject(TrackedSubject):
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""
         return () if state is None else tuple(map(left_out, state.unexplained))
+
+    def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of a frame set."""
+        return self._doubt(state, observation.points, observation.masks, seconds, before)
+
+    @cached_property
+    def _doubt(self) -> MultiviewDoubt:
+        return MultiviewDoubt(self.tracker)
 
     def unfound(self, observation: HullObservation) -> str:
         """`lost` if a camera still sees a person, else `absent`."""

@@ -25,7 +25,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 
 Item = TypeVar("Item")
-STAGES = ("decode", "segment", "wait", "hull", "track", "write")
+STAGES = ("decode", "segment", "wait", "hull", "track", "doubt", "write")
 """Stages of a frame. Several cameras' films are decoded and segmented in parallel: their sum is not what the tracker waits for, `wait`."""
 FALLBACK_RATE = 25.0
 """Frames/s of an overlay if the film does not state its rate."""

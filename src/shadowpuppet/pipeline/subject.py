@@ -20,6 +20,7 @@ from shadowpuppet.io.person import Person
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.silhouette.added import BesideBody
+from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.video import Image
 
 
@@ -79,6 +80,10 @@ class TrackedSubject(ABC):
         """The tracker's state after an observation; None while there is no person."""
 
     @abstractmethod
+    def doubt(self, state: Any, observation: Any, seconds: float, before: Any) -> tuple[Doubt, Any]:
+        """Doubt about the estimate of an observation at a time (s), and what the next frame's needs: its `before`, at first None."""
+
+    @abstractmethod
     def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
         """A frame of overlay.mp4, (H, W, 3), blue green red."""
 
@@ -107,14 +112,17 @@ class TrackedSubject(ABC):
         return [self.body.landmark_names.index(name) for name in joint_names(self.body)]
 
 
-def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | None, observation: Any = None) -> MotionFrame:
-    """The motion of one frame from a tracker's state, without a pose if the person is lost or absent."""
+def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | None, observation: Any,
+                 before: Any = None) -> tuple[MotionFrame, Any]:
+    """The motion of one frame from a tracker's state, without a pose if the person is lost or absent; and the next frame's `before`."""
     if state is None:
-        return MotionFrame(seconds, subject.unfound(observation))
+        return MotionFrame(seconds, subject.unfound(observation)), None
     if state.status in BLANK:
-        return MotionFrame(seconds, state.status, cost=state.cost, overlap=state.overlap)
-    joints = subject.points(state.pose)[subject.joint_columns]
-    return MotionFrame(seconds, state.status, state.pose, joints, cost=state.cost, overlap=state.overlap)
+        return MotionFrame(seconds, state.status, cost=state.cost, overlap=state.overlap), None
+    joints, (doubt, before) = subject.points(state.pose)[subject.joint_columns], subject.doubt(state, observation, seconds, before)
+    found = MotionFrame(seconds, state.status, state.pose, joints, doubt.pose_sd, doubt.joint_sd[subject.joint_columns],
+                        state.cost, state.overlap, doubt.limb_status)
+    return found, before
 
 
 def joint_names(body: Body) -> list[str]:

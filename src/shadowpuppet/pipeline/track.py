@@ -66,7 +66,7 @@ class Kind(NamedTuple):
     """Stages whose times are written to metrics.json."""
 
 
-MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "write"))
+MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "doubt", "write"))
 MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, False, STAGES)
 
 
@@ -192,7 +192,7 @@ def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
            cache: SilhouetteCache | None) -> None:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
-    subject, survey, timer, state, count = prepared.check(), prepared.survey, StageTimer(), None, 0
+    subject, survey, timer, state, before, count = prepared.check(), prepared.survey, StageTimer(), None, None, 0
     left_out = LeftOut([footage.view.camera for footage in survey.rig.footage])
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
@@ -209,8 +209,9 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
                 left_out.add(seen.time, subject.left_out(state))
+                with timer.time("doubt"):
+                    found, before = motion_frame(subject, seen.time, state, observation, before)
                 with timer.time("write"):
-                    found = motion_frame(subject, seen.time, state, observation)
                     writer.write(found)
                     if overlay is not None:
                         overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))

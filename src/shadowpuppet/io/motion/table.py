@@ -17,11 +17,14 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten
 from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.motion.trc import read_trc, write_trc
+from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
 
 AXES = ("_x", "_y", "_z")
 SD = "_sd"
 """Suffix of columns of standard deviations; no name of a joint or degree of freedom may end in it."""
+LIMB_STATUS = "_status"
+"""Suffix of the columns of limbs' statuses."""
 TRANSLATIONS = ("torso_y", "root_x", "root_y", "root_z")
 """Degrees of freedom in metres; all others are angles."""
 Columns = dict[str, Array | NDArray[np.str_]]
@@ -93,7 +96,8 @@ def _functions(path: Path) -> tuple:
 def run_headers(joints: Sequence[str], dofs: Sequence[str]) -> tuple[list[str], list[str]]:
     """Columns of joints.csv and angles.csv."""
     positions = [column for name in joints for suffix in ("", SD) for column in joint_columns([name], suffix)]
-    return ["time", *positions, "status", "cost", "overlap"], ["time", *dofs, *(f"{name}{SD}" for name in dofs)]
+    limbs = [limb + LIMB_STATUS for limb in limbs_of(joints)]
+    return ["time", *positions, "status", "cost", "overlap", *limbs], ["time", *dofs, *(f"{name}{SD}" for name in dofs)]
 
 
 def run_rows(frame: MotionFrame) -> tuple[list[str], list[str]]:
@@ -102,7 +106,8 @@ def run_rows(frame: MotionFrame) -> tuple[list[str], list[str]]:
     positions = np.concatenate([joints, joint_sd], 1).ravel().tolist()
     angles = np.concatenate([np.asarray(frame.pose), np.asarray(frame.pose_sd)]).tolist()
     time = cells([frame.time])
-    return [*time, *cells(positions), frame.status, *cells([frame.cost], 2), *cells([frame.overlap])], [*time, *cells(angles)]
+    row = [*time, *cells(positions), frame.status, *cells([frame.cost], 2), *cells([frame.overlap]), *(frame.limb_status or ())]
+    return row, [*time, *cells(angles)]
 
 
 def read_run_tables(joints: Table, angles: Table, frames: int, body_name: str) -> Motion:
@@ -110,7 +115,8 @@ def read_run_tables(joints: Table, angles: Table, frames: int, body_name: str) -
     names = column_joints(joints.path, joints.columns)
     dofs = tuple(name for name in angles.columns if name != "time" and not name.endswith(SD))
     series: dict[str, Any] = {
-        "times": joints.times(), "status": _statuses(joints), "cost": joints.numbers(["cost"])[:, 0],
+        "times": joints.times(), "status": _statuses(joints, "status"), "limb_status": _limb_statuses(joints, names),
+        "cost": joints.numbers(["cost"])[:, 0],
         "overlap": joints.numbers(["overlap"])[:, 0], "joints": _joints(joints, names), "joint_sd": _joints(joints, names, SD),
         "poses": angles.numbers(dofs), "pose_sd": angles.numbers([f"{name}{SD}" for name in dofs]),
     }
@@ -118,11 +124,19 @@ def read_run_tables(joints: Table, angles: Table, frames: int, body_name: str) -
     return Motion(body_name=body_name, dof_names=dofs, joint_names=names, **series)
 
 
-def _statuses(table: Table) -> np.ndarray:
-    status = table.texts("status")
+def _limb_statuses(table: Table, joints: Sequence[str]) -> np.ndarray:
+    """Statuses (T, K) of the limbs; (0, 0) of runs made before limbs had one."""
+    columns = [limb + LIMB_STATUS for limb in limbs_of(joints)]
+    if not set(columns) & set(table.columns):
+        return np.empty((0, 0), str)
+    return np.stack([_statuses(table, column) for column in columns], 1)
+
+
+def _statuses(table: Table, column: str) -> np.ndarray:
+    status = table.texts(column)
     wrong = [i for i, word in enumerate(status) if word not in STATUSES]
     if wrong:
-        raise FormatError(f"{table.path}: line {table.lines[wrong[0]]}, column 'status': found {shorten([status[wrong[0]]])!r}, "
+        raise FormatError(f"{table.path}: line {table.lines[wrong[0]]}, column {column!r}: found {shorten([status[wrong[0]]])!r}, "
                           f"expected one of {', '.join(STATUSES)}")
     return np.array(status, str)
 
@@ -140,9 +154,10 @@ def motion_columns(motion: Motion) -> Columns:
     deviations = motion.joint_sd.reshape(len(motion), 3 * len(motion.joint_names)).T
     found |= dict(zip(joint_columns(motion.joint_names, SD), deviations))
     found |= {"status": motion.status, "cost": motion.cost, "overlap": motion.overlap}
+    found |= {limb + LIMB_STATUS: column for limb, column in zip(motion.limbs, motion.limb_status.T)}
     for values, suffix in ((motion.poses, ""), (motion.pose_sd, SD)):
         found |= {f"{name}{suffix} [{dof_unit(name)}]": column for name, column in zip(motion.dof_names, values.T)}
-    always = {"time", "status", *joint_columns(motion.joint_names)}
+    always = {"time", "status", *joint_columns(motion.joint_names), *(limb + LIMB_STATUS for limb in motion.limbs)}
     return {name: column for name, column in found.items() if name in always or np.isfinite(column.astype(float)).any()}
 
 

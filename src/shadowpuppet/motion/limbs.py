@@ -1,0 +1,21 @@
+"""The limbs of a body by the names of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+LIMBS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
+"""Limbs that have a status of their own: an arm is shoulder to hand, a leg hip to foot, the trunk is the rest."""
+ARM, LEG = ("shoulder", "elbow", "wrist", "hand", "fist"), ("hip", "knee", "ankle", "heel", "toe")
+
+
+def limb_of(joint: str) -> str:
+    """The limb that a joint, such as `left_elbow`, belongs to."""
+    side, _, name = joint.partition("_")
+    return f"{side}_arm" if name in ARM else f"{side}_leg" if name in LEG else "trunk"
+
+
+def limbs_of(joints: Iterable[str]) -> tuple[str, ...]:
+    """The limbs to which joints belong, in the order of `LIMBS`."""
+    found = set(map(limb_of, joints))
+    return tuple(limb for limb in LIMBS if limb in found)

@@ -1,0 +1,84 @@
+"""Doubt about a frame's estimate: standard deviations of joints and degrees of freedom, and a status for every limb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import limb_of, limbs_of
+from shadowpuppet.tracking.doubt.variance import Components, turned, variance_model
+
+STEP = 1e-4
+"""Step (rad or m) of the derivatives of joints by degrees of freedom."""
+UNBOUNDED = 1.0
+"""Standard deviation (m or rad) of a degree of freedom without limits of which the joints tell nothing."""
+UNSEEN = 0.7
+"""Share of a limb that no silhouette shows from which on a doubtful limb is `predicted`."""
+Points = Callable[[Array], Array]
+"""From poses (N, D) to landmarks (N, L, 3), metres."""
+
+
+class Evidence(NamedTuple):
+    """What a frame shows about the accuracy of its estimate."""
+
+    components: Components
+    """Lengths (L, 3), metres, by name."""
+    unseen: Mapping[str, float]
+    """Share of each limb that no silhouette shows: hidden before or behind the body, or outside the picture."""
+    frozen: bool = False
+    """Whether the picture has not changed for longer than repeated frames explain."""
+
+
+class Doubt(NamedTuple):
+    """How far a frame's estimate may be off."""
+
+    joint_sd: Array
+    """Standard deviations of the landmarks along the world's axes, of shape (L, 3), metres."""
+    pose_sd: Array
+    """Standard deviations of the degrees of freedom, of shape (D,), rad or m."""
+    limb_status: tuple[str, ...]
+    """Of `motion.STATUSES`, for each of the limbs that the landmarks belong to."""
+
+
+def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: Skeleton, points: Points, pose: Array, R: Array) -> Doubt:
+    """Doubt about a pose (D,), of which `points` gives the landmarks along the axes of the evidence's components, and `names` their names.
+
+    `kind`: of the calibrated model, `monocular` or `multiview`; `R` (3, 3) takes vectors from the components' axes to the world's.
+    """
+    model = variance_model(kind)
+    sd = model.sd(names, evidence.components)
+    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), limb_statuses(model.limits, names, sd, evidence))
+
+
+def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) -> Array:
+    """Standard deviations (D,) of a pose's degrees of freedom, from those of its landmarks, `sd` (L, 3), metres.
+
+    To first order the landmarks tell J' diag(1/sd^2) J, to which is added what the joints' limits tell (uniform between them): a degree
+    of freedom that moves no landmark, such as the roll of a straight arm, may be anywhere between its limits.
+    """
+    number = len(pose)
+    moved = points(np.concatenate([pose[None], pose + STEP * np.eye(number)]))
+    jacobian = ((moved[1:] - moved[0]) / STEP / sd).reshape(number, -1)
+    low, high = skeleton.limits
+    width = np.where(np.isfinite(high - low), (high - low) / np.sqrt(12), UNBOUNDED)
+    return np.sqrt(np.diag(np.linalg.inv(jacobian @ jacobian.T + np.diag(1 / np.maximum(width, STEP) ** 2))))
+
+
+def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, evidence: Evidence) -> tuple[str, ...]:
+    """Status of each limb from the deviations (L, 3), metres, of its joints, named `names`.
+
+    `tracked`, but `uncertain` if a joint's deviation, all axes together, is over the limit (m) for limbs of its kind; or `predicted` if
+    moreover most of the limb is unseen. All are `predicted` if the picture is frozen.
+    """
+    if evidence.frozen:
+        return ("predicted",) * len(limbs_of(names))
+    radius, out = np.sqrt((sd**2).sum(1)), list[str]()
+    for limb in limbs_of(names):
+        own = [n for n, name in enumerate(names) if limb_of(name) == limb]
+        sure = radius[own].max() <= limits[limb.rpartition("_")[2]]
+        out.append("tracked" if sure else "predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain")
+    return tuple(out)

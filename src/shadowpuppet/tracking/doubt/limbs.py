@@ -1,0 +1,32 @@
+"""Groups of joints that share their factors of doubt, and the parts of bodies' shapes that belong to each limb."""
+
+from __future__ import annotations
+
+from shadowpuppet.body.skeleton import SIDES
+
+GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
+          "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle",)}
+"""Groups of joints that share their factors of doubt; left and right are alike."""
+_GROUP_OF = {joint: group for group, joints in GROUPS.items() for joint in joints}
+LEG_PARTS = ("thigh", "shank", "foot", "upper_leg", "lower_leg")
+LEVER = {"shoulder": 0.15, "elbow": 0.3, "wrist": 0.55, "hand": 0.6, "fist": 0.7, "hip": 0.15, "knee": 0.4, "ankle": 0.8}
+"""Distance (m) by which a joint may be off if nothing is known of its limb's direction."""
+TRUNK_LEVER = 0.3
+
+
+def group_of(joint: str) -> str:
+    """The group that a joint belongs to."""
+    return _GROUP_OF[joint.rpartition("_")[2]]
+
+
+def lever_of(joint: str) -> float:
+    """The joint's lever (m)."""
+    return LEVER.get(joint.partition("_")[2], TRUNK_LEVER)
+
+
+def limb_of_part(part: str) -> str:
+    """The limb that a part of a body's shape, such as `left_forearm`, belongs to."""
+    side, _, name = part.partition("_")
+    if side not in SIDES or not name:
+        return "trunk"
+    return f"{side}_leg" if name in LEG_PARTS else f"{side}_arm"

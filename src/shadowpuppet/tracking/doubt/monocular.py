@@ -1,0 +1,232 @@
+"""What one camera's frame says about doubt: the components of the joints' variances, along the camera's axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import unpack
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import LIMBS, limb_of
+from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
+from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
+from shadowpuppet.tracking.doubt.mirror import Mirrors
+from shadowpuppet.tracking.doubt.steps import CONSTANT, is_frozen, steps, stillness
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+
+SAMPLES = 24
+"""Number of poses drawn from the particles."""
+TEMPERATURE = 100.0
+"""A particle's weight falls to 1/e for this much more cost (pixels at 320 x 240): neighbouring pixels err together."""
+SHORTENING = 0.02
+"""Uncertainty (m) of a segment's length in the picture, from outline and body shape."""
+THIN = 0.03
+"""Half width of what an inaccurate outline may leave over, as a share of the root of the person's area."""
+DISTANCE = 0.02
+"""Standard deviation of the person's distance, over it: who is measured does not stand exactly where it was measured."""
+GOOD_MISFIT = 0.05
+"""Share of the pixels that differ though the pose is right."""
+REACH = 1.1
+"""Radius about a limb's root, over the limb's length, in which unexplained silhouette may be this limb's."""
+TRUNK_REACH = 1.0
+"""The same about the neck for the trunk, metres."""
+MOST_UNEXPLAINED = 2.0
+"""Bound of the unexplained silhouette, over the limb's area."""
+
+
+class Before(NamedTuple):
+    """What the next frame needs of this one."""
+
+    seconds: float
+    points: Array
+    """Landmarks (L, 3), camera's frame, metres."""
+    mask: Mask
+    """Silhouette (H, W)."""
+    still: int
+    """Number of frames for which it has been the same, pixel by pixel."""
+    since: float
+    """Time (s) of the first of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class MonocularDoubt:
+    """States doubt about the estimates of a `MonocularTracker`."""
+
+    tracker: MonocularTracker
+
+    def __call__(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of a mask (H, W) at a time (s); and what the next frame needs."""
+        picture = self.tracker.picture
+        evidence, now = self.evidence(state, mask, seconds, before)
+        R = picture.camera.T_camera_world[:3, :3].T
+        return state_doubt("monocular", evidence, self.names, picture.body.skeleton, picture.points, state.pose, R), now
+
+    def evidence(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Evidence, Before]:
+        """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.
+
+        Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
+        the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
+        turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
+        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; its last step; the
+        misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the error of the
+        person's distance.
+        """
+        points = self.tracker.picture.points(state.pose[None])[0]
+        at, lever = dict(zip(self.names, points)), self.levers
+        still = before.still + 1 if before is not None and np.array_equal(before.mask, mask) else 0
+        spread = self._spread(state, points)
+        shares = self._shares(state.pose, points, mask)
+        columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
+        found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
+            "constant": np.full(len(points), CONSTANT),
+            "spread": np.sqrt((spread[:, :2] ** 2).mean(1)),
+            "spread_depth": spread[:, 2],
+            "mirrored": self._chains.mirrored(points),
+            "foreshortened": self._chains.foreshortened(points, at["left_shoulder"] - at["right_shoulder"]),
+            "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
+            "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
+            "step": steps(points, seconds, before),
+            "misfit": max(1 - state.overlap - GOOD_MISFIT, 0.0) * lever,
+            "still": stillness(still) * lever,
+        }
+        components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
+        components["alternative"] = self._mirrors.displacements(state.pose, points, self.tracker.observe(mask, state.pose))
+        components["distance"] = points * (0, 0, DISTANCE)
+        unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
+        since = before.since if still and before is not None else seconds
+        return Evidence(components, unseen, is_frozen(still, seconds - since)), Before(seconds, points, mask, still, since)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the L landmarks."""
+        return self.tracker.picture.body.landmark_names
+
+    @cached_property
+    def levers(self) -> Array:
+        """The joints' levers (L,), metres."""
+        return np.array([lever_of(name) for name in self.names])
+
+    @cached_property
+    def _chains(self) -> Chains:
+        return Chains.of(self.names)
+
+    @cached_property
+    def _mirrors(self) -> Mirrors:
+        return Mirrors(self.tracker.picture)
+
+    @cached_property
+    def _limbs(self) -> dict[str, list[int]]:
+        """Indices of each limb's joints."""
+        return {limb: [n for n, name in enumerate(self.names) if limb_of(name) == limb] for limb in LIMBS}
+
+    @cached_property
+    def _parts(self) -> dict[str, NDArray[np.int64]]:
+        """Indices of the shapes of each limb that the body has."""
+        limbs = [limb_of_part(name) for name in self.tracker.picture.body.parts]
+        return {limb: np.flatnonzero([own == limb for own in limbs]) for limb in LIMBS if limb in limbs}
+
+    def _spread(self, state: State, points: Array) -> Array:
+        """Root mean squared distance (L, 3) from the estimate's joints, `points`, to those of poses drawn from the particles."""
+        poses, scale = np.repeat(state.pose[None], SAMPLES, axis=0), self.tracker.stages[0].scale
+        for n, (stage, particles) in enumerate(zip(self.tracker.stages, state.particles)):
+            weights = np.exp((particles.costs.min() - particles.costs) / (TEMPERATURE * scale))
+            along = (np.arange(SAMPLES) + 0.5) / SAMPLES * weights.sum()
+            drawn = np.searchsorted(np.cumsum(weights), along).clip(0, len(weights) - 1)
+            poses[:, stage.dofs] = particles.poses[np.random.default_rng(n).permutation(drawn)]  # stages are independent
+        return np.sqrt(((self.tracker.picture.points(poses) - points) ** 2).mean(0))
+
+    def _shares(self, pose: Array, points: Array, mask: Mask) -> dict[str, tuple[float, float, float, float]]:
+        """Of each limb, drawn in a pose (D,), the share that is hidden before or behind others, the silhouette near it that nothing
+        explains over its area, and the shares outside the mask (H, W) and outside the picture. `points` (L, 3): the joints in the
+        camera's frame."""
+        import cv2
+
+        picture, width = self.tracker.picture, self.tracker.picture.camera.size[0]
+        drawn = {limb: unpack(picture.draw(pose, parts), width) for limb, parts in self._parts.items()}
+        times = np.add.reduce([limb.view(np.uint8) for limb in drawn.values()])
+        body = times > 0
+        counted = ~picture.legs(pose) if self.tracker.settings.ignore_legs else np.ones_like(body)
+        square = np.ones((2 * max(1, round(THIN * float(np.sqrt(np.count_nonzero(body))))) + 1,) * 2, np.uint8)
+
+        def thick(pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+            return cv2.morphologyEx(pixels.view(np.uint8), cv2.MORPH_OPEN, square).view(bool)
+
+        rows, columns = np.nonzero(thick(mask & ~body & counted))
+        outside = thick(body & ~mask & counted)
+        R, t = picture.camera.T_camera_world[:3, :3], picture.camera.T_camera_world[:3, 3]
+        pixels = picture.camera.project((points - t) @ R)
+        cut = ~np.asarray(((pixels >= 0) & (pixels < picture.camera.size)).all(1))
+        shares = {}
+        for limb, own in drawn.items():
+            area = max(np.count_nonzero(own), 1)
+            (x, y), reach = self._reach(limb, points, pixels)
+            near = np.count_nonzero((columns - x) ** 2 + (rows - y) ** 2 < reach**2)
+            shares[limb] = (np.count_nonzero(own & (times > 1)) / area, min(near / area, MOST_UNEXPLAINED),
+                            np.count_nonzero(own & outside) / area, float(cut[self._limbs[limb]].mean()))
+        return shares
+
+    def _reach(self, limb: str, points: Array, pixels: Array) -> tuple[Array, float]:
+        """Centre (2,) and radius, pixels, of the region in which a limb may be."""
+        focal, own = float(self.tracker.picture.camera.matrix[0, 0]), self._limbs[limb]
+        root = self.names.index("neck") if limb == "trunk" else own[0]
+        length = TRUNK_REACH if limb == "trunk" else REACH * float(np.sqrt((np.diff(points[own], axis=0) ** 2).sum(1)).sum())
+        return pixels[root], length * focal / points[root, 2]
+
+
+CHAINS = {"elbow": ("shoulder", "elbow"), "wrist": ("shoulder", "elbow", "wrist"), "hand": ("shoulder", "elbow", "wrist"),
+          "fist": ("shoulder", "elbow", "wrist"), "knee": ("hip", "knee"), "ankle": ("hip", "knee", "ankle")}
+"""Joints from a limb's root on whose directions a joint's place depends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """The bones from the limbs' roots to their joints."""
+
+    starts: NDArray[np.int64]
+    """Landmark at each bone's beginning (B,)."""
+    ends: NDArray[np.int64]
+    bears: Array
+    """1 where a landmark's place depends on a bone's direction, (L, B)."""
+    sided: NDArray[np.bool_]
+    """Whether a landmark is a limb's, (L,)."""
+
+    @classmethod
+    def of(cls, names: Sequence[str]) -> Chains:
+        """The chains among landmarks, by their names."""
+        chains = []
+        for name in names:
+            side, _, joint = name.partition("_")
+            chains.append([(f"{side}_{a}", f"{side}_{b}") for a, b in pairwise(CHAINS.get(joint, ()))])
+        bones = list(dict.fromkeys(bone for chain in chains for bone in chain))
+        starts, ends = np.array([[names.index(a), names.index(b)] for a, b in bones]).reshape(-1, 2).T
+        bears = np.array([[bone in chain for bone in bones] for chain in chains], float)
+        return cls(starts, ends, bears, np.array([name.partition("_")[0] in SIDES for name in names]))
+
+    def mirrored(self, points: Array) -> Array:
+        """How far in depth (L,), metres, landmarks (L, 3) move if the bones above them point as far to the front as to the back."""
+        return np.sqrt(self.bears @ (2 * self._along(points)[1]) ** 2)
+
+    def foreshortened(self, points: Array, across: Array) -> Array:
+        """Errors of depth (L,), metres, of landmarks (L, 3) if the bones above look longer or shorter by `SHORTENING`, and so half the line
+        of the shoulders, `across` (3,)."""
+        shoulders = _depth_errors(np.array([float(np.linalg.norm(across)) / 2]), across[2:] / 2)
+        return np.sqrt(self.bears @ _depth_errors(*self._along(points)) ** 2 + self.sided * shoulders**2)
+
+    def _along(self, points: Array) -> tuple[Array, Array]:
+        """Each bone's length, and its part along the view through its end (B,), metres."""
+        bones, ends = points[self.ends] - points[self.starts], points[self.ends]
+        return np.sqrt((bones**2).sum(1)), (bones * ends).sum(1) / np.sqrt((ends**2).sum(1))
+
+
+def _depth_errors(lengths: Array, depths: Array) -> Array:
+    """Errors of depth (B,) of bones that look longer or shorter by `SHORTENING`, from lengths and depths (B,), metres."""
+    seen = np.sqrt(np.maximum(lengths**2 - depths**2, 0))
+    return np.minimum(seen * SHORTENING / np.maximum(np.abs(depths), 1e-6), np.sqrt(2 * lengths * SHORTENING))

@@ -1,0 +1,183 @@
+"""What the frames of several cameras say about doubt: the components of the joints' variances, along the world's axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body.shapes import Limbs
+from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import LIMBS, limb_of
+from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
+from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
+from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.resampling import normalise
+
+GOOD_MISFIT = 0.08
+"""One less the overlap of a body that fits."""
+FAR = 0.06
+"""Distance (m) from a part's surface beyond which a surface point is unexplained."""
+POINTS = 600
+"""Number of surface points that are looked at, about."""
+AXIS_POINTS = 7
+"""Number of points along each part's axis that are looked up in the silhouettes."""
+CROSSING = 0.15
+"""Distance (m) of left and right within which they may have been confused, and for how long (s) that counts."""
+MEMORY = 1.0
+
+
+class Before(NamedTuple):
+    """What the next frame needs of this one."""
+
+    seconds: float
+    points: Array
+    """Landmarks (L, 3), world, metres."""
+    masks: tuple[Mask | None, ...]
+    still: int
+    """Number of frames for which no camera's silhouette has changed, or some camera's has not."""
+    apart: Array
+    """Least recent distance (L,) of each joint from its counterpart on the other side, metres; infinite for joints without one."""
+
+
+@dataclass(frozen=True, eq=False)
+class MultiviewDoubt:
+    """States doubt about the estimates of a `MultiviewTracker`."""
+
+    tracker: MultiviewTracker
+
+    def __call__(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
+                 before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate from surface points and masks (H, W) at a time (s); and what the next frame needs."""
+        body = self.tracker.body
+        evidence, now = self.evidence(state, surface, masks, seconds, before)
+        return state_doubt("multiview", evidence, self.names, body.skeleton, body.points, state.pose, np.eye(3)), now
+
+    def evidence(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
+                 before: Before | None) -> tuple[Evidence, Before]:
+        """What the frame shows about the accuracy of the estimate from surface points and masks (H, W) at a time (s); and what the next
+        frame needs.
+
+        Of every joint there are: a constant; the particles' spread; of its limb, the surface near it that no part explains, the share
+        outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever; its last step;
+        the misfit of the whole body; silhouettes that do not change; and the distance to its counterpart on the other side, if they
+        were close within the last second.
+        """
+        body = self.tracker.body
+        points = body.points(state.pose[None])[0]
+        still = count_still(before, masks)
+        apart = self._apart(points, seconds, before)
+        weights = normalise(state.particles.log_weights)
+        spread = np.sqrt(np.einsum("n,nla->la", weights, (body.points(state.particles.poses) - points) ** 2))
+        shares = self._limb_shares(state.pose, surface, masks)
+        columns = dict(zip(("bare", "unexplained", "outside", "unseen"), shares[self._limbs_of_joints].T * self.levers))
+        columns |= {"constant": np.full(len(points), CONSTANT), "misfit": max(1 - state.overlap - GOOD_MISFIT, 0.0) * self.levers,
+                    "still": stillness(still) * self.levers, "step": steps(points, seconds, before)}
+        found = {name: np.repeat(values[:, None], 3, axis=1) for name, values in columns.items()} | {"spread": spread}
+        other = np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]
+        evidence = Evidence(found | {"swapped": other}, dict(zip(LIMBS, shares[:, 0].tolist())))
+        return evidence, Before(seconds, points, tuple(masks), still, apart)
+
+    def _limb_shares(self, pose: Array, surface: SurfacePoints, masks: Sequence[Mask | None]) -> Array:
+        """For each of `LIMBS`: the share of it without surface points, the points near it that no part explains over those that its
+        surface should have, the share outside a silhouette, and the root of the inverse number of cameras that see it, (5, 4)."""
+        T = self.tracker.body.skeleton.forward(pose[None])[0][self._limbs.joints]
+        starts, ends = (T[:, :, 3] + (T[:, :, :3] @ places[:, :, None])[..., 0] for places in (self._limbs.starts, self._limbs.ends))
+        near, far = self._explained(starts, ends, surface.points[:: max(1, len(surface.points) // POINTS)])
+        outside, seen = self._looked_up(starts, ends, masks)
+        return np.stack([near, far, outside, seen], 1)
+
+    def _explained(self, starts: Array, ends: Array, points: Array) -> tuple[Array, Array]:
+        """For each of `LIMBS`: the share of it without surface points, and the points near it that no part explains, over those that
+        its surface should have. `starts`, `ends`: of the parts' axes (S, 3); `points` (P, 3)."""
+        along = ends - starts
+        share = np.einsum("psa,sa->ps", points[:, None] - starts, along) / np.maximum((along**2).sum(1), 1e-9)
+        closest = starts + np.clip(share, 0, 1)[..., None] * along
+        distances = np.linalg.norm(points[:, None] - closest, axis=2) - self._radii
+        part = distances.argmin(1)
+        limb, explained = self._limb_of_parts[part], distances[np.arange(len(part)), part] < FAR
+        expected = np.maximum(self._surface_shares * len(points), 1e-9)
+        good, bad = (np.bincount(limb[which], minlength=len(LIMBS)) / expected for which in (explained, ~explained))
+        return np.clip(1 - good, 0, 1), np.minimum(bad, 2.0)
+
+    def _looked_up(self, starts: Array, ends: Array, masks: Sequence[Mask | None]) -> tuple[Array, Array]:
+        """For each of `LIMBS`: the share of its axis outside a silhouette, and the root of the inverse number of cameras that see it."""
+        share = np.linspace(0.05, 0.95, AXIS_POINTS)[:, None, None]
+        axis = (starts + share * (ends - starts)).reshape(-1, 3)
+        limb = np.tile(self._limb_of_parts, AXIS_POINTS)
+        seen, out = np.zeros(len(LIMBS)), np.zeros(len(LIMBS))
+        for camera, mask in zip(self.tracker.cameras, masks):
+            if mask is None or not may_be_person(mask):
+                continue
+            pixels = camera.project(axis)
+            columns, rows = np.rint(np.where(np.isfinite(pixels), pixels, -1)).astype(int).T
+            inside = (columns >= 0) & (rows >= 0) & (columns < mask.shape[1]) & (rows < mask.shape[0])
+            missed = ~mask[rows[inside], columns[inside]]
+            seen += np.bincount(limb[inside], minlength=len(LIMBS))
+            out += np.bincount(limb[inside], missed, minlength=len(LIMBS))
+        number = np.maximum(seen / np.maximum(np.bincount(limb, minlength=len(LIMBS)), 1), 0.25)
+        return out / np.maximum(seen, 1), 1 / np.sqrt(number)
+
+    def _apart(self, points: Array, seconds: float, before: Before | None) -> Array:
+        """Least distance (L,) of each joint from its counterpart in about the last second."""
+        now = np.where(self.counterparts == np.arange(len(points)), np.inf, np.linalg.norm(points - points[self.counterparts], axis=1))
+        if before is None:
+            return now
+        forgotten = CROSSING * (seconds - before.seconds) / MEMORY
+        return np.minimum(now, before.apart + forgotten)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the L landmarks."""
+        return self.tracker.body.landmark_names
+
+    @cached_property
+    def levers(self) -> Array:
+        """The joints' levers (L,), metres."""
+        return np.array([lever_of(name) for name in self.names])
+
+    @cached_property
+    def _limbs_of_joints(self) -> list[int]:
+        return [LIMBS.index(limb_of(name)) for name in self.names]
+
+    @cached_property
+    def counterparts(self) -> NDArray[np.int64]:
+        """Index of each joint's counterpart on the other side (L,); its own without one."""
+        other = {f"{a}_": f"{b}_" for a, b in (SIDES, SIDES[::-1])}
+        swapped = [next((b + name.removeprefix(a) for a, b in other.items() if name.startswith(a)), name) for name in self.names]
+        return np.array([self.names.index(name) for name in swapped])
+
+    @property
+    def _limbs(self) -> Limbs:
+        assert self.tracker.body.limbs is not None
+        return self.tracker.body.limbs
+
+    @cached_property
+    def _radii(self) -> Array:
+        return self._limbs.radii.mean((1, 2))
+
+    @cached_property
+    def _limb_of_parts(self) -> NDArray[np.int64]:
+        return np.array([LIMBS.index(limb_of_part(part)) for part in self._limbs.parts])
+
+    @cached_property
+    def _surface_shares(self) -> Array:
+        """Share of the body's surface that belongs to each of `LIMBS`, (5,)."""
+        areas = np.bincount(self._limb_of_parts, self._radii * self._limbs.lengths, minlength=len(LIMBS))
+        return areas / areas.sum()
+
+
+def count_still(before: Before | None, masks: Sequence[Mask | None]) -> int:
+    """Number of frames for which the silhouette of some camera with a person has not changed."""
+    if before is None:
+        return 0
+    same = [now is not None and last is not None and now.any() and np.array_equal(now, last) for now, last in zip(masks, before.masks)]
+    return before.still + 1 if any(same) else 0
