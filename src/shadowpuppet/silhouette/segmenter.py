@@ -61,7 +61,7 @@ class Segmenter:
         self._check(image)
         gap = None
         if self.correction is not None:
-            image, gap, _ = self.correction(image)
+            image, gap, *_ = self.correction(image)
         label = self.classifier(image)
         if self.covered is not None:
             label[self.covered] = 2
