@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.jit import compiled
+from shadowpuppet.jit import compiled, device
 
 NEUTRAL = 128.0
 """Cr and Cb of a grey pixel, 8 bit."""
@@ -71,3 +71,59 @@ def far_from_samples(image, samples, squared_radius, needed, out):
                 if near >= needed:
                     break
             out[y, x] = near < needed
+
+
+@device
+def _shifted(planes, scene, shift, inverse_sigma, factor):
+    """Whether a pixel's Y, Cr, Cb are the scene's with a share of a shift, 0.1 to 1.1 of it, to `factor` standard deviations."""
+    along, length = np.float32(0), np.float32(0)
+    for c in range(3):
+        weight = inverse_sigma[c] * inverse_sigma[c]
+        along += weight * (planes[c] - scene[c]) * shift[c]
+        length += weight * shift[c] * shift[c]
+    if not 0.1 * length < along <= 1.1 * length:
+        return False
+    share, squared = along / length, np.float32(0)
+    for c in range(3):
+        each = (planes[c] - scene[c] - share * shift[c]) * inverse_sigma[c]
+        squared += each * each
+    return squared <= factor * factor
+
+
+@compiled(nogil=True)
+def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, age, stood, due):
+    """Number of pixels that have looked alike, unlike the background, often enough to become background; they are set in `due` (H, W).
+
+    label: of the pixels (H, W), 0 background; held (H, W): 2 on the person, 1 near them, else 0; planes (H, W, 3), uint8, Y, Cr, Cb; scene:
+    as learnt, and shift: how the background has changed around a pixel, 0 where it has not, both (H, W, 3), float32; factor: greatest
+    difference that counts as alike, over the standard deviation; ages: how often, where the person was not, and where they were.
+
+    State: slow (H, W, 3), mean of what a pixel has looked like; age (H, W), how often; stood (H, W), 1 where the person was since it was
+    background last. A due pixel starts anew. A held pixel that looks as before neither ages nor starts anew, and is due at once if it has
+    changed as its surroundings have: towards `shift`, by a share of it.
+    """
+    number = 0
+    for y in range(label.shape[0]):
+        for x in range(label.shape[1]):
+            if label[y, x] == 0:
+                age[y, x] = stood[y, x] = 0
+                continue
+            far = np.float32(0)
+            for c in range(3):
+                far = max(far, abs(planes[y, x, c] - slow[y, x, c]) * inverse_sigma[y, x, c])
+            alike = far <= factor
+            if held[y, x]:
+                if alike and _shifted(planes[y, x], scene[y, x], shift[y, x], inverse_sigma[y, x], factor):
+                    due[y, x] = 1
+                elif not alike:
+                    age[y, x], stood[y, x] = 0, max(stood[y, x], held[y, x] // 2)
+                    slow[y, x] = planes[y, x]
+            else:
+                age[y, x] = age[y, x] + 1 if alike and age[y, x] else 1
+                for c in range(3):
+                    slow[y, x, c] += (planes[y, x, c] - slow[y, x, c]) / np.float32(age[y, x])
+                due[y, x] = age[y, x] >= ages[stood[y, x]]
+            if due[y, x]:
+                age[y, x] = stood[y, x] = 0
+                number += 1
+    return number
