@@ -136,14 +136,14 @@ def test_a_pixel_is_due_when_it_has_looked_alike_often_enough():
     """Plain twin of the kernel's counting, for one free pixel."""
     rng = np.random.default_rng(3)
     label, levels = rng.random(60) < 0.8, np.where(rng.random(60) < 0.9, 100, 160)
-    slow, age, stood, due = np.zeros((1, 1, 3), np.float32), *(np.zeros((1, 1), np.uint8) for _ in range(3))
+    slow, age, before, due = np.zeros((1, 1, 3), np.float32), *(np.zeros((1, 1), np.uint8) for _ in range(3))
     nothing, sigma = np.zeros((1, 1, 3), np.float32), np.full((1, 1, 3), 0.2, np.float32)
     seen, plain, last, count = [], [], 0.0, 0
     for each, level in zip(label, levels):
         due[:] = 0
         planes = np.full((1, 1, 3), level, np.uint8)
         watch(np.array([[each]], np.uint8), np.zeros((1, 1), np.uint8), planes, nothing, nothing, sigma, np.float32(2), (4, 20), slow, age,
-              stood, due)
+              before, due)
         seen.append(bool(due[0, 0]))
         count = 0 if not each else count + 1 if count and abs(level - last) <= 10 else 1
         last = level if each else last

@@ -74,16 +74,14 @@ def far_from_samples(image, samples, squared_radius, needed, out):
 
 
 @device
-def _shifted(planes, scene, shift, inverse_sigma, factor):
-    """Whether a pixel's Y, Cr, Cb are the scene's with a share of a shift, 0.1 to 1.1 of it, to `factor` standard deviations."""
-    along, length = np.float32(0), np.float32(0)
+def _explained(planes, scene, shift, inverse_sigma, factor):
+    """Whether a pixel's Y, Cr, Cb are the scene's with a share of a shift, 0 to 1.1 of it, to `factor` standard deviations."""
+    along, length, squared = np.float32(0), np.float32(1e-6), np.float32(0)
     for c in range(3):
         weight = inverse_sigma[c] * inverse_sigma[c]
         along += weight * (planes[c] - scene[c]) * shift[c]
         length += weight * shift[c] * shift[c]
-    if not 0.1 * length < along <= 1.1 * length:
-        return False
-    share, squared = along / length, np.float32(0)
+    share = min(max(along / length, np.float32(0)), np.float32(1.1))
     for c in range(3):
         each = (planes[c] - scene[c] - share * shift[c]) * inverse_sigma[c]
         squared += each * each
@@ -91,39 +89,44 @@ def _shifted(planes, scene, shift, inverse_sigma, factor):
 
 
 @compiled(nogil=True)
-def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, age, stood, due):
-    """Number of pixels that have looked alike, unlike the background, often enough to become background; they are set in `due` (H, W).
+def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, age, before, due):
+    """Number of pixels that become background as they look now; they are set in `due` (H, W).
 
-    label: of the pixels (H, W), 0 background; held (H, W): 2 on the person, 1 near them, else 0; planes (H, W, 3), uint8, Y, Cr, Cb; scene:
-    as learnt, and shift: how the background has changed around a pixel, 0 where it has not, both (H, W, 3), float32; factor: greatest
-    difference that counts as alike, over the standard deviation; ages: how often, where the person was not, and where they were.
+    They are those that look alike, unlike the background, for long enough, and those that look, for the second time, like the scene as
+    learnt, or as if the scene there had changed as it has around them. A pixel on or near the person that looks as before neither ages nor
+    starts anew.
 
-    State: slow (H, W, 3), mean of what a pixel has looked like; age (H, W), how often; stood (H, W), 1 where the person was since it was
-    background last. A due pixel starts anew. A held pixel that looks as before neither ages nor starts anew, and is due at once if it has
-    changed as its surroundings have: towards `shift`, by a share of it.
+    label: of the pixels (H, W), 0 background; held (H, W): 2 on the person, 1 near them, else 0; planes (H, W, 3), uint8, Y, Cr, Cb,
+    smoothed; scene: the same as learnt, and shift: how the background has changed around a pixel, 0 where it has not, both (H, W, 3),
+    float32; factor: greatest difference that counts as alike, over the standard deviation; ages: how often a pixel must look alike where
+    the person was not, and where they were.
+
+    State: slow (H, W, 3), mean of what a pixel has looked like; age (H, W), how often; before (H, W), 1 where the person was since it was
+    background last, 2 more where it was explained the last time. A due pixel starts anew.
     """
     number = 0
     for y in range(label.shape[0]):
         for x in range(label.shape[1]):
             if label[y, x] == 0:
-                age[y, x] = stood[y, x] = 0
+                age[y, x] = before[y, x] = 0
                 continue
+            near, past = np.int64(held[y, x]), np.int64(before[y, x])
+            stood, again = past % 2, past >= 2
             far = np.float32(0)
             for c in range(3):
                 far = max(far, abs(planes[y, x, c] - slow[y, x, c]) * inverse_sigma[y, x, c])
             alike = far <= factor
-            if held[y, x]:
-                if alike and _shifted(planes[y, x], scene[y, x], shift[y, x], inverse_sigma[y, x], factor):
-                    due[y, x] = 1
-                elif not alike:
-                    age[y, x], stood[y, x] = 0, max(stood[y, x], held[y, x] // 2)
-                    slow[y, x] = planes[y, x]
-            else:
+            explained = _explained(planes[y, x], scene[y, x], shift[y, x], inverse_sigma[y, x], factor)
+            if near and not alike:
+                age[y, x], stood = 0, max(stood, near // 2)
+            elif not near:
                 age[y, x] = age[y, x] + 1 if alike and age[y, x] else 1
-                for c in range(3):
-                    slow[y, x, c] += (planes[y, x, c] - slow[y, x, c]) / np.float32(age[y, x])
-                due[y, x] = age[y, x] >= ages[stood[y, x]]
+            due[y, x] = (explained and again) or (not near and age[y, x] >= ages[stood])
+            share = np.float32(1) / max(age[y, x], 1) if alike and not explained else np.float32(1)
+            for c in range(3):
+                slow[y, x, c] += (planes[y, x, c] - slow[y, x, c]) * share
+            before[y, x] = stood + 2 * int(explained)
             if due[y, x]:
-                age[y, x] = stood[y, x] = 0
+                age[y, x] = before[y, x] = 0
                 number += 1
     return number

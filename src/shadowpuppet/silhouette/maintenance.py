@@ -48,8 +48,8 @@ class MaintainedSegmenter:
         """Number of pixels that have become background so far, each as often as it has."""
         self._next = -np.inf
         shape = segmenter.background.shape
-        self._age, self._stood = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
-        self._scene = segmenter.background.mean
+        self._age, self._before = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+        self._learnt = segmenter
         self._shift = np.zeros((*shape, 3), np.float32)
         self._slow = np.zeros((*shape, 3), np.float32) if isinstance(segmenter.classifier, ChannelClassifier) else None
 
@@ -73,8 +73,9 @@ class MaintainedSegmenter:
             return
         due, ages = np.zeros(held.shape, np.uint8), (round(LASTING / INTERVAL), round(STOOD / INTERVAL))
         planes = smoothed(to_planes(seen.image), classifier.smoothing)
-        found = watch(seen.label, held, planes, self._scene, self._shift, classifier.inverse_sigma, np.float32(classifier.factor), ages, slow,
-                      self._age, self._stood, due)
+        assert isinstance(self._learnt.classifier, ChannelClassifier)
+        found = watch(seen.label, held, planes, self._learnt.classifier.mean, self._shift, classifier.inverse_sigma, np.float32(classifier.factor), ages, slow,
+                      self._age, self._before, due)
         if found:
             self.followed += found
             self._follow(due, slow, classifier)
@@ -86,7 +87,7 @@ class MaintainedSegmenter:
         window = bounding_window(due, BESIDE)
         background = replace(self.segmenter.background, mean=mean)
         self.segmenter = replace(self.segmenter, background=background, classifier=classifier.with_scene(mean, window))
-        self._shift = _spread(mean - self._scene)
+        self._shift = _spread(mean - self._learnt.background.mean)
 
 
 def _held(person: NDArray[np.uint8]) -> NDArray[np.uint8]:
