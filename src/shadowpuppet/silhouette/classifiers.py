@@ -104,6 +104,11 @@ class ChannelClassifier:
         lowest, highest = np.ceil(self.mean - reach), np.floor(self.mean + reach)
         return np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8)
 
+    @cached_property
+    def least_sigma(self) -> Floats:
+        """Least assumed standard deviation in the picture, of shape (3,)."""
+        return np.asarray(1 / self.inverse_sigma.max(axis=(0, 1)), np.float32)
+
     def with_scene(self, mean: Floats, window: Window) -> ChannelClassifier:
         """A copy whose background looks like `mean` (H, W, 3), Y, Cr, Cb, not smoothed, in a window of rows and columns. The standard
         deviation assumed there is the picture's least one, increased at edges."""
@@ -111,14 +116,13 @@ class ChannelClassifier:
         rows, columns = (slice(max(each.start - reach, 0), each.stop + reach) for each in window)
         inner = tuple(slice(each.start - wide.start, each.stop - wide.start) for each, wide in zip(window, (rows, columns)))
         smooth = smoothed(np.ascontiguousarray(mean[rows, columns]), self.smoothing)
-        least = 1 / self.inverse_sigma.max(axis=(0, 1))
-        sigma = np.hypot(least, edge_jitter(smooth))
+        sigma = np.hypot(self.least_sigma, edge_jitter(smooth))
         part = replace(self, mean=smooth[inner], inverse_sigma=(1 / sigma).astype(np.float32)[inner])
         out = replace(self, mean=self.mean.copy(), inverse_sigma=self.inverse_sigma.copy())
         lowest, highest = (bound.copy() for bound in self.surely_background)
         out.mean[window], out.inverse_sigma[window] = part.mean, part.inverse_sigma
         lowest[window], highest[window] = part.surely_background
-        out.__dict__["surely_background"] = lowest, highest  # only the window's are computed again
+        out.__dict__.update(surely_background=(lowest, highest), least_sigma=self.least_sigma)  # only the window's are computed again
         return out
 
 

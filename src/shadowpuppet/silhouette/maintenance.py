@@ -87,7 +87,10 @@ class MaintainedSegmenter:
         window = bounding_window(due, BESIDE)
         background = replace(self.segmenter.background, mean=mean)
         self.segmenter = replace(self.segmenter, background=background, classifier=classifier.with_scene(mean, window))
-        self._shift = _spread(mean - self._learnt.background.mean)
+        beside = bounding_window(due, 2 * AROUND)
+        around = bounding_window(due, AROUND)
+        inner = tuple(slice(each.start - wide.start, each.stop - wide.start) for each, wide in zip(around, beside))
+        self._shift[around] = _spread(mean[beside] - self._learnt.background.mean[beside])[inner]
 
 
 def _held(person: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -102,7 +105,7 @@ def _spread(change: NDArray[np.float32]) -> NDArray[np.float32]:
     """Mean change (H, W, 3) of the changed pixels around each pixel; 0 where there are none."""
     import cv2
 
-    changed = change.any(axis=2).astype(np.float32)
+    changed = (np.abs(change).sum(axis=2) > 0).astype(np.float32)
     side = (2 * AROUND + 1,) * 2
     sums, number = cv2.boxFilter(change, -1, side, normalize=False), cv2.boxFilter(changed, -1, side, normalize=False)
     return np.asarray(sums / np.maximum(number, 1)[..., None], np.float32) * (number > 0.5)[..., None]
