@@ -1,8 +1,9 @@
 """Maintenance of the background: it follows what changes in the scene and stays, such as a chair that was moved or the sun on a wall.
 
-Pixels that have looked alike for some seconds, unlike the empty scene and away from the person, become background as they look now. Where
-the person stands the background is held; where they stood, for longer. A film whose pixels beside the person all look like the empty scene
-is segmented as if there were no maintenance.
+Pixels that have looked alike for some seconds, unlike the background and away from the person, become background as they look now. Where
+the person stands the background is held, and for longer where they stood, with one exception: pixels that look like the scene as learnt, or
+as it would if it had changed there as it has beside it (light that wanders on). A film whose pixels beside the person all look like the
+empty scene is segmented as if there were no maintenance.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ background once."""
 MARGIN = 0.05
 """Distance to the person up to which pixels are held, over the height of the silhouette."""
 MAX_SHARE = 0.4
-"""Share of the picture that differs from the scene beside the person from which on nothing is followed: the camera, or all of the light, has
-changed."""
+"""Share of the picture that differs from the scene beside the person from which on nothing is followed: the camera, or all of the light,
+has changed."""
 AROUND = 5
 """Distance in pixels to which a change of the background tells how the pixels beside it may have changed."""
 BESIDE = 4
@@ -74,8 +75,8 @@ class MaintainedSegmenter:
         due, ages = np.zeros(held.shape, np.uint8), (round(LASTING / INTERVAL), round(STOOD / INTERVAL))
         planes = smoothed(to_planes(seen.image), classifier.smoothing)
         assert isinstance(self._learnt.classifier, ChannelClassifier)
-        found = watch(seen.label, held, planes, self._learnt.classifier.mean, self._shift, classifier.inverse_sigma, np.float32(classifier.factor), ages, slow,
-                      self._age, self._before, due)
+        found = watch(seen.label, held, planes, self._learnt.classifier.mean, self._shift, classifier.inverse_sigma,
+                      np.float32(classifier.factor), ages, slow, self._age, self._before, due)
         if found:
             self.followed += found
             self._follow(due, slow, classifier)
