@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.silhouette._kernels import watch
-from shadowpuppet.silhouette.maintenance import INTERVAL, LASTING, STOOD, MaintainedSegmenter
+from shadowpuppet.silhouette.maintenance import INTERVAL, LASTING, MaintainedSegmenter
 
 SIZE = (72, 96)
 PERSON = (slice(20, 68), slice(40, 54))
@@ -89,10 +89,10 @@ def test_what_the_person_touches_is_held_and_is_followed_after_they_have_left_it
         assert alike(mask, PERSON, touching) > 0.9
     away = (PERSON[0], slice(10, 24))
     inner, learnt_mean = (slice(27, 37), slice(57, 65)), maintained.segmenter.background.mean
-    for n, time in enumerate(seconds(20 + STOOD - 1, 20)):
+    for n, time in enumerate(seconds(29, 20)):
         maintained(frame(n, away, touching), time)
     assert (maintained.segmenter.background.mean[inner] == learnt_mean[inner]).all()
-    for n, time in enumerate(seconds(20 + STOOD + 2, 20 + STOOD - 1)):
+    for n, time in enumerate(seconds(32, 29)):
         maintained(frame(n, away, touching), time)
     assert (maintained.segmenter.background.mean[inner] != learnt_mean[inner]).any(axis=2).all()
 
@@ -109,12 +109,43 @@ def test_light_that_wanders_behind_the_person_is_followed():
     assert without[-1] < 0.7
 
 
-def test_a_camera_that_sees_another_place_changes_nothing():
-    maintained = MaintainedSegmenter(learnt())
-    other = np.random.default_rng(5).integers(0, 255, (*SIZE, 3)).astype(np.uint8)
-    for time in seconds(8):
-        maintained(other, time)
+def test_a_change_nearly_everywhere_is_not_followed():
+    """It is the camera, or all of the light."""
+    maintained = MaintainedSegmenter(learnt(light=False, stabilise=False))
+    image = frame(0, None)
+    for y in range(2, 70, 10):
+        for x in range(2, 94, 10):
+            image[y : y + 8, x : x + 8] = (20, 200, 20)
+    for time in seconds(6):
+        mask = maintained(image, time)
+    assert mask.mean() < 0.1
     assert maintained.followed == 0
+
+
+def looks(held: int, planes: list[int], shift: int, times: int = 1) -> list[bool]:
+    """Whether one pixel of a scene of 100, held or not, is due at each look, with the surroundings changed by `shift`."""
+    slow, age, before = np.zeros((1, 1, 3), np.float32), np.zeros((1, 1), np.uint8), np.zeros((1, 1), np.uint8)
+    scene, sigma = np.full((1, 1, 3), 100, np.float32), np.full((1, 1, 3), 0.2, np.float32)
+    out = []
+    for _ in range(times):
+        due = np.zeros((1, 1), np.uint8)
+        watch(np.ones((1, 1), np.uint8), np.full((1, 1), held, np.uint8), np.array(planes, np.uint8)[None, None], scene,
+              np.array([shift, 0, 0], np.float32)[None, None], sigma, np.float32(2), (4, 20), slow, age, before, due)
+        out.append(bool(due[0, 0]))
+    return out
+
+
+@pytest.mark.parametrize("held", [0, 1, 2])
+def test_a_pixel_that_its_surroundings_explain_is_due_at_the_second_look(held):
+    assert looks(held, [140, 100, 100], 40, 2) == [False, True]
+    assert looks(held, [120, 100, 100], 40, 2) == [False, True]  # half in the light
+    assert looks(held, [102, 100, 100], 40, 2) == [False, True]  # in none, as it was learnt
+
+
+def test_a_pixel_on_the_person_that_nothing_explains_is_never_due():
+    assert not any(looks(2, [140, 100, 100], 0, 100))
+    assert not any(looks(2, [140, 130, 100], 40, 100))
+    assert not any(looks(1, [60, 100, 100], 40, 100))
 
 
 def test_the_same_film_has_the_same_masks():
