@@ -90,11 +90,11 @@ def _explained(planes, scene, shift, inverse_sigma, factor):
 
 @compiled(nogil=True)
 def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, age, before, due):
-    """Number of pixels that become background as they look now; they are set in `due` (H, W).
+    """Number of pixels that are to become background as they look now; they are set in `due` (H, W).
 
-    They are those that look alike, unlike the background, for long enough, and those that look, for the second time, like the scene as
-    learnt, or as if the scene there had changed as it has around them. A pixel on or near the person that looks as before neither ages nor
-    starts anew.
+    1 in `due`: they have looked alike, unlike the background, for long enough; 2: the same beside pixels that have changed, or they look,
+    for the second time, like the scene as learnt, or as if the scene there had changed as it has around them. A pixel on or near the person
+    that looks as before neither ages nor starts anew.
 
     label: of the pixels (H, W), 0 background; held (H, W): 2 on the person, 1 near them, else 0; planes (H, W, 3), uint8, Y, Cr, Cb,
     smoothed; scene: the same as learnt, and shift: how the background has changed around a pixel, 0 where it has not, both (H, W, 3),
@@ -121,7 +121,9 @@ def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, 
                 age[y, x], stood = 0, max(stood, near // 2)
             elif not near:
                 age[y, x] = age[y, x] + 1 if alike and age[y, x] else 1
-            due[y, x] = (explained and again) or (not near and age[y, x] >= ages[stood])
+            lasting = not near and age[y, x] >= ages[stood]
+            beside = shift[y, x, 0] != 0 or shift[y, x, 1] != 0 or shift[y, x, 2] != 0
+            due[y, x] = 2 if (explained and again) or (lasting and beside) else int(lasting)
             share = np.float32(1) / max(age[y, x], 1) if alike and not explained else np.float32(1)
             for c in range(3):
                 slow[y, x, c] += (planes[y, x, c] - slow[y, x, c]) * share

@@ -30,6 +30,8 @@ MAX_SHARE = 0.4
 has changed."""
 AROUND = 5
 """Distance in pixels to which a change of the background tells how the pixels beside it may have changed."""
+SPECKS = 2e-4
+"""Least share of the picture that changes at once where nothing beside has changed before: fewer pixels are noise."""
 BESIDE = 4
 """Pixels around a change whose assumed noise changes with it: smoothing and edges reach that far."""
 
@@ -77,8 +79,10 @@ class MaintainedSegmenter:
         assert isinstance(self._learnt.classifier, ChannelClassifier)
         found = watch(seen.label, held, planes, self._learnt.classifier.mean, self._shift, classifier.inverse_sigma,
                       np.float32(classifier.factor), ages, slow, self._age, self._before, due)
-        if found:
-            self.followed += found
+        if np.count_nonzero(due == 1) < SPECKS * due.size:
+            due &= 2
+        if found and due.any():
+            self.followed += np.count_nonzero(due)
             self._follow(due, slow, classifier)
 
     def _follow(self, due: NDArray[np.uint8], slow: NDArray[np.float32], classifier: ChannelClassifier) -> None:
