@@ -87,6 +87,8 @@ def test_what_the_person_touches_is_held_and_is_followed_after_they_have_left_it
     for n, time in enumerate(seconds(20)):
         mask = maintained(frame(n, thing=touching), time)
         assert alike(mask, PERSON, touching) > 0.9
+    for n, left in enumerate(range(40, 9, -1)):
+        maintained(frame(n, (PERSON[0], slice(left, left + 14)), touching), 20 - 0.01 * (40 - left))
     away = (PERSON[0], slice(10, 24))
     inner, learnt_mean = (slice(27, 37), slice(57, 65)), maintained.segmenter.background.mean
     for n, time in enumerate(seconds(29, 20)):

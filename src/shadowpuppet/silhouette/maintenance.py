@@ -25,6 +25,8 @@ LASTING, STOOD = 2.0, 10.0
 background once."""
 MARGIN = 0.05
 """Distance to the person up to which pixels are held, over the height of the silhouette."""
+GOES_ON = 0.6
+"""Least overlap of the silhouettes of a frame and the last."""
 MAX_SHARE = 0.4
 """Share of the picture that differs from the scene beside the person from which on nothing is followed: the camera, or all of the light,
 has changed."""
@@ -50,6 +52,7 @@ class MaintainedSegmenter:
         self.followed = 0
         """Number of pixels that have become background so far, each as often as it has."""
         self._next = -np.inf
+        self._person: NDArray[np.uint8] | None = None
         shape = segmenter.background.shape
         self._age, self._before = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
         self._learnt = segmenter
@@ -60,10 +63,24 @@ class MaintainedSegmenter:
         """The person's mask (H, W) in a frame (H, W, 3) or (H, W) at `time` (s). Raises `SilhouetteError` for a frame that does not fit."""
         labelled = self.segmenter.labelled(image)
         mask = self.segmenter.finished(labelled)
-        if self._slow is not None and time >= self._next:
+        if self._slow is not None and self._goes_on(mask) and time >= self._next:
             self._next = time + INTERVAL - 1e-6
             self._look(labelled, mask, self._slow)
         return mask
+
+    def _goes_on(self, mask: NDArray[np.bool_]) -> bool:
+        """Whether a frame's mask (H, W) is the last one's person. If it jumps, to a patch of light that is larger than the person for
+        example, nothing is followed until it is back: the person may be what is beside it."""
+        import cv2
+
+        bits = mask.view(np.uint8)
+        if self._person is not None:
+            both = cv2.countNonZero(cv2.bitwise_and(bits, self._person))
+            either = cv2.countNonZero(cv2.bitwise_or(bits, self._person))
+            if both < GOES_ON * either:
+                return False
+        self._person = bits
+        return True
 
     def _look(self, seen: Labelled, mask: NDArray[np.bool_], slow: NDArray[np.float32]) -> None:
         from shadowpuppet.silhouette._kernels import watch
