@@ -54,6 +54,12 @@ def _thing(**times: float) -> dict[str, Any]:
     return {"obstacles": [{"kind": "pillar", "ahead": 0.7, "left": 0.35, **times}]}
 
 
+def _moved_chair() -> dict[str, Any]:
+    """A chair in the empty scene, too, that stands elsewhere from second 2 on."""
+    return {"obstacles": [{"kind": "chair", "ahead": -0.3, "left": 1.4, "leaves": 2.0},
+                          {"kind": "chair", "ahead": -0.2, "left": 0.85, "turn_deg": 30, "enters": 2.0}]}  # fmt: skip
+
+
 CROSSING = {"turn_deg": 90, "motion": {"motion": "walk", "path": "line", "size": 5.5}}
 """A person who walks past, in the picture between the rows' begin and end."""
 ONE: tuple[Row, ...] = (
@@ -71,6 +77,7 @@ ONE: tuple[Row, ...] = (
     Row("flicker of 20 %", "flicker 0.2"),
     _stays("a lamp switched on, 1.5", "lamp 1.5"),
     _stays("a lamp switched off, 0.5", "lamp 0.5"),
+    Row("a patch of sun, 1.5, wanders", "sun 1.5 drift"),
     Row("vignetting of 20 %", "vignetting 0.2"),
     Row("vignetting of 50 %", "vignetting 0.5"),
     Row("noise of 5", "noise 5"),
@@ -94,6 +101,7 @@ ONE: tuple[Row, ...] = (
     _passes("leaves for 2 s", "absent", 2.5, 4.5),
     Row("a pillar comes and stays", begin=3, scene=_thing(enters=3.0)),
     Row("a pillar comes for 1.5 s", begin=2.5, end=4, scene=_thing(enters=2.5, leaves=4.0)),
+    Row("a chair beside is moved", begin=2, scene=_moved_chair()),
     Row("a second person 1 m aside", scene=_beside(ahead=0.0, left=1.0)),
     Row("a second person passes behind", begin=2, end=5.5, scene=_beside(ahead=-1.2, left=0.0, **CROSSING)),
     Row("a second person passes in front", begin=2.7, end=4.7, scene=_beside(ahead=0.5, left=0.0, **CROSSING)),

@@ -18,6 +18,7 @@ KEYS = {
     "mono.ratio_opencv_arm": ("OpenCV's time over ours, an arm's stage", ".1f"),
     "mono.ratio_naive_frame": ("the naive filter's time over ours, a frame", ".0f"),
     "mono.ratio_boxes": ("boxes' time over cardbox's", ".2f"),
+    "mono.ratio_naive_correction": ("plain correction's time over ours, clean film", ".0f"),
     "mono.step_fps": ("frames/s of the filter, Table I", ".0f"),
     "mono.default_fps": ("frames/s of the filter, default preset", ".0f"),
     "mono.chain_fps": ("frames/s from film to pose, default preset, one core", ".0f"),

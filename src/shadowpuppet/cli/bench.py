@@ -21,6 +21,7 @@ MONO_ROWS = (
     ("default", "a frame of the default filter", 1e3, "ms", ""),
     ("silhouette", "a frame's silhouette, 640 x 480", 1e3, "ms", ""),
     ("correct", "  of this, light and movement looked for", 1e3, "ms", "mono.ratio_correction"),
+    ("naive_correct", "  plain OpenCV and NumPy: one shift, one gain", 1e3, "ms", "mono.ratio_naive_correction"),
     ("correct_moved", "  a nudged camera's frame shifted back", 1e3, "ms", "mono.ratio_correction_moved"),
     ("correct_uneven", "  an uneven change of light undone", 1e3, "ms", "mono.ratio_correction_uneven"),
 )

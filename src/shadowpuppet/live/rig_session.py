@@ -22,7 +22,7 @@ from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
-from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.pipeline.rig import FrameSet, Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.pipeline.survey import OPENED, OPENING
@@ -51,7 +51,7 @@ class RigSession(LiveSession):
         self._worked = tuple(camera.resized(worked_size(camera.size, self.options.max_size)) for camera in self.full)
         body = average_body(self.options.multiview.body)
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
-        self._silhouettes: list[Silhouettes] = []
+        self._segment: list[Segment] = []
         given = self.scene if self.scene and all(self.scene) else None
         self.begin_learning()
         self.begin_waiting()
@@ -112,7 +112,7 @@ class RigSession(LiveSession):
 
     def _learnt(self, scenes: list[list[Image]]) -> None:
         self.scene = scenes
-        self._silhouettes = [Silhouettes("live", learn_background(scene, self.options.silhouette)) for scene in scenes]
+        self._segment = [Silhouettes("live", learn_background(scene, self.options.silhouette)).following() for scene in scenes]
         self.phase, self._state, self._before = ("tracking" if self.subject else "waiting"), None, None
 
     def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
@@ -155,7 +155,7 @@ class RigSession(LiveSession):
         return tuple(map(scaled, shot.images, self._worked))
 
     def _masks(self, shot: SnapshotSet, images: tuple[Image, ...]) -> tuple[Mask, ...]:
-        return tuple(silhouettes(CameraFrame(shot.captured, image, None)) for silhouettes, image in zip(self._silhouettes, images))
+        return tuple(segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images))
 
     def _forget_time(self) -> None:
         for collector in self._collectors:

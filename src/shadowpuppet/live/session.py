@@ -19,6 +19,7 @@ from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
 from shadowpuppet.pipeline.person import MonocularSubject
+from shadowpuppet.pipeline.rig import Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_settings
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
@@ -49,6 +50,7 @@ class Session(LiveSession):
         self._recent: list[Image] = []
         self._silhouettes: Silhouettes | None = None
         self._clean: Silhouettes | None = None
+        self._segment: Segment | None = None
         self.begin_learning()
         self.begin_waiting()
         if self.scene:
@@ -148,6 +150,7 @@ class Session(LiveSession):
 
         self.scene, self._silhouettes = scene, silhouettes(asked)
         self._clean = self._silhouettes if clean == asked else silhouettes(clean)
+        self._segment = self._silhouettes.following()
         self.phase, self._state, self._before = ("tracking" if self.fit else "waiting"), None, None
 
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
@@ -155,9 +158,9 @@ class Session(LiveSession):
 
     def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
         """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
-        silhouettes = self._silhouettes if self.phase == "tracking" else self._clean
-        assert silhouettes is not None
-        return (silhouettes(CameraFrame(shot.captured, images[0], None)),)
+        segment = self._segment if self.phase == "tracking" else self._clean
+        assert segment is not None
+        return (segment(CameraFrame(shot.captured, images[0], None)),)
 
     def _forget_time(self) -> None:
         self._collector.wait()

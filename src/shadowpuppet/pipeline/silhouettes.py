@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
 from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
 from shadowpuppet.silhouette.clutter import Clutter, find_clutter
+from shadowpuppet.silhouette.maintenance import MaintainedSegmenter
 from shadowpuppet.video import Image
 
 
@@ -43,6 +44,18 @@ class Silhouettes:
         else:
             mask = self._within(self.segmenter(frame.image))
         return mask if self.clutter is None else self.clutter.removed(mask)
+
+    def following(self) -> Callable[[CameraFrame], Mask]:
+        """Makes the masks (H, W) of the film's frames, one after another; with `maintain` the background follows lasting changes."""
+        if self.segmenter is None or not self.segmenter.settings.maintain:
+            return self
+        maintained = MaintainedSegmenter(self.segmenter)
+
+        def mask_of(frame: CameraFrame) -> Mask:
+            mask = self._within(maintained(frame.image, frame.time))
+            return mask if self.clutter is None else self.clutter.removed(mask)
+
+        return mask_of
 
     def elsewhere(self, frame: CameraFrame) -> Mask:
         """The mask (H, W) in a picture that is none of the film's, so that what the person always covers there need not be covered."""
@@ -124,7 +137,8 @@ def _recovered(footage: Footage, sampled: list[Image]) -> RecoveredScene:
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
-    return map(uncluttered_silhouettes(footage, take_sample(footage, options.masks), options), footage.frames(ready=options.masks))
+    silhouettes = uncluttered_silhouettes(footage, take_sample(footage, options.masks), options)
+    return map(silhouettes.following(), footage.frames(ready=options.masks))
 
 
 def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:

@@ -200,7 +200,8 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     try:
         with ExitStack() as stack:
             overlay = stack.enter_context(write_frames(writer.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
-            frames = stack.enter_context(closing(read_frames(survey.rig, survey.silhouettes, ready=options.masks, every=options.every)))
+            segment = [silhouettes.following() for silhouettes in survey.silhouettes]
+            frames = stack.enter_context(closing(read_frames(survey.rig, segment, ready=options.masks, every=options.every)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
             observed = stack.enter_context(closing(subject.observations(frames)))

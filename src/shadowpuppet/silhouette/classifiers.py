@@ -25,7 +25,7 @@ from shadowpuppet.silhouette.background import (
     to_brightness,
     to_planes,
 )
-from shadowpuppet.silhouette.boundary import Labels
+from shadowpuppet.silhouette.boundary import Labels, Window, disc
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -45,6 +45,9 @@ MIN_SAMPLES = 7
 """Number of samples kept, at most twice as many."""
 ROUNDING_MARGIN = 1 - 1e-4
 """Factor on a threshold that keeps it on the safe side of single precision."""
+
+EDGE_JITTER = 0.05
+"""Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 
 Classifier = Callable[[Image], Labels]
 """From a frame (H, W, 3) or (H, W) to its labels (H, W)."""
@@ -100,6 +103,34 @@ class ChannelClassifier:
         reach = np.where(keyed > 0, ROUNDING_MARGIN * self.factor / (self.inverse_sigma * np.sqrt(keyed.sum())), np.float32(256))
         lowest, highest = np.ceil(self.mean - reach), np.floor(self.mean + reach)
         return np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8)
+
+    @cached_property
+    def least_sigma(self) -> Floats:
+        """Least assumed standard deviation in the picture, of shape (3,)."""
+        return np.asarray(1 / self.inverse_sigma.max(axis=(0, 1)), np.float32)
+
+    def with_scene(self, mean: Floats, window: Window) -> ChannelClassifier:
+        """A copy whose background looks like `mean` (H, W, 3), Y, Cr, Cb, not smoothed, in a window of rows and columns. The standard
+        deviation assumed there is the picture's least one, increased at edges."""
+        reach = 2 * round(2 * self.smoothing + 1)
+        rows, columns = (slice(max(each.start - reach, 0), each.stop + reach) for each in window)
+        inner = tuple(slice(each.start - wide.start, each.stop - wide.start) for each, wide in zip(window, (rows, columns)))
+        smooth = smoothed(np.ascontiguousarray(mean[rows, columns]), self.smoothing)
+        sigma = np.hypot(self.least_sigma, edge_jitter(smooth))
+        part = replace(self, mean=smooth[inner], inverse_sigma=(1 / sigma).astype(np.float32)[inner])
+        out = replace(self, mean=self.mean.copy(), inverse_sigma=self.inverse_sigma.copy())
+        lowest, highest = (bound.copy() for bound in self.surely_background)
+        out.mean[window], out.inverse_sigma[window] = part.mean, part.inverse_sigma
+        lowest[window], highest[window] = part.surely_background
+        out.__dict__.update(surely_background=(lowest, highest), least_sigma=self.least_sigma)  # only the window's are computed again
+        return out
+
+
+def edge_jitter(mean: np.ndarray) -> np.ndarray:
+    """Standard deviation that is assumed at the edges of a smoothed background (H, W, 3), beyond that elsewhere."""
+    import cv2
+
+    return EDGE_JITTER * np.asarray(cv2.dilate(mean, disc(1)) - cv2.erode(mean, disc(1)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, at_half_contrast, disc
+from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, Window, at_half_contrast, disc
 
-Window = tuple[slice, slice]
-"""Rows and columns of a picture."""
 MIN_PART_SHARE = 0.02
 """Least size of another part of the person (a hand), over the largest part's."""
 MAX_PART_GAP = 0.06

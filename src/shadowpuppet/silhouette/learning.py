@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
 from shadowpuppet.silhouette.background import Background, FilmNoise, Image
-from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, disc, outline_width
+from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
-from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene
+from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene, edge_jitter
 from shadowpuppet.silhouette.cleanup import Window, coarse_person
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
@@ -31,8 +31,6 @@ FILM_SAMPLE = 12
 """Number of frames in which the film's noise and the blur of its outlines are measured; at most twice as many are used."""
 MIN_EDGE_CONTRAST = 1.5
 """Least contrast on an outline, over that of a pixel that may be foreground."""
-EDGE_JITTER = 0.05
-"""Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 MAX_GREY_CHROMA = 2
 """Greatest deviation of colours from neutral in a film without colour, grey levels."""
 
@@ -80,12 +78,9 @@ def _channel_classifier(background: Background, frames: list[Image], settings: S
 def assumed_sigma(background: Background, noise: FilmNoise, noise_floor: float) -> np.ndarray:
     """Standard deviation (H, W, 3) of Y, Cr, Cb assumed for the empty scene: the greatest of the learnt one, the film's noise and
     the floor, increased at the background's edges."""
-    import cv2
-
     mean = scene.smoothed(background.mean, noise.smoothing)
     floor = np.maximum(noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR]), NOISE_TAIL_FACTOR * noise.sigma)
-    across = cv2.dilate(mean, disc(1)) - cv2.erode(mean, disc(1))
-    return np.hypot(np.maximum(background.smooth_sigma * noise.share, np.maximum(floor, 1e-3)), EDGE_JITTER * across)
+    return np.hypot(np.maximum(background.smooth_sigma * noise.share, np.maximum(floor, 1e-3)), edge_jitter(mean))
 
 
 def _choose(background: Background, frames: list[Image], channels: ChannelClassifier, settings: SilhouetteSettings) -> KeyChoice:

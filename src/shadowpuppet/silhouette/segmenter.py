@@ -4,23 +4,37 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
-from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile
+from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile, Labels
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, Classifier
 from shadowpuppet.silhouette.cleanup import Window, clean
 from shadowpuppet.silhouette.correction.frame_correction import Correction
+from shadowpuppet.silhouette.correction.registration import Gap
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 WHOLE_IMAGE: Window = (slice(None), slice(None))
 
 
+class Labelled(NamedTuple):
+    """A frame with its pixels classified."""
+
+    image: Image
+    """The corrected frame (H, W, 3) or (H, W)."""
+    label: Labels
+    """0 background, 1 perhaps a person, 2 surely a person (H, W)."""
+    gap: Gap | None
+    """Pixels that a moved camera does not show; None if it stands still."""
+
+
 @dataclass(frozen=True, eq=False)
 class Segmenter:
-    """A learnt background: `segmenter(image)` is the mask of the person. It has no state: a mask depends on its frame alone.
+    """A learnt background: `segmenter(image)` is the mask of the person. It has no state: a mask depends on its frame alone
+    (`maintenance.MaintainedSegmenter` has one).
 
     The steps of a call, in order:
 
@@ -58,13 +72,22 @@ class Segmenter:
 
         Raises `SilhouetteError` for a frame that does not fit the background.
         """
+        return self.finished(self.labelled(image))
+
+    def labelled(self, image: Image) -> Labelled:
+        """A frame's pixels after step 3. Raises `SilhouetteError` for a frame that does not fit the background."""
         self._check(image)
         gap = None
         if self.correction is not None:
-            image, gap, _ = self.correction(image)
+            image, gap, *_ = self.correction(image)
         label = self.classifier(image)
         if self.covered is not None:
             label[self.covered] = 2
+        return Labelled(image, label, gap)
+
+    def finished(self, labelled: Labelled) -> NDArray[np.bool_]:
+        """The mask (H, W) that step 4 makes of it."""
+        image, label, gap = labelled
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.edge)
         mask = label > 0 if self.covered is None else (label > 0) | self.covered

@@ -36,6 +36,9 @@ class SilhouetteSettings:
     stabilise: bool | None = None
     """Whether to follow a nudged or shaking camera, frame by frame, so that masks are those of a camera that stands still. By default for
     every method but `averaging`."""
+    maintain: bool = False
+    """Whether the background follows lasting changes while tracking: things smaller than the person that were moved and stay, light that
+    wanders slowly. Not for a person who hardly moves, who may become background."""
     clean: bool | None = None
     """Whether to remove specks and small holes, keep only the person, and move the outline to half of the contrast. By default for
     every method but `averaging`."""

@@ -39,13 +39,13 @@ def test_gains_are_found_whatever_the_person_covers(gains, share, noise):
 def test_a_constant_light_leaves_the_picture_as_it_is():
     scene = scene_of()
     image = filmed(scene, 1 + NEGLIGIBLE / 4, 0.3)
-    assert Light(scene).normalised(image) is image
+    assert Light(scene).normalised(image)[0] is image
 
 
 def test_a_picture_too_dark_to_tell_is_left_as_it_is():
     scene = scene_of()
     black = np.zeros_like(scene)
-    assert Light(scene).normalised(black) is black
+    assert Light(scene).normalised(black)[0] is black
 
 
 def test_a_channel_that_shows_no_gain_has_that_of_the_others():
@@ -60,7 +60,7 @@ def test_clipped_pixels_of_a_bright_scene_are_not_taken_for_a_person():
     scene[:20] = 225
     image = filmed(scene, 1.3, noise=1)
     assert (image[:20] == 255).all()
-    assert np.abs(Light(scene).normalised(image)[:20].astype(int) - 225).max() <= 2
+    assert np.abs(Light(scene).normalised(image)[0][:20].astype(int) - 225).max() <= 2
 
 
 def check_silhouettes(gain, grey: bool) -> None:

@@ -76,6 +76,16 @@ def test_a_lamp_lights_a_part_of_the_picture_and_another_part_less():
     assert len(places) > 3
 
 
+def test_the_sun_comes_and_wanders_inward():
+    fault = Fault(kind="sun", amount=1.6, drift=True)
+    change = [lit(fault, index)[..., 0].max(axis=0) / 0.5 for index in range(COUNT)]
+    assert change[0].max() == pytest.approx(1)
+    assert all(each.max() > 1.5 and each.min() < 1.01 for each in change[COUNT // 5 :])
+    places = [abs(float(np.average(np.arange(48) - 23.5, weights=each - 1))) for each in change[COUNT // 5 :]]
+    assert (np.diff(places) < 0).all()
+    assert places[0] - places[-1] > 0.1 * 48
+
+
 def test_a_drift_builds_up_evenly_and_stays():
     fault = Fault(kind="gain", amount=2, begin=1, end=2, drift=True)
     seen = [lit(fault, index)[0, 0, 0] / 0.5 for index in range(COUNT)]

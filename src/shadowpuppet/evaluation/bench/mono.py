@@ -29,7 +29,8 @@ FIGURES = Figures(
     ratios={"mono.ratio_opencv_full": ("opencv", "particle"), "mono.ratio_opencv_arm": ("opencv_arm", "arm"),
             "mono.ratio_naive_frame": ("naive_frame", "step"), "mono.ratio_boxes": ("boxes", "particle"),
             "mono.ratio_correction": ("correct", "silhouette"), "mono.ratio_correction_moved": ("correct_moved", "silhouette"),
-            "mono.ratio_correction_uneven": ("correct_uneven", "silhouette")},
+            "mono.ratio_correction_uneven": ("correct_uneven", "silhouette"),
+            "mono.ratio_naive_correction": ("naive_correct", "correct")},
 )  # fmt: skip
 
 
@@ -64,6 +65,7 @@ def contenders() -> dict[str, Contender]:
         "naive_frame": Contender(lambda: naive_mono.frame(rng, full.picture, settings, full.pose, full.mask, NAIVE_PARTICLES), share),
         "silhouette": Contender(film.segment),
         "correct": Contender(lambda: film.correct("clean")),
+        "naive_correct": Contender(film.correct_plainly),
         "correct_moved": Contender(lambda: film.correct("moved")),
         "correct_uneven": Contender(lambda: film.correct("uneven")),
     }

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette import Segmenter, learn_background
 from shadowpuppet.silhouette.correction.frame_correction import Corrected
+from shadowpuppet.silhouette.correction.light import NEGLIGIBLE
+from shadowpuppet.silhouette.correction.registration import STILL
 
 Image = NDArray[np.uint8]
 SIZE = (640, 480)
@@ -62,6 +64,21 @@ class SilhouetteCase:
         """What of `segment` looks for changes of light and movement, and undoes them, in the frame of a name."""
         assert self.segmenter.correction is not None
         return self.segmenter.correction(self.frames[name])
+
+
+    def correct_plainly(self) -> Image:
+        """A straightforward correction of the clean frame by OpenCV and NumPy: phase correlation (a shift alone) of the whole picture with
+        the empty scene, and the median ratio of all pixels, per channel; none is undone if it is small."""
+        import cv2
+
+        assert self.segmenter.correction is not None
+        image, scene = self.frames["clean"], self.segmenter.correction.scene
+        before, after = (cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY).astype(np.float32) for picture in (scene, image))
+        shift, _ = cv2.phaseCorrelate(before, after)
+        if np.hypot(shift[0], shift[1]) >= STILL:
+            image = np.asarray(cv2.warpAffine(image, np.array([[1, 0, -shift[0]], [0, 1, -shift[1]]]), SIZE), np.uint8)
+        gains = np.median(np.maximum(image, 1) / np.maximum(scene, np.float32(1)), axis=(0, 1))
+        return image if np.abs(np.log(gains)).max() < NEGLIGIBLE else np.clip(np.rint(image / gains), 0, 255).astype(np.uint8)
 
 
 def _filmed(picture: NDArray[np.floating], seed: int) -> Image:

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
-from shadowpuppet.silhouette.correction.frame_correction import Correction
-from shadowpuppet.silhouette.correction.registration import Homography
+from shadowpuppet.silhouette.correction.frame_correction import Corrected, Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
 
 # Limits of the warnings. Films in good light have a noise of 0.9 to 1.3; sensor noise of sd 15 leaves 5.8, H.264 at crf 32 leaves 3.0.
@@ -98,7 +97,7 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     frames = [frame for run in runs for frame in run]
     each = [[correction(image) for _, image in run] for run in runs]
     corrected = [[frame.image for frame in run] for run in each]
-    states = [_state(correction, image, frame.movement) for (_, image), frame in zip(frames, itertools.chain(*each))]
+    states = [_state(correction, image, frame) for (_, image), frame in zip(frames, itertools.chain(*each))]
     gains = np.concatenate([state.gains for state in states])
     moved = np.array([state.moved for state in states])
     still = np.flatnonzero(moved == 0)
@@ -113,14 +112,12 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     )  # fmt: skip
 
 
-def _state(correction: Correction, image: Image, movement: Homography | None) -> _State:
-    moved, matched = 0.0, True
-    if correction.registration is not None:
-        matched = correction.registration.matches(image, movement)
-        if movement is not None:
-            moved, image = correction.registration.pixels(movement), correction.registration.undone(image, movement)[0]
-    gains = np.ones(1) if correction.light is None else correction.light.gains(image)
-    return _State(gains, moved, matched)
+def _state(correction: Correction, image: Image, frame: Corrected) -> _State:
+    registration = correction.registration
+    if registration is None:
+        return _State(frame.gains, 0.0, True)
+    moved = 0.0 if frame.movement is None else registration.pixels(frame.movement)
+    return _State(frame.gains, moved, registration.matches(image, frame.movement))
 
 
 def _changes(runs: Sequence[Sequence[Image]]) -> tuple[float | None, float | None]:

@@ -6,6 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shadowpuppet.silhouette.background import Image
 from shadowpuppet.silhouette.cleanup import Window
 from shadowpuppet.silhouette.correction.light import Light
@@ -22,6 +25,8 @@ class Corrected(NamedTuple):
     """Pixels that a moved camera does not show; None if it stands still."""
     movement: Homography | None
     """The camera's movement since the empty scene; None if it stands still."""
+    gains: NDArray[np.float64]
+    """Gain (C,) of each channel over the empty scene; 1 if it is negligible, or not followed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,15 +51,15 @@ class Correction:
     def __call__(self, image: Image) -> Corrected:
         """The corrected frame; the frame itself if nothing is to be corrected. What a moved camera does not show is the empty scene."""
         movement = None if self.registration is None else self.registration.movement(image)
-        gap = None
+        gap, gains = None, np.ones(1)
         if self.registration is not None and movement is not None:
             image, gap = self.registration.undone(image, movement)
         if self.light is not None:
-            image = self.light.normalised(image)
+            image, gains = self.light.normalised(image)
         if gap is not None:
             image = gap.blanked(image, self.scene)
         if self.region is not None:
             blank = self.scene.copy()
             blank[self.region] = image[self.region]
             image = blank
-        return Corrected(image, gap, movement)
+        return Corrected(image, gap, movement, gains)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +43,8 @@ TILTED = 0.005
 """Share of the pixels by which a surface is held level: a corner without informative pixels is not bent away."""
 BLOCKS, MISFIT = (8, 6), 0.07
 """Blocks across and down, and the greatest median of what a surface leaves of their log gain: above, it is no light that has changed."""
-UNIT = 128
-"""A factor of 1 in 8 bits."""
+LEVELS = 128
+"""Number of bins for the median distance of log gains from a surface."""
 NODES = 24
 """Number of the surface's nodes across the picture, between which it is interpolated."""
 
@@ -61,46 +62,50 @@ class Light:
         The mode is the background's even if the person covers nearly half of the picture. A channel in which too few pixels
         show a gain, such as red in a blue room, has the mean of the others; all have 1 if no channel shows one.
         """
-        return self._gains(self._pixels(image))
+        return self._gains(self._pixels(image).reshape(self._sampled[0].shape))
 
-    def normalised(self, image: Image) -> Image:
-        """The picture divided by its gains; the picture itself if they are negligible.
+    def normalised(self, image: Image) -> tuple[Image, NDArray[np.float64]]:
+        """The picture divided by its gains, and the gain (C,) of each channel; the picture itself, and gains of 1, if they are negligible.
 
         Where the scene under this light would be clipped, the picture's difference from that is kept, not its ratio.
         """
-        import cv2
-
-        pixels = self._pixels(image)
-        gains = self._gains(pixels)
-        surface = self._surface(pixels, gains)
+        quick = self._ratios(image, self._few)
+        if self._negligible(quick):
+            return image, np.ones(self._channels)
+        gains = self.gains(image)
+        surface = self._surface(image, quick, gains)
         if surface is None and np.abs(np.log(gains)).max() < NEGLIGIBLE:
-            return image
-        table = np.clip(np.rint(np.arange(256)[:, None] / gains), 0, 255).astype(np.uint8)
-        out = np.asarray(cv2.LUT(image, table[None] if image.ndim == 3 else table[:, 0]), np.uint8)
-        if surface is not None:
-            return self._evened(out, gains, surface)
-        if gains.max() > 1:
-            clipped = cv2.subtract(self.scene, np.append(np.floor(CLIPPED / gains), np.zeros(4 - len(gains))))
-            out = np.asarray(cv2.add(out, clipped), np.uint8)
-        return out
+            return image, np.ones(self._channels)
+        return self._divided(image, gains, surface), gains
 
     def surface(self, image: Image) -> NDArray[np.float64] | None:
         """Coefficients (6, C) of the log gain over the picture, beyond that of `gains`; None if light has changed evenly.
 
         The terms are 1, x, y, x^2, x y, y^2, with x and y from -1 to 1 across the picture's width and its height.
         """
-        pixels = self._pixels(image)
-        return self._surface(pixels, self._gains(pixels))
+        return self._surface(image, self._ratios(image, self._few), self.gains(image))
 
     def _pixels(self, image: Image) -> Image:
-        """The sampled pixels (n, C) of a picture."""
-        return image[:: self._step, :: self._step].reshape(self._sampled[0].shape)
+        """The sampled pixels (h, w, C) of a picture."""
+        view = image[:: self._step, :: self._step]
+        return view if image.ndim == 3 else view[..., None]
 
-    def _ratios(self, pixels: Image, some: slice = slice(None)) -> tuple[Floats, NDArray[np.bool_]]:
-        """Log ratios of picture to scene at some of its sampled pixels (n, C), and whether each shows a gain (n, C)."""
-        levels, informative = self._sampled
-        after = pixels[some]
-        return LOG[after] - levels[some], informative[some] & (after > DARK // 2) & (after < BRIGHT)
+    def _ratios(self, image: Image, pixels: _Sampled) -> _Ratios:
+        """Log ratios of picture to scene at sampled pixels."""
+        from shadowpuppet.silhouette.correction._kernels import log_ratios
+
+        rows, columns, levels, informative, terms = pixels
+        beyond, use = np.empty(levels.shape, np.float32), np.empty(levels.shape, np.float32)
+        log_ratios(self._pixels(image), rows, columns, levels, informative, LOG, (DARK // 2, BRIGHT), beyond, use)
+        return _Ratios(terms, beyond, use)
+
+    def _negligible(self, few: _Ratios) -> bool:
+        """Whether some log ratios certainly show no change of light: less than half of what would be corrected."""
+        if few.use.sum() < MIN_SHARE * few.use.size:
+            return False
+        found, weights = _fit(few, np.zeros(6), 1)
+        own = np.einsum("cn,cn->c", weights, few.beyond) / np.maximum(weights.sum(1), 1e-6)
+        return bool(np.abs(own).max() < NEGLIGIBLE / 2 and np.ptp(NODE_TERMS @ found) < UNEVEN)
 
     def _gains(self, pixels: Image) -> NDArray[np.float64]:
         from shadowpuppet.silhouette.correction._kernels import modes
@@ -110,45 +115,48 @@ class Light:
         known = np.isfinite(logs)
         return np.exp(np.where(known, BIN * logs, BIN * logs[known].mean() if known.any() else 0.0))
 
-    def _surface(self, pixels: Image, gains: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        some, logs = slice(None, None, SPARSE), np.log(gains).astype(np.float32)
-        (few, use), terms = self._ratios(pixels, some), self._terms
-        few = few - logs
-        if use.sum() < 50 * len(gains):
+    def _surface(self, image: Image, few: _Ratios, gains: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        few = few.less(np.log(gains))
+        if few.use.sum() < 50 * len(gains):
             return None
-        quick = _fitted(terms[some], few, use, np.zeros(6), 1)
-        if np.ptp(NODE_TERMS @ quick) < 2 * UNEVEN:
+        shared, _ = _fit(few, np.zeros(6), 1)
+        if np.ptp(NODE_TERMS @ shared) < 2 * UNEVEN:
             return None
-        ratios, informative = self._ratios(pixels)
-        beyond = ratios - logs
-        shared = _fitted(terms, beyond, informative, _fitted(terms[some], few, use, quick, ROUNDS), 2)
-        beyond -= (terms @ shared.astype(np.float32))[:, None]
-        own = np.column_stack([_fitted(terms, beyond[:, c : c + 1], informative[:, c : c + 1], np.zeros(6), 2) for c in range(len(gains))])
-        return None if self._misfit(beyond - terms @ own.astype(np.float32), informative) > MISFIT else own + shared[:, None]
+        shared, _ = _fit(few, shared, ROUNDS)
+        terms, beyond, use = every = self._ratios(image, self._all).less(np.log(gains))
+        shared, _ = _fit(every, shared, 2)
+        beyond = np.asarray(beyond - shared.astype(np.float32) @ terms, np.float32)
+        own = np.column_stack([_fit(_Ratios(terms, beyond[c : c + 1], use[c : c + 1]), np.zeros(6), 2)[0] for c in range(len(gains))])
+        left = np.asarray(beyond - own.T.astype(np.float32) @ terms, np.float32)
+        return None if self._misfit(left, use) > MISFIT else own + shared[:, None]
 
-    def _evened(self, image: Image, gains: NDArray[np.float64], surface: NDArray[np.float64]) -> Image:
-        """A picture, divided by its gains, divided by the gain of a surface (6, C)."""
+    def _divided(self, image: Image, gains: NDArray[np.float64], surface: NDArray[np.float64] | None) -> Image:
+        """A picture divided by its gains, and by the gain of a surface (6, C) if there is one."""
         import cv2
 
-        def over_picture(nodes: NDArray[np.float64]) -> Image:
-            values = np.clip(np.rint(nodes), 0, 255).astype(np.uint8).reshape(NODES, NODES, -1)
-            return np.asarray(cv2.resize(values, image.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.uint8).reshape(image.shape)
+        from shadowpuppet.silhouette.correction._kernels import divided
 
-        factors = np.exp(-(NODE_TERMS @ surface))
-        out = np.asarray(cv2.multiply(image, over_picture(UNIT * factors), scale=1 / UNIT), np.uint8)
-        reached = CLIPPED * factors / gains
-        if reached.min() < self.scene.max():
-            out = np.asarray(cv2.add(out, cv2.subtract(self.scene, over_picture(reached))), np.uint8)
+        factors = (1 / gains)[None, None].repeat(image.shape[1], 1).astype(np.float32)
+        if surface is not None:
+            nodes = (np.exp(-(NODE_TERMS @ surface)) / gains).astype(np.float32).reshape(NODES, NODES, -1)
+            factors = np.asarray(cv2.resize(nodes, (image.shape[1], NODES), interpolation=cv2.INTER_LINEAR), np.float32)
+        clips, out = bool(CLIPPED * factors.min() < self.scene.max()), np.empty(image.shape, np.uint8)
+        before, scene, factors, after = (each.reshape(len(each), -1) for each in (np.ascontiguousarray(image), self.scene, factors, out))
+        divided(before, scene, factors, clips, after)
         return out
 
-    def _misfit(self, beyond: NDArray[np.floating], informative: NDArray[np.bool_]) -> float:
-        """Median, over blocks of the picture, of the mean log gain (n, C) that is left of informative pixels."""
+    def _misfit(self, beyond: Floats, use: Floats) -> float:
+        """Median, over blocks of the picture, of the mean log gain (C, n) that is left of pixels that count."""
         import cv2
 
         height, width = (-(-side // self._step) for side in self.scene.shape[:2])
-        sums, counts = (cv2.resize(values.reshape(height, width, -1).astype(np.float32), BLOCKS, interpolation=cv2.INTER_AREA)
-                        for values in (beyond * informative, informative))  # fmt: skip
+        sums, counts = (cv2.resize(values.T.reshape(height, width, -1), BLOCKS, interpolation=cv2.INTER_AREA)
+                        for values in (beyond * use, use))  # fmt: skip
         return float(np.median(np.abs(sums / np.maximum(counts, 1e-3))))
+
+    @property
+    def _channels(self) -> int:
+        return self.scene.shape[2] if self.scene.ndim == 3 else 1
 
     @property
     def _step(self) -> int:
@@ -161,11 +169,48 @@ class Light:
         return LOG[pixels], (pixels > DARK) & (pixels < BRIGHT)
 
     @cached_property
-    def _terms(self) -> Floats:
-        """The surface's terms (n, 6) at the sampled pixels."""
-        height, width = self.scene.shape[:2]
-        y, x = np.mgrid[: height : self._step, : width : self._step].reshape(2, -1)
-        return _terms(2 * x / max(width - 1, 1) - 1, 2 * y / max(height - 1, 1) - 1)
+    def _all(self) -> _Sampled:
+        height, width = (-(-side // self._step) for side in self.scene.shape[:2])
+        rows, columns = np.mgrid[:height, :width].reshape(2, -1)
+        x, y = (2 * self._step * each / max(side - 1, 1) - 1 for each, side in zip((columns, rows), self.scene.shape[1::-1]))
+        levels, informative = self._sampled
+        return _Sampled(rows, columns, levels.T.copy(), informative.T.copy(), _terms(x, y).T.copy())
+
+    @cached_property
+    def _few(self) -> _Sampled:
+        """Every so many-th of them."""
+        rows, columns, levels, informative, terms = self._all
+        return _Sampled(rows[::SPARSE].copy(), columns[::SPARSE].copy(), levels[:, ::SPARSE].copy(), informative[:, ::SPARSE].copy(),
+                        terms[:, ::SPARSE].copy())
+
+
+class _Sampled(NamedTuple):
+    """Sampled pixels of the scene."""
+
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    """Of shape (n,), among the rows and columns that are sampled."""
+    levels: Floats
+    """Log levels (C, n)."""
+    informative: NDArray[np.bool_]
+    """Whether each can show a gain (C, n)."""
+    terms: Floats
+    """The surface's terms (6, n)."""
+
+
+class _Ratios(NamedTuple):
+    """Log ratios of a picture to the scene at sampled pixels."""
+
+    terms: Floats
+    """The surface's terms (6, n) at the pixels."""
+    beyond: Floats
+    """Log ratios (C, n)."""
+    use: Floats
+    """1 where picture and scene show a gain (C, n), else 0."""
+
+    def less(self, logs: NDArray[np.float64]) -> _Ratios:
+        """The ratios less log gains (C,)."""
+        return self._replace(beyond=self.beyond - logs.astype(np.float32)[:, None])
 
 
 def _terms(x: NDArray[np.float64], y: NDArray[np.float64]) -> Floats:
@@ -177,21 +222,21 @@ NODE_TERMS = _terms(np.tile(_MIDDLES, NODES), np.repeat(_MIDDLES, NODES))
 """The terms (NODES * NODES, 6) at the nodes, row by row."""
 
 
-def _fitted(terms: Floats, beyond: Floats, informative: NDArray[np.bool_], start: NDArray[np.float64], rounds: int) -> NDArray[np.float64]:
-    """Coefficients (6,) of the surface that most log gains (n, C) of informative pixels lie on, from those of `start`.
+def _fit(ratios: _Ratios, found: NDArray[np.float64], rounds: int) -> tuple[NDArray[np.float64], Floats]:
+    """Coefficients (6,) of the surface that most log ratios lie on, by weighted fits that begin with those in `found`, and the last one's
+    weights (C, n)."""
+    from shadowpuppet.silhouette.correction._kernels import surface_weights
 
-    The weights of each round are Geman and McClure's.
-    """
-    found = start
-    held = TILTED * len(terms) * beyond.shape[1] * np.diag([0, 1, 1, 1, 1, 1])
+    terms, beyond, use = ratios
+    held, weights = TILTED * beyond.size * HELD, np.empty_like(beyond)
+    histogram, (total, moment) = np.empty(LEVELS, np.float32), np.empty((2, terms.shape[1]), np.float32)
     for _ in range(rounds):
-        apart = np.abs(beyond - (terms @ found.astype(np.float32))[:, None])
-        scale = np.clip(1.4826 * np.median(apart[informative]), SPREAD, PERSON_SPREAD)
-        weight = informative / np.square(1 + np.square(apart / np.float32(2 * scale)))
-        weight, moment = weight.sum(1), (weight * beyond).sum(1)
-        found = np.linalg.solve((terms * weight[:, None]).T @ terms + held, terms.T @ moment)
-    return found
+        surface_weights(beyond, use, found.astype(np.float32) @ terms, (SPREAD, PERSON_SPREAD), histogram, weights, total, moment)
+        found = np.asarray(np.linalg.solve((terms * total) @ terms.T + held, terms @ moment), float)
+    return found, weights
 
 
+HELD = np.diag([0.0, 1, 1, 1, 1, 1])
+"""Coefficients that are held."""
 LOG = np.log(np.maximum(np.arange(256), 1)).astype(np.float32)
 """Logarithm of each grey level."""

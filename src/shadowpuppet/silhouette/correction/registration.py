@@ -15,28 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Floats, Image, to_brightness
-
-Homography = NDArray[np.float64]
-"""Of shape (3, 3): pixels of the empty scene to pixels of the frame, in coordinates about the middle over half the width."""
+from shadowpuppet.silhouette.correction.points import (
+    OFFSET,
+    Homography,
+    Points,
+    compared,
+    matrix_of,
+    median_of,
+    refined,
+    searched_shift,
+    solved_step,
+    textured_points,
+)
 
 WIDTH = 160
 """Width of the reduced picture, pixels, about."""
-BLOCKS = 8, 6
-"""Number of blocks across and down; points are taken from each."""
-POINTS = 40
-"""Greatest number of points in a block."""
-MIN_SLOPE = 2.5
-"""Least slope of a point's brightness, grey levels per pixel of the reduced picture: below, it is noise, rounding or a faint shadow."""
-MIN_BLOCKS = 0.25
-"""Least share of blocks with points: a plain wall shows no movement, and moves no silhouette."""
-OFFSET = 16
-"""Added to grey levels before the logarithm: noise of dark pixels counts less."""
 FINE, COARSE = 1.0, 8.0
 """Standard deviations of the smoothing, pixels of the reduced picture: noise is taken off, and what changes more slowly."""
-REACH = 0.1
-"""Greatest shift that is searched, over the width."""
-MIN_SCALE = 0.01
-"""Least assumed standard deviation of a point's difference, log brightness."""
 STILL = 0.4
 """Greatest movement, pixels of the frame at its corners, up to which it is left unchanged."""
 UNLIKE, SEARCHED_FROM = 0.9, 0.6
@@ -44,32 +39,14 @@ UNLIKE, SEARCHED_FROM = 0.9, 0.6
 and light reach 0.7, pictures that have nothing in common 1.4, a nudge in a room with few details 0.8."""
 BETTER = 0.6
 """Greatest such difference under a movement, over that without it: compression leaves 0.65 under a movement that is none."""
-BEND = 0.04
-"""Standard deviation of the corners, over half the width, that is assumed for a change of view beyond shift and roll."""
-OUTSIDE = 1e3
-"""Difference of a point outside the picture."""
-CORRELATION = 4.0
-"""Number of neighbouring points whose differences count as one."""
-STEPS = 8
-"""Greatest number of steps of a refinement."""
+PIECE, BENT = 64, 0.03
+"""Greatest number of pixels in a row over which a movement is taken for linear, and its greatest error by that, pixels."""
 ROUGH, SETTLED = 0.3, 0.05
 """Movement of a step, pixels of the frame, at which the refinement in half of the reduced picture, and in all of it, ends."""
-SEARCHED = 3
-"""Step over the points in the search of shifts."""
-SHIFTS = np.zeros((8, 3))
-SHIFTS[2, 0] = SHIFTS[5, 1] = 1
-SHIFTS[1, 2], SHIFTS[3, 2] = -1, 1
-
-
-class Points(NamedTuple):
-    """Textured points of the empty scene at one reduction."""
-
-    xy: Floats
-    """Their places (N, 2), coordinates about the middle over half the width."""
-    value: Floats
-    """Values of the reduced scene (N,)."""
-    jacobian: Floats
-    """Derivatives of the values with respect to the eight parameters of a homography (N, 8)."""
+SPARSE, FEWER = 3, 0.5
+"""Step over the points in the first test for a movement, and its limits over those of the second, which has all points."""
+NONE = np.eye(3)
+"""No movement."""
 
 
 class Gap(NamedTuple):
@@ -110,27 +87,32 @@ class Registration:
             return None
         fine, coarse = levels
         picture = self._reduced(image)
-        difference = _compared(fine, picture, np.eye(3))
-        if not self._moved(fine, difference):
+        if not self._moved(self._some, picture, FEWER):
+            return None
+        if not self._moved(fine, picture):
             return None
         small = _halved(picture)
         pixel = 2 / self.scene.shape[1]
-        found = _refined(coarse, small, _searched(coarse, small), True, ROUGH * pixel)
-        found = _refined(fine, picture, found, False, SETTLED * pixel)
-        better = _unlike(fine, _compared(fine, picture, found)) < BETTER * min(_unlike(fine, difference), 1)
+        found = refined(coarse, small, searched_shift(coarse, small), True, ROUGH * pixel)
+        found = refined(fine, picture, found, False, SETTLED * pixel)
+        better = _unlike(fine, compared(fine, picture, found)) < BETTER * min(_unlike(fine, compared(fine, picture, NONE)), 1)
         return found if better and self.pixels(found) >= STILL else None
 
-    def _moved(self, points: Points, difference: Floats) -> bool:
-        """Whether points' differences (N,) look like those of a camera that moved: a little, by the first step; far, by their size."""
-        step = _solved(*_equations(points, difference), np.eye(3), rigid=True)
-        return _unlike(points, difference) >= SEARCHED_FROM or self.pixels(_matrix(step)) >= STILL
+    def _moved(self, points: Points, picture: Floats, margin: float = 1.0) -> bool:
+        """Whether points look like those of a camera that moved: a little, by the first step; far, by the size of their differences; both
+        over `margin` of the limits."""
+        difference = compared(points, picture, NONE)
+        typical = median_of(np.abs(difference))
+        if typical >= margin * SEARCHED_FROM * points.typical:
+            return True
+        return self.pixels(matrix_of(solved_step(points, difference, typical, NONE, rigid=True))) >= margin * STILL
 
     def matches(self, image: Image, movement: Homography | None) -> bool:
         """Whether a frame under a movement looks like the scene; true if the scene has too little texture to tell."""
         if self._levels is None:
             return True
         points = self._levels[0]
-        return _unlike(points, _compared(points, self._reduced(image), np.eye(3) if movement is None else movement)) < UNLIKE
+        return _unlike(points, compared(points, self._reduced(image), NONE if movement is None else movement)) < UNLIKE
 
     def pixels(self, movement: Homography) -> float:
         """The greatest displacement of a corner by a movement, pixels of the frame."""
@@ -138,13 +120,17 @@ class Registration:
 
     def undone(self, image: Image, movement: Homography) -> tuple[Image, Gap]:
         """The frame as the camera would see it without a movement, and the pixels that it does not show."""
-        import cv2
+        from shadowpuppet.silhouette.correction._kernels import moved_back
 
         height, width = self.scene.shape[:2]
         to_pixels = np.array([[width / 2, 0, (width - 1) / 2], [0, width / 2, (height - 1) / 2], [0, 0, 1]])
         matrix = to_pixels @ movement @ np.linalg.inv(to_pixels)
-        out = cv2.warpPerspective(image, matrix, (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        return np.asarray(out, np.uint8), _gap(matrix, width, height)
+        channels = image.size // (height * width)
+        piece = int(np.clip(2 * np.sqrt(BENT / max(np.abs(matrix[2, :2]).max(), 1e-9)), 8, PIECE))
+        ramp = np.repeat(np.arange(piece, dtype=np.float32), channels)
+        image, out = np.ascontiguousarray(image), np.empty(self.scene.shape, np.uint8)
+        moved_back(image.reshape(height, -1), matrix, channels, ramp, out.reshape(height, -1))
+        return out, _gap(matrix, width, height)
 
     @cached_property
     def _corners(self) -> NDArray[np.float64]:
@@ -155,22 +141,30 @@ class Registration:
     def _levels(self) -> tuple[Points, Points] | None:
         """Points of the reduced scene and of its half; None if it has too little texture."""
         fine, grey = self._reduced(self.scene), self._reduced_grey(self.scene).astype(np.float32)
-        points = _points(fine, grey)
-        return None if points is None else (points, _points(_halved(fine), _halved(grey)) or points)
+        points = textured_points(fine, grey)
+        return None if points is None else (points, textured_points(_halved(fine), _halved(grey)) or points)
+
+    @cached_property
+    def _some(self) -> Points:
+        """Some of the points of the reduced scene."""
+        assert self._levels is not None
+        return self._levels[0].some(SPARSE)
 
     def _reduced_grey(self, image: Image) -> Image:
         import cv2
 
-        height, width = image.shape[:2]
-        factor = max(1, round(width / WIDTH))
-        size = max(width // factor, 8), max(height // factor, 8)
-        return np.asarray(cv2.resize(to_brightness(image), size, interpolation=cv2.INTER_AREA), np.uint8)
+        factor = max(1, round(image.shape[1] / WIDTH))
+        out = to_brightness(image)
+        while factor % 2 == 0 and out.shape[0] % 2 == 0 and out.shape[1] % 2 == 0:  # several times as fast as at once
+            out, factor = _halved(out), factor // 2
+        size = max(out.shape[1] // factor, 8), max(out.shape[0] // factor, 8)
+        return out if out.shape == size[::-1] else np.asarray(cv2.resize(out, size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _reduced(self, image: Image) -> Floats:
         import cv2
 
-        logs = LOGS[self._reduced_grey(image)]
-        return np.asarray(cv2.GaussianBlur(logs, (0, 0), FINE) - cv2.blur(logs, (2 * round(COARSE) + 1,) * 2), np.float32)
+        logs = np.asarray(cv2.LUT(self._reduced_grey(image), LOGS), np.float32)
+        return np.asarray(cv2.subtract(cv2.GaussianBlur(logs, (0, 0), FINE), cv2.blur(logs, (2 * round(COARSE) + 1,) * 2)), np.float32)
 
 
 LOGS = np.log(np.arange(256) + OFFSET).astype(np.float32)
@@ -188,103 +182,15 @@ def _gap(matrix: Homography, width: int, height: int) -> Gap:
     return Gap(np.asarray(unseen, np.uint8), (top, max(min(y[2], y[3]), top) + 1, left, max(min(x[1], x[2]), left) + 1))
 
 
-def _halved(picture: Floats) -> Floats:
+def _halved(picture: np.ndarray) -> np.ndarray:
     import cv2
 
-    return np.asarray(cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA), np.float32)
-
-
-def _points(picture: Floats, grey: Floats) -> Points | None:
-    """The points of steepest slope in each block of a reduced picture (H, W), of brightness `grey` (H, W), grey levels; None if too few
-    blocks have any."""
-    height, width = picture.shape
-    down, across = (np.asarray(slope) for slope in np.gradient(picture))
-    slope = np.hypot(down, across)
-    slope[slope * (grey + OFFSET) < MIN_SLOPE] = 0
-    slope[:2], slope[-2:], slope[:, :2], slope[:, -2:] = 0, 0, 0, 0
-    rows, columns, filled = list[NDArray[np.intp]](), list[NDArray[np.intp]](), 0
-    for ys in np.array_split(np.arange(height), BLOCKS[1]):
-        for xs in np.array_split(np.arange(width), BLOCKS[0]):
-            block = slope[np.ix_(ys, xs)].ravel()
-            order = np.argsort(-block, kind="stable")[: min(POINTS, len(block) // 3)]
-            best = order[block[order] > 0]
-            filled += len(best) >= 3
-            rows.append(ys[best // len(xs)])
-            columns.append(xs[best % len(xs)])
-    if filled < MIN_BLOCKS * BLOCKS[0] * BLOCKS[1]:
-        return None
-    y, x = np.concatenate(rows), np.concatenate(columns)
-    half = width / 2
-    u, v = (x + 0.5) / half - 1, (y + 0.5 - height / 2) / half
-    a, b = across[y, x] * half, down[y, x] * half
-    along = a * u + b * v
-    jacobian = np.column_stack([a * u, a * v, a, b * u, b * v, b, -along * u, -along * v])
-    return Points(np.column_stack([u, v]).astype(np.float32), picture[y, x], jacobian.astype(np.float32))
-
-
-def _searched(points: Points, picture: Floats) -> Homography:
-    """The shift under which most points look alike, to a pixel of a reduced picture (H, W)."""
-    from shadowpuppet.silhouette.correction._kernels import shift_costs
-
-    reach = round(REACH * picture.shape[1])
-    cap = np.float32(np.median(np.abs(points.value)))
-    costs = shift_costs(points.xy[::SEARCHED], points.value[::SEARCHED], picture, reach, cap)
-    y, x = np.unravel_index(np.argmin(costs), costs.shape)
-    out = np.eye(3)
-    out[:2, 2] = (int(x) - reach, int(y) - reach)
-    out[:2, 2] /= picture.shape[1] / 2
-    return out
-
-
-def _refined(points: Points, picture: Floats, movement: Homography, rigid: bool, tolerance: float) -> Homography:
-    """A movement refined by Gauss-Newton steps; `rigid`: shift and roll alone."""
-    for _ in range(STEPS):
-        step = _solved(*_equations(points, _compared(points, picture, movement)), movement, rigid)
-        movement = movement @ np.linalg.inv(_matrix(step))
-        movement = movement / movement[2, 2]
-        if np.abs(step).sum() < tolerance:
-            break
-    return movement
-
-
-def _equations(points: Points, difference: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Normal equations (8, 8) and (8,) of a step that takes differences (N,) away, in units of their standard deviation.
-
-    Weights are Geman and McClure's.
-    """
-    scale = np.float32(max(1.4826 * float(np.median(np.abs(difference))), MIN_SCALE))
-    weight = 1 / ((1 + np.square(difference / (2 * scale))) * scale) ** 2
-    weighted = points.jacobian * weight[:, None]
-    return (weighted.T @ points.jacobian).astype(float), (difference @ weighted).astype(float)
+    return np.asarray(cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA))
 
 
 def _unlike(points: Points, difference: Floats) -> float:
     """Median of the differences (N,) of points over that of their values: near 0 for pictures that match, 1.4 for strangers."""
-    return float(np.median(np.abs(difference)) / np.median(np.abs(points.value)))
-
-
-def _compared(points: Points, picture: Floats, movement: Homography) -> Floats:
-    """Differences (N,) of a reduced picture (H, W) and points under a movement; a point outside the picture has a very large one."""
-    from shadowpuppet.silhouette.correction._kernels import point_differences
-
-    out = np.empty(len(points.value), np.float32)
-    point_differences(points.xy, points.value, picture, movement.astype(np.float32), np.float32(OUTSIDE), out)
-    return out
-
-
-def _solved(left: NDArray[np.float64], right: NDArray[np.float64], movement: Homography, rigid: bool) -> NDArray[np.float64]:
-    """The step (8,) that solves normal equations."""
-    prior = CORRELATION / BEND**2
-    if rigid:
-        left, right = SHIFTS.T @ left @ SHIFTS, SHIFTS.T @ right
-        return SHIFTS @ np.linalg.solve(left + np.eye(3), right)
-    beyond = prior * (np.eye(8) - SHIFTS @ np.linalg.pinv(SHIFTS))
-    now = (movement - np.eye(3)).ravel()[:8]
-    return np.asarray(np.linalg.solve(left + beyond + np.eye(8), right + beyond @ now), float)
-
-
-def _matrix(step: NDArray[np.float64]) -> Homography:
-    return np.eye(3) + np.append(step, 0).reshape(3, 3)
+    return median_of(np.abs(difference)) / points.typical
 
 
 def _mapped(movement: Homography, xy: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -104,7 +104,7 @@ def _doubt(movement: Movement) -> str | None:
 
 def _in_one_light(frames: Sequence[Image]) -> list[Image]:
     light = Light(_median(frames))
-    return [light.normalised(frame) for frame in frames]
+    return [light.normalised(frame)[0] for frame in frames]
 
 
 def _median(frames: Sequence[Image]) -> Image:

@@ -10,11 +10,14 @@ import numpy as np
 from shadowpuppet.geometry import Array
 
 FaultName = Literal[
-    "gain", "white_balance", "flicker", "lamp", "vignetting", "defocus", "black", "motion_blur", "noise", "crf",
+    "gain", "white_balance", "flicker", "lamp", "sun", "vignetting", "defocus", "black", "motion_blur", "noise", "crf",
     "nudge", "shake", "frozen", "dropped", "repeated", "late", "absent",
 ]  # fmt: skip
 LAMP_REACH = 0.35
 """Radius of the patch that a switched lamp lights, a Gaussian's standard deviation, over the picture's width."""
+SUN_SIZE, SUN_BLUR, SUN_WAY = (0.1, 0.14), 0.008, (0.1, 0.2)
+"""Half the width and the height of the sun's patch, the blur of its border, and the place of its middle with how far it wanders, over the
+picture's width."""
 SHAKE_SECONDS = 0.12
 """Smoothness of a shaking tripod's movement: standard deviation of the Gaussian that filters white noise, seconds."""
 
@@ -57,6 +60,17 @@ def lamp(light: Array, amount: float, now: Moment) -> Array:
     centre = np.array([(0.15 if now.chance[0] < 0.5 else 0.85) * width, (0.2 + 0.4 * now.chance[1]) * height])
     away = np.hypot(*(np.meshgrid(np.arange(width) - centre[0], np.arange(height) - centre[1]))) / (LAMP_REACH * width)
     return light * (1 + (amount - 1) * now.share * np.exp(-(away**2) / 2))[..., None]
+
+
+def sun(light: Array, amount: float, now: Moment) -> Array:
+    """The sun through a window, at the left or the right: the light in an upright patch on the wall times the amount. With `drift` it comes
+    within the first tenth of the time, and wanders inward."""
+    height, width = light.shape[:2]
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / width)
+    across = np.abs((x if now.chance[0] < 0.5 else 1 - x) - SUN_WAY[0] - SUN_WAY[1] * now.share) - SUN_SIZE[0]
+    down = np.abs(y - (0.25 + 0.2 * now.chance[1]) * height / width) - SUN_SIZE[1]
+    there = min(10 * now.share, 1.0) / (1 + np.exp(np.maximum(across, down) / SUN_BLUR))
+    return light * (1 + (amount - 1) * there)[..., None]
 
 
 def vignetting(light: Array, amount: float, now: Moment) -> Array:
@@ -158,6 +172,7 @@ KINDS: dict[str, Kind] = {
     "white_balance": Kind("factor on red and divisor of blue", 1.2, 0.3, 3, light=white_balance),
     "flicker": Kind("relative amplitude", 0.05, 0, 0.5, light=flicker),
     "lamp": Kind("factor on the light beside the lamp", 1.5, 0.1, 5, light=lamp),
+    "sun": Kind("factor on the light in a patch of sun", 1.3, 0.1, 5, light=sun),
     "vignetting": Kind("share of light missing at the corners", 0.3, 0, 0.9, light=vignetting),
     "defocus": Kind("standard deviation of the blur, pixels", 1.5, 0.3, 20, light=defocus),
     "black": Kind("", light=black),
