@@ -12,7 +12,6 @@ import numpy as np
 
 from shadowpuppet.silhouette.background import Floats, smoothed
 from shadowpuppet.silhouette.boundary import Labels, disc
-from shadowpuppet.silhouette.shadows import MAYBE_SHADOW
 
 RADIUS = 4
 """Half side of the square that colours are averaged over, pixels."""
@@ -44,8 +43,9 @@ class AreaFilter(NamedTuple):
 def _guided(guide: Floats, values: Floats, variance: float) -> Floats:
     """Values (H, W) averaged, except across edges of the guide (H, W) that have more than `variance`."""
     mean_guide, mean_values = _mean(guide), _mean(values)
-    slope = (_mean(guide * values) - mean_guide * mean_values) / (np.maximum(_mean(guide * guide) - mean_guide**2, 0) + variance)
-    return _mean(slope) * guide + _mean(mean_values - slope * mean_guide)
+    spread = np.maximum(_mean(guide * guide) - mean_guide**2, np.float32(0)) + np.float32(variance)
+    slope = ((_mean(guide * values) - mean_guide * mean_values) / spread).astype(np.float32)
+    return _mean(slope) * guide + _mean((mean_values - slope * mean_guide).astype(np.float32))
 
 
 def _mean(values: Floats) -> Floats:
@@ -61,6 +61,8 @@ def with_areas(label: Labels, area: Labels) -> Labels:
     Areas tell dark clothes from shadows, and add what pixel by pixel is within the noise, but for a rim of `RIM` pixels.
     """
     import cv2
+
+    from shadowpuppet.silhouette.shadows import MAYBE_SHADOW
 
     out = np.where((label == MAYBE_SHADOW) & (area > 0), area, label)
     inner = np.asarray(cv2.erode(np.where(area == MAYBE_SHADOW, 0, area).astype(np.uint8), disc(RIM)), np.uint8)

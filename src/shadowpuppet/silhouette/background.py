@@ -20,7 +20,7 @@ NOISY, NOISY_SMOOTHING = 3.0, 1.5
 """Noise of a film after that, grey levels of brightness, from which on it is smoothed by more; a camera in good light and web video have
 less."""
 WHITE_SHARE = 0.7
-"""Share of the noise that this smoothing leaves, below which it is a sensor's: neighbouring pixels' is independent. Compression's is not."""
+"""Share of the noise that this smoothing leaves, below which it is a sensor's: independent from pixel to pixel. Compression's is not."""
 
 UNLIKE = 8.0
 """Median difference of a frame from the empty scene, over that of the film's better frames, from which on it does not show the scene."""

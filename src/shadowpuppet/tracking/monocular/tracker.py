@@ -36,6 +36,8 @@ class State(NamedTuple):
     """Intersection over union of the drawn estimate and the silhouette, legs left out."""
     status: str
     """`tracked`, `uncertain`, `lost` or `absent`."""
+    mask: Mask | None = None
+    """The frame's silhouette (H, W), if the next frame needs it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +49,26 @@ class MonocularTracker:
     settings: MonocularSettings = field(default_factory=MonocularSettings)
     scheme: Scheme | None = None
     """A resampling scheme of your own, in place of the settings'."""
+    blurred: bool = False
+    """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
+    is covered since this frame only, and so for a part of the exposure, does not count."""
 
     def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
         `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2. Raises `TrackingError` for a mask of another size than the
         camera's."""
         mask = check_mask(mask, self.picture.camera.size)
-        return track_or_recover(
+        state = track_or_recover(
             state, is_absent=self.is_absent(mask, state.pose), recover=self.settings.recover, hold=self.absent,
             cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, mask, also))  # fmt: skip
+        return state._replace(mask=mask) if self.blurred else state
 
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
         estimate, observation = last, self.observe(mask, last, also)
+        if state.mask is not None:
+            observation = observation.ignoring(mask & ~state.mask)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
