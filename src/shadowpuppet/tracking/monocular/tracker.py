@@ -51,7 +51,7 @@ class MonocularTracker:
     """A resampling scheme of your own, in place of the settings'."""
     blurred: bool = False
     """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
-    is covered since this frame only, and so for a part of the exposure, does not count."""
+    is covered since this frame only, and so for a part of the exposure, does not count, except in the status."""
 
     def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
@@ -66,9 +66,8 @@ class MonocularTracker:
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
-        estimate, observation = last, self.observe(mask, last, also)
-        if state.mask is not None:
-            observation = observation.ignoring(mask & ~state.mask)
+        estimate, whole = last, self.observe(mask, last, also)
+        observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
@@ -77,7 +76,7 @@ class MonocularTracker:
                 particles[i] = step(rng, ranked, resample=stage.resample, propose=stage.propose(cycle), weigh=weigh, number=stage.number)
                 estimate = stage.put(estimate, stage.estimate(particles[i]))
                 others = estimate if stage.moves_torso else others
-        return self.judge(estimate, particles, observation)
+        return self.judge(estimate, particles, whole)
 
     def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` if no
