@@ -21,7 +21,7 @@ from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
-from shadowpuppet.pipeline.look import Survey
+from shadowpuppet.pipeline.look import Look, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import FALLBACK_RATE
 from shadowpuppet.pipeline.rig import FrameSet
@@ -146,6 +146,9 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     except TrackingError as error:
         raise TrackingError(f"{footage.recording.path}: {error}") from None
     subject = MonocularSubject.of(fit, footage.camera, options.tracker, source, rate / options.every)
+    condition = survey.look.condition if isinstance(survey.look, Look) else None
+    if condition is not None and condition.blurred and options.every == 1:
+        subject = replace(subject, tracker=replace(subject.tracker, blurred=True))
     start = subject.tracker.start(for_start, masks[0]).overlap
     other = clean.segmenter.key if clean is not survey.silhouettes[0] and clean.segmenter is not None else None
     guess = fit.guess

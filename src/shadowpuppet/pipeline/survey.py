@@ -72,7 +72,7 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hi
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
         "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
         "left_out": _left_out(silhouettes, footage),
-        "condition": condition_of(silhouettes, sample),
+        "condition": condition_of(silhouettes, sample, runs),
     })  # fmt: skip
 
 
@@ -278,11 +278,12 @@ def _share(masks: Sequence[Mask]) -> float:
     return float(np.mean([mask.mean() for mask in masks]))
 
 
-def condition_of(silhouettes: Silhouettes, sample: Sample) -> FilmCondition | None:
-    """The condition of a film in its sampled frames; None for ready silhouettes and an empty film."""
+def condition_of(silhouettes: Silhouettes, sample: Sample, masks: Sequence[Sequence[Mask]]) -> FilmCondition | None:
+    """The condition of a film in its sampled frames, whose masks (H, W) are given by run; None for ready silhouettes and an empty film."""
     if silhouettes.segmenter is None or not sample.frames:
         return None
-    return film_condition(silhouettes.segmenter, [[(frame.time, frame.image) for frame in run] for run in sample.runs])
+    return film_condition(silhouettes.segmenter, [[(frame.time, frame.image) for frame in run] for run in sample.runs],
+                          masks)
 
 
 def _poor(condition: FilmCondition | None) -> tuple[str, ...]:

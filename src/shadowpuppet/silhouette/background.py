@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ SMOOTHING = 0.7
 NOISY, NOISY_SMOOTHING = 3.0, 1.5
 """Noise of a film after that, grey levels of brightness, from which on it is smoothed by more; a camera in good light and web video have
 less."""
+WHITE_SHARE = 0.7
+"""Share of the noise that this smoothing leaves, below which it is a sensor's: independent from pixel to pixel. Compression's is not."""
 
 UNLIKE = 8.0
 """Median difference of a frame from the empty scene, over that of the film's better frames, from which on it does not show the scene."""
@@ -124,13 +127,16 @@ def sample_frames(images: Iterable[Image], count: int) -> list[Image]:
     return kept.kept
 
 
-def film_noise(frames: list[Image], mean: Floats, smoothing: float = SMOOTHING) -> NDArray[np.float64]:
+def film_noise(frames: list[Image], mean: Floats, smooth: Callable[[np.ndarray], np.ndarray] | None = None) -> NDArray[np.float64]:
     """Noise of a film: standard deviation (3,) of its Y, Cr, Cb, grey levels, smoothed, about the smoothed background `mean` (H, W, 3).
+
+    smooth: what smooths them; `smoothed` by default.
 
     It is the 68th percentile of the differences of all pixels (one standard deviation of a normal distribution): a person covering less
     than a third of the picture hardly changes it. Frames that do not show the scene, black ones for example, are left out.
     """
-    differences = [np.abs(smoothed(to_planes(f).astype(np.float32), smoothing) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
+    smooth = smooth or smoothed
+    differences = [np.abs(smooth(to_planes(f).astype(np.float32)) - mean)[::2, ::2].reshape(-1, 3) for f in frames]
     typical = np.array([np.median(each[:, 0]) for each in differences])
     shown = typical <= UNLIKE * max(float(np.percentile(typical, 25)), 1.0)
     return np.percentile(np.concatenate([each for each, use in zip(differences, shown) if use]), 68, axis=0)
@@ -151,6 +157,11 @@ class FilmNoise(NamedTuple):
         """Whether the film is smoothed by more than a clean one."""
         return self.smoothing > SMOOTHING
 
+    @property
+    def grainy(self) -> bool:
+        """Whether that noise is a sensor's, so that averages over areas have little of it."""
+        return self.noisy and bool(self.share[0] < WHITE_SHARE)
+
 
 def measured_noise(frames: list[Image], mean: Floats) -> FilmNoise:
     """The noise of a film's frames about the background `mean` (H, W, 3); none without frames."""
@@ -159,7 +170,7 @@ def measured_noise(frames: list[Image], mean: Floats) -> FilmNoise:
     least = film_noise(frames, smoothed(mean))
     if least[0] < NOISY:
         return FilmNoise(SMOOTHING, least, np.ones(3))
-    more = film_noise(frames, smoothed(mean, NOISY_SMOOTHING), NOISY_SMOOTHING)
+    more = film_noise(frames, smoothed(mean, NOISY_SMOOTHING), partial(smoothed, smoothing=NOISY_SMOOTHING))
     return FilmNoise(NOISY_SMOOTHING, more, np.minimum(more / np.maximum(least, 1e-3), 1))
 
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
-from shadowpuppet.silhouette.background import Background, FilmNoise, Image
+from shadowpuppet.silhouette.areas import AreaFilter
+from shadowpuppet.silhouette.background import Background, FilmNoise, Floats, Image
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
-from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene, edge_jitter
+from shadowpuppet.silhouette.classifiers import METHODS, AreaColours, ChannelClassifier, EmptyScene, edge_jitter
 from shadowpuppet.silhouette.cleanup import Window, coarse_person
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
@@ -70,15 +71,26 @@ def _channel_classifier(background: Background, frames: list[Image], settings: S
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
     noise = scene.measured_noise(frames, background.mean)
-    sigma = assumed_sigma(background, noise, settings.noise_floor)
-    return ChannelClassifier("both", scene.smoothed(background.mean, noise.smoothing), (1 / sigma).astype(np.float32), settings.factor,
-                             darkest, noise.smoothing, EXCESS_NOISE if noise.noisy else 0.0)
-
-
-def assumed_sigma(background: Background, noise: FilmNoise, noise_floor: float) -> np.ndarray:
-    """Standard deviation (H, W, 3) of Y, Cr, Cb assumed for the empty scene: the greatest of the learnt one, the film's noise and
-    the floor, increased at the background's edges."""
     mean = scene.smoothed(background.mean, noise.smoothing)
+    sigma = assumed_sigma(background, noise, settings.noise_floor, mean)
+    areas = _area_colours(background, frames, noise, settings) if noise.grainy and background.colour else None
+    return ChannelClassifier("both", mean, (1 / sigma).astype(np.float32), settings.factor, darkest, noise.smoothing,
+                             EXCESS_NOISE if noise.noisy else 0.0, areas)
+
+
+def _area_colours(background: Background, frames: list[Image], noise: FilmNoise, settings: SilhouetteSettings) -> AreaColours:
+    """Colours averaged over areas, for a film with the `noise` of a sensor."""
+    average = AreaFilter(noise.smoothing, float(noise.sigma[0]))
+    mean = average(background.mean)
+    sigma = scene.film_noise(frames, mean, average)
+    least = noise.sigma / np.maximum(noise.share, 1e-3)
+    averaged = FilmNoise(noise.smoothing, sigma, np.minimum(sigma / np.maximum(least, 1e-3), 1))
+    return AreaColours(average, mean, (1 / assumed_sigma(background, averaged, settings.noise_floor, mean)).astype(np.float32))
+
+
+def assumed_sigma(background: Background, noise: FilmNoise, noise_floor: float, mean: Floats) -> np.ndarray:
+    """Standard deviation (H, W, 3) of Y, Cr, Cb assumed for the empty scene: the greatest of the learnt one, the film's noise and
+    the floor, increased at the edges of the background's smoothed `mean` (H, W, 3)."""
     floor = np.maximum(noise_floor * np.array([1, COLOUR_FLOOR, COLOUR_FLOOR]), NOISE_TAIL_FACTOR * noise.sigma)
     return np.hypot(np.maximum(background.smooth_sigma * noise.share, np.maximum(floor, 1e-3)), edge_jitter(mean))
 

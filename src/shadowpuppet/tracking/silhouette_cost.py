@@ -43,6 +43,11 @@ class Observation:
         seen = cls.of(mask, ignore, also)
         return cls(seen.silhouette, seen.ignore | (seen.silhouette & picture.leg_bits(pose)), also)
 
+    def ignoring(self, pixels: ArrayLike) -> Observation:
+        """The observation in which the pixels (H, W) do not count either."""
+        skipped = pack(pixels)
+        return Observation(self.silhouette | skipped, self.ignore | skipped, self.also)
+
     @property
     def area(self) -> int:
         """Pixels of the silhouette that count."""

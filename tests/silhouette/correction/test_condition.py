@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -70,3 +71,12 @@ def test_light_that_nothing_explains_is_no_compression():
     spots = cv2.resize(np.random.default_rng(1).normal(0, 14, (24, 32, 3)), (160, 120))
     found = condition(lambda n, empty: empty + spots)
     assert "in light that no smooth change explains" in found.warnings()[0]
+
+
+def test_motion_blur_is_named_only_if_strong():
+    good = condition(lambda n, empty: empty)
+    assert (good.blur, good.blurred) == (None, False)
+    assert not replace(good, blur=0.2).blurred
+    assert replace(good, blur=0.4).blurred
+    assert replace(good, blur=0.4).warnings() == ()
+    assert "moving limbs are blurred (90 %" in replace(good, blur=0.9).warnings()[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -349,3 +350,18 @@ def test_legs_of_the_person_change_little():
     # What counts them is worse off.
     counting = track(MonocularTracker(low, make_settings("default", {"ignore_legs": False})), masks)
     assert np.mean([s.overlap for s in counting]) < np.mean([s.overlap for s in states]) - 0.05
+
+
+def test_in_a_film_blurred_by_motion_what_is_covered_since_this_frame_does_not_count():
+    poses, masks = wave(8)
+    blurred = [masks[0], *(now | before for before, now in pairwise(masks))]
+    plain = tracker()
+    wiser = replace(plain, blurred=True)
+    states = track(wiser, blurred)
+    assert all(state.mask is not None for state in states[1:])
+    assert all(state.mask is None for state in track(plain, blurred))
+    state = states[-2]
+    observation = plain.observe(blurred[-1], state.pose).ignoring(blurred[-1] & ~blurred[-2])
+    assert observation.area == int((blurred[-1] & blurred[-2]).sum())
+    drawn = view().draw(poses[-1])
+    assert observation.cost_and_overlap(drawn)[0] <= plain.observe(blurred[-1], state.pose).cost_and_overlap(drawn)[0]

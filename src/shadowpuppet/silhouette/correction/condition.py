@@ -12,13 +12,19 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
 from shadowpuppet.silhouette.correction.frame_correction import Corrected, Correction
+from shadowpuppet.silhouette.correction.motion_blur import blurred_share
 from shadowpuppet.silhouette.segmenter import Segmenter
 
-# Limits of the warnings. Films in good light have a noise of 0.9 to 1.3; sensor noise of sd 15 leaves 5.8, H.264 at crf 32 leaves 3.0.
+# Limits of the warnings. Films in good light have a noise of 0.9 to 1.3; sensor noise of sd 15 leaves 5.8, H.264 at crf 28
+# 1.3 to 2.3, at crf 32, from which on errors grow by more than a third, 1.7 to 3.4.
 WARN_NOISE = 6.5
 WARN_ERROR = 3.0
+WARN_COMPRESSION = 1.6
 WARN_GAIN = 1.5
 WARN_UNMATCHED = 0.02
+WARN_BLUR = 0.6
+BLURRED = 0.3
+"""Share of mixtures in fast limbs from which on a film counts as blurred by motion; short exposures have at most 0.26."""
 STEADY = 0.5
 """Change from frame to frame over the difference to the empty scene, below which that difference is no noise: it stays."""
 COPIED = 0.8
@@ -45,10 +51,22 @@ class FilmCondition:
     """Time (s) from which on all frames have a movement; None if the last one has none."""
     unmatched: float
     """Share of the frames in which the empty scene was not found, whatever the movement."""
+    blur: float | None = None
+    """Share of mixtures of limb and background in fast limbs; None if nothing moves fast."""
+
+    @property
+    def blurred(self) -> bool:
+        """Whether moving limbs are blurred, because the exposure lasts from frame to frame."""
+        return self.blur is not None and self.blur >= BLURRED and not self.compressed
+
+    @property
+    def compressed(self) -> bool:
+        """Whether most of a frame is copied from the last."""
+        return self.copied is not None and self.copied > COPIED
 
     def warnings(self) -> tuple[str, ...]:
         """What harms the silhouettes, and the remedy, a sentence each."""
-        return (*self._movement(), *self._light(), *self._noise())
+        return (*self._movement(), *self._light(), *self._noise(), *self._blur())
 
     def _movement(self) -> Iterator[str]:
         remedy = "its frames are shifted back, and what they do not show of the scene is guessed"
@@ -70,7 +88,7 @@ class FilmCondition:
 
     def _noise(self) -> Iterator[str]:
         lasts = self.change is not None and self.change < STEADY * self.noise
-        if lasts and self.noise > WARN_ERROR and self.copied is not None and self.copied > COPIED:
+        if lasts and self.noise > WARN_COMPRESSION and self.compressed:
             yield (f"the film is compressed too much (its pixels are {self.noise:.1f} grey levels off the empty scene): outlines are "
                    "blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality")
         elif lasts and self.noise > WARN_ERROR:
@@ -79,6 +97,11 @@ class FilmCondition:
         elif self.noise > WARN_NOISE:
             yield (f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use more "
                    "light, or less gain of the camera")
+
+    def _blur(self) -> Iterator[str]:
+        if self.blur is not None and self.blur > WARN_BLUR and not self.compressed:
+            yield (f"moving limbs are blurred ({100 * self.blur:.0f} % of what they reach or leave within two frames is half limb, half "
+                   "background): they look too wide, or vanish; use a shorter exposure with more light")
 
 
 class _State(NamedTuple):
@@ -91,8 +114,12 @@ class _State(NamedTuple):
     matched: bool
 
 
-def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Image]]]) -> FilmCondition:
-    """The condition of a film's sampled frames, in `runs` of consecutive ones, each with its time (s) and picture (H, W, 3) or (H, W)."""
+def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Image]]],
+                   masks: Sequence[Sequence[NDArray[np.bool_]]] | None = None) -> FilmCondition:
+    """The condition of a film's sampled frames, in `runs` of consecutive ones, each with its time (s) and picture (H, W, 3) or (H, W).
+
+    masks: the person's masks (H, W) in them, for motion blur.
+    """
     correction = segmenter.correction or Correction(np.zeros(segmenter.background.image_shape, np.uint8))
     frames = [frame for run in runs for frame in run]
     each = [[correction(image) for _, image in run] for run in runs]
@@ -109,6 +136,7 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
         moved=float(moved.max()), moved_frames=float((moved > 0).mean()),
         moved_since=frames[first][0] if first < len(frames) else None,
         unmatched=float(np.mean([not state.matched for state in states])),
+        blur=None if masks is None else blurred_share(corrected, masks),
     )  # fmt: skip
 
 

@@ -39,6 +39,8 @@ class State(NamedTuple):
     """`tracked`, `uncertain`, `lost` or `absent`."""
     unexplained: Unexplained | None = None
     """What the silhouettes have beside the body; None if nothing is left out."""
+    mask: Mask | None = None
+    """The frame's silhouette (H, W), if the next frame needs it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,9 @@ class MonocularTracker:
     """A resampling scheme of your own, in place of the settings'."""
     looks: int = 0
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
+    blurred: bool = False
+    """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
+    is covered since this frame only, and so for a part of the exposure, does not count, except in the status."""
 
     def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
@@ -62,12 +67,15 @@ class MonocularTracker:
         found = track_or_recover(
             state, is_absent=self.is_absent(rest, state.pose), recover=self.settings.recover, hold=self.absent,
             cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, rest, also))  # fmt: skip
-        return found._replace(unexplained=self.unexplained(state.unexplained, mask, found)) if self.looks else found
+        if self.looks:
+            found = found._replace(unexplained=self.unexplained(state.unexplained, mask, found))
+        return found._replace(mask=mask) if self.blurred else found
 
     def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
-        estimate, observation = last, self.observe(mask, last, also, state.unexplained)
+        estimate, whole = last, self.observe(mask, last, also, state.unexplained)
+        observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
@@ -76,7 +84,7 @@ class MonocularTracker:
                 particles[i] = step(rng, ranked, resample=stage.resample, propose=stage.propose(cycle), weigh=weigh, number=stage.number)
                 estimate = stage.put(estimate, stage.estimate(particles[i]))
                 others = estimate if stage.moves_torso else others
-        return self.judge(estimate, particles, observation)
+        return self.judge(estimate, particles, whole)
 
     def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` if no
