@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 LIMBS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Limbs that have a status of their own: an arm is shoulder to hand, a leg hip to foot, the trunk is the rest."""
+DOUBTFUL = ("uncertain", "predicted")
+"""Statuses of a limb that keeps its place without being vouched for."""
 ARM, LEG = ("shoulder", "elbow", "wrist", "hand", "fist"), ("hip", "knee", "ankle", "heel", "toe")
 
 
@@ -19,3 +21,11 @@ def limbs_of(joints: Iterable[str]) -> tuple[str, ...]:
     """The limbs to which joints belong, in the order of `LIMBS`."""
     found = set(map(limb_of, joints))
     return tuple(limb for limb in LIMBS if limb in found)
+
+
+def doubtful_joints(joints: Iterable[str], statuses: Iterable[str] | None) -> frozenset[str]:
+    """Those of joints whose limb has one of the statuses `DOUBTFUL`. `statuses`: one for each of `limbs_of(joints)`; None: all vouched
+    for."""
+    joints = tuple(joints)
+    doubtful = {limb for limb, status in zip(limbs_of(joints), statuses or ()) if status in DOUBTFUL}
+    return frozenset(joint for joint in joints if limb_of(joint) in doubtful)
