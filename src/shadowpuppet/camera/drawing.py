@@ -26,7 +26,7 @@ MIDDLE_COLOUR = (66, 228, 240)
 """The colour of parts that are neither left nor right."""
 PALE, PALENESS = (190, 190, 190), 0.7
 """The colour mixed into that of a limb that is not vouched for, and its share."""
-DASH = 6
+DASH = 8
 """Length of the dashes and gaps of such a limb's bones, in pictures 240 pixels high, pixels."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
