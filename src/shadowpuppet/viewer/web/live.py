@@ -152,7 +152,7 @@ def open_viewer(listen: str = "127.0.0.1", port: int | None = None, record: bool
 def posed(body: Body, tree: BodyTree, mesh: Any, pose: Array, root: Array, doubtful: frozenset[str] = frozenset()) -> Figure:
     """Figure of a body in one pose (D,), limbs of `doubtful` landmarks pale; `root` (4, 4): the body's frame to the world."""
     animation, limbs = tree.animation(np.zeros(1), np.asarray(pose, float)[None], root), limbs_of(body.landmark_names)
-    pale = {limb_of(name) for name in doubtful}
+    pale = {limb_of(name) for name in body.landmark_names if name in doubtful}
     statuses = LimbStatuses(limbs, np.array([["uncertain" if limb in pale else "tracked" for limb in limbs]]))
     return animation_figure(body.name, animation, mesh, statuses=statuses)
 
