@@ -27,5 +27,5 @@ def doubtful_joints(joints: Iterable[str], statuses: Iterable[str] | None) -> fr
     """Those of joints whose limb has one of the statuses `DOUBTFUL`. `statuses`: one for each of `limbs_of(joints)`; None: all vouched
     for."""
     joints = tuple(joints)
-    doubtful = {limb for limb, status in zip(limbs_of(joints), statuses or ()) if status in DOUBTFUL}
+    doubtful = {limb for limb, status in zip(limbs_of(joints), () if statuses is None else statuses) if status in DOUBTFUL}
     return frozenset(joint for joint in joints if limb_of(joint) in doubtful)
