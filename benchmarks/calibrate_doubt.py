@@ -15,6 +15,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
@@ -196,9 +198,9 @@ def _errors(truth: JointTable, names: Sequence[str], points: Array) -> Array:
     return np.stack(known, 1) - points
 
 
-def collect(kind: str, path: Path, again: bool) -> list[Path]:
-    """Files with the runs of a recording, one a fault."""
-    folder = BUILD / kind / path.name
+def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
+    """Files with the runs of a recording, one a fault, in a folder of `build`."""
+    folder = build / kind / path.name
     if path.parent == RINGS:
         make_ring(path)
     if again or not (folder / "done").exists():
@@ -243,12 +245,14 @@ def read_runs(files: Iterable[Path]) -> list[Tracked]:
 
 def errors_of(runs: Iterable[Tracked]) -> list[Errors]:
     """Errors of all joints and axes where they are known."""
-    found = []
+    found = list[Errors]()
     for run in runs:
         lengths, known = np.stack(list(run.components.values()), 3), np.isfinite(run.errors)
         for j, joint in enumerate(run.joints):
-            found += [Errors(run.recording, run.fault, joint, axis, tuple(run.components), lengths[which, j, axis], run.errors[which, j, axis])
-                      for axis, which in enumerate(known[:, j].T) if which.any()]
+            for axis, which in enumerate(known[:, j].T):
+                if which.any():
+                    own = lengths[which, j, axis], run.errors[which, j, axis]
+                    found.append(Errors(run.recording, run.fault, joint, axis, tuple(run.components), *own))
     return found
 
 
@@ -277,7 +281,7 @@ MOST = 15000
 """Greatest number of errors, about, that factors are fitted to."""
 SCALE = 100.0
 """Factor on scores (m), for the optimiser's tolerances."""
-LEAST = {"constant": 1.0, "distance": 1.0}
+LEAST = {"constant": 0.7, "distance": 1.0}
 """Least factors: made recordings know neither the doubt in where a joint is in a body, nor that in the distance."""
 SILENT = 0.005
 """Share of the joints that may be over `FAR_ERROR` off in a limb that is vouched for."""
@@ -299,14 +303,14 @@ Factors = dict[str, dict[int, Array]]
 
 
 def fit_all(runs: Sequence[Errors]) -> Factors:
-    """Factors of all groups that occur."""
+    """Factors of all groups that occur; the world's two level axes (several cameras) share theirs."""
     least = np.array([LEAST.get(name, 0.0) for name in runs[0].names])
-    out: Factors = {}
-    for group in GROUPS:
-        for axis in range(3):
-            own = [run for run in runs if group_of(run.joint) == group and run.axis == axis]
-            if own:
-                out.setdefault(group, {})[axis] = fit(*(np.concatenate([getattr(run, name) for run in own]) for name in ("lengths", "errors")), least)
+    axes, out = [(0,), (1,), (2,)] if "distance" in runs[0].names else [(0, 1), (2,)], dict[str, dict[int, Array]]()
+    for group, tied in product(GROUPS, axes):
+        own = [run for run in runs if group_of(run.joint) == group and run.axis in tied]
+        if own:
+            lengths, errors = (np.concatenate([getattr(run, name) for run in own]) for name in ("lengths", "errors"))
+            out.setdefault(group, {}).update(dict.fromkeys(tied, fit(lengths, errors, least)))
     return out
 
 
@@ -435,7 +439,7 @@ HEAD = "# Factors of the components of doubt, by group of joints and axis. Writt
 
 
 def _smallest(folder: Path) -> list[object]:
-    return ["--recordings", smallest.make(folder / "tiny")]
+    return ["--kind", "monocular", "--folder", folder, "--recordings", smallest.make(folder / "tiny")]
 
 
 def main() -> None:
@@ -443,6 +447,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kind", default="monocular,multiview", help="trackers, separated by commas")
     parser.add_argument("--recordings", type=Path, nargs="*", help="folders; the proving grounds without")
+    parser.add_argument("--folder", type=Path, default=BUILD, help="where components and errors are kept")
     parser.add_argument("--write", action="store_true", help="write the factors into the package")
     parser.add_argument("--again", action="store_true", help="track again what has been tracked")
     parser.add_argument("--workers", type=int, default=2)
@@ -450,7 +455,7 @@ def main() -> None:
     for kind in args.kind.split(","):
         paths = args.recordings or MADE[kind]()
         with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
-            files = [file for found in pool.map(collect, [kind] * len(paths), paths, [args.again] * len(paths)) for file in found]
+            files = [file for found in pool.map(partial(collect, kind, build=args.folder, again=args.again), paths) for file in found]
         runs = read_runs(files)
         for title, own in (("clean", [run for run in runs if run.fault == "clean"]), ("clean and spoiled", runs)):
             joints, limbs = left_out(own)

@@ -1,0 +1,128 @@
+"""Standard deviations, their factors, and limbs' statuses: what they are made of, and what makes them grow."""
+
+from __future__ import annotations
+
+import numpy as np
+import people
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shadowpuppet.body.models import MODELS
+from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
+from shadowpuppet.pipeline.subject import average_body
+from shadowpuppet.tracking.doubt.doubt import UNSEEN, limb_statuses, pose_deviations
+from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
+from shadowpuppet.tracking.doubt.steps import PACE, STILL_ALLOWED, steps, stillness
+from shadowpuppet.tracking.doubt.variance import VarianceModel, turned, variance_model
+
+JOINTS = ("neck", "left_shoulder", "left_elbow", "left_hand", "right_knee")
+LIMITS = {"trunk": 0.3, "arm": 0.2, "leg": 0.3}
+LIMBS_OF_JOINTS = ("trunk", "left_arm", "right_leg")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_joint_and_part_of_every_body_has_a_limb_a_group_and_a_lever(name):
+    body = average_body(name)
+    limbs = set(limbs_of(body.landmark_names))
+    assert {limb_of(joint) for joint in body.landmark_names} == limbs == {limb_of_part(part) for part in body.parts}
+    assert {group_of(joint) for joint in body.landmark_names} <= set(GROUPS)
+    assert all(0.1 < lever_of(joint) < 1 for joint in body.landmark_names)
+
+
+@pytest.mark.parametrize("kind", ["monocular", "multiview"])
+def test_the_calibrated_factors_are_whole(kind):
+    model = variance_model(kind)
+    bodies = [average_body(name) for name in MODELS if kind == "monocular" and name in people.BODIES or kind == "multiview"
+              and name not in people.BODIES]
+    assert {group_of(joint) for body in bodies for joint in body.landmark_names} <= set(model.groups)
+    assert model.factors.shape == (len(model.groups), 3, len(model.names))
+    assert (model.factors >= 0).all() and (model.factors[:, :, model.names.index("constant")] > 0).all()
+    assert {limb.rpartition("_")[2] for body in bodies for limb in limbs_of(body.landmark_names)} <= set(model.limits)
+    assert all(0 < limit <= 0.3 for limit in model.limits.values())
+
+
+def test_a_variance_is_the_sum_of_the_components_variances():
+    factors = np.zeros((2, 3, 2))
+    factors[0], factors[1] = [[1, 2], [0, 1], [3, 0]], [[0, 5], [0, 0], [1, 1]]
+    model = VarianceModel(("a", "b"), ("neck", "elbow"), factors, LIMITS)
+    a, b = np.full((2, 3), 0.3), np.full((2, 3), 0.2)
+    found = model.sd(["neck", "left_elbow"], {"a": a, "b": b})
+    np.testing.assert_allclose(found, [[np.hypot(0.3, 0.4), 0.2, 0.9], [1.0, 0, np.hypot(0.3, 0.2)]])
+
+
+def test_deviations_turn_with_the_axes():
+    quarter = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    np.testing.assert_allclose(turned(np.array([[1.0, 2, 3]]), quarter), [[2, 1, 3]])
+    assert np.isclose((turned(np.array([[1.0, 2, 3]]), np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]) ** 2).sum(), 14)
+
+
+# Degrees of freedom
+
+
+def deviations(pose, sd=0.02):
+    picture = people.picture()
+    names = picture.body.skeleton.dof_names
+    return dict(zip(names, pose_deviations(picture.body.skeleton, picture.points, pose, np.full((len(picture.body.landmark_names), 3), sd))))
+
+
+def test_the_roll_of_a_straight_arm_is_unknown_within_its_limits_and_that_of_a_bent_one_is_known():
+    skeleton = people.picture().body.skeleton
+    low, high = (limit[skeleton.dof_names.index("left_elbow_roll")] for limit in skeleton.limits)
+    straight, bent = (deviations(skeleton.pose(left_shoulder_abduction=1.2, left_elbow_flexion=angle)) for angle in (0.0, 1.4))
+    assert np.isclose(straight["left_elbow_roll"], (high - low) / np.sqrt(12), rtol=0.05)
+    assert bent["left_elbow_roll"] < 0.15
+
+
+def test_the_deviation_of_an_angle_follows_from_that_of_what_it_moves():
+    pose = people.picture().body.skeleton.pose(left_shoulder_abduction=1.2, left_elbow_flexion=1.4)
+    fine, coarse = deviations(pose, 0.01), deviations(pose, 0.02)
+    forearm = 0.25
+    assert 0.2 * 0.01 / forearm < fine["left_elbow_flexion"] < 3 * 0.01 / forearm
+    assert np.isclose(coarse["left_elbow_flexion"], 2 * fine["left_elbow_flexion"], rtol=0.1)
+    assert all(coarse[name] >= fine[name] for name in fine)
+
+
+# Limbs
+
+
+def statuses(*radii: float, unseen: float = 0.0) -> tuple[str, ...]:
+    sd = np.outer(radii, [1, 0, 0]).astype(float)
+    return limb_statuses(LIMITS, JOINTS, sd, dict.fromkeys(LIMBS, unseen))
+
+
+def test_a_limb_is_as_doubtful_as_its_most_doubtful_joint():
+    assert limbs_of(JOINTS) == LIMBS_OF_JOINTS
+    assert statuses(0.1, 0.1, 0.1, 0.1, 0.1) == ("tracked",) * 3
+    assert statuses(0.1, 0.1, 0.1, 0.21, 0.21) == ("tracked", "uncertain", "tracked")
+    assert statuses(0.31, 0.1, 0.1, 0.1, 0.31) == ("uncertain", "tracked", "uncertain")
+
+
+def test_a_doubtful_limb_that_no_silhouette_shows_is_predicted():
+    assert statuses(0.1, 0.1, 0.1, 0.3, 0.1, unseen=UNSEEN + 0.01) == ("tracked", "predicted", "tracked")
+    assert statuses(0.1, 0.1, 0.1, 0.1, 0.1, unseen=1.0) == ("tracked",) * 3
+
+
+# Steps
+
+
+class Earlier:
+    def __init__(self, seconds: float, points: np.ndarray) -> None:
+        self.seconds, self.points = seconds, points
+
+
+@given(st.floats(0.01, 1), st.floats(0, 0.5))
+def test_a_step_is_measured_in_the_same_time_at_any_frame_rate(interval, speed):
+    before = Earlier(3.0, np.zeros((2, 3)))
+    now = np.array([[speed * interval, 0, 0], [0, 0, 0]])
+    np.testing.assert_allclose(steps(now, 3.0 + interval, before), [speed * PACE, 0], atol=1e-9)
+
+
+def test_the_first_frame_has_no_step():
+    np.testing.assert_array_equal(steps(np.ones((2, 3)), 0.0, None), [0, 0])
+
+
+def test_few_repeated_pictures_are_no_fault_and_more_raise_the_doubt_to_a_bound():
+    assert [stillness(n) for n in range(STILL_ALLOWED + 1)] == [0] * (STILL_ALLOWED + 1)
+    later = [stillness(n) for n in range(STILL_ALLOWED, 100)]
+    assert sorted(later) == later and later[1] > 0 and later[-1] == 2

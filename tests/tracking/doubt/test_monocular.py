@@ -1,0 +1,90 @@
+"""Doubt about one camera's estimates: it grows with what the silhouette does not show, contradicts or repeats."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import people
+import pytest
+
+from shadowpuppet.tracking.doubt.monocular import Chains, MonocularDoubt
+from shadowpuppet.tracking.monocular.settings import make_settings
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+
+NAMES = people.picture().body.landmark_names
+LEFT_HAND, RIGHT_HAND = NAMES.index("left_hand"), NAMES.index("right_hand")
+
+
+@cache
+def tracker() -> MonocularTracker:
+    return MonocularTracker(people.picture(), make_settings("liu2011", {}))
+
+
+def pose(**angles: float) -> np.ndarray:
+    spread = {"left_shoulder_abduction": 1.3, "right_shoulder_abduction": 1.3}
+    return people.picture().body.skeleton.pose(**(spread | angles))
+
+
+def state(at: np.ndarray, mask: np.ndarray | None = None):
+    """The state of an estimate that all particles agree on."""
+    mask = people.picture().mask(at) if mask is None else mask
+    begun = tracker().start(np.random.default_rng(0), mask)
+    particles = [each._replace(poses=np.repeat(at[None, stage.dofs], len(each.poses), axis=0))
+                 for stage, each in zip(tracker().stages, begun.particles)]
+    return tracker().judge(at, particles, tracker().observe(mask, at))
+
+
+def doubt(at: np.ndarray, mask: np.ndarray | None = None, before=None, seconds: float = 0.0):
+    mask = people.picture().mask(at) if mask is None else mask
+    return MonocularDoubt(tracker())(state(at, mask), mask, seconds, before)
+
+
+def test_the_same_frame_has_the_same_doubt_and_a_fitting_estimate_of_a_stretched_body_little():
+    (one, _), (other, _) = doubt(pose()), doubt(pose())
+    assert all(np.array_equal(a, b) for a, b in zip(one, other))
+    assert one.joint_sd.shape == (len(NAMES), 3) and one.pose_sd.shape == (len(pose()),)
+    assert np.isfinite(one.joint_sd).all() and (one.joint_sd > 0).all() and np.isfinite(one.pose_sd).all()
+    assert one.limb_status == ("tracked",) * 3
+
+
+def test_an_arm_before_the_trunk_is_doubtful_and_the_other_is_not_affected():
+    hidden = pose(left_shoulder_abduction=0.1, left_elbow_roll=1.5, left_elbow_flexion=2.0)
+    (seen, _), (unseen, _) = doubt(pose()), doubt(hidden)
+    assert (unseen.joint_sd[LEFT_HAND] > 1.5 * seen.joint_sd[LEFT_HAND]).any()
+    np.testing.assert_allclose(unseen.joint_sd[RIGHT_HAND], seen.joint_sd[RIGHT_HAND], rtol=0.5)
+
+
+def test_silhouette_that_nothing_explains_near_an_arm_makes_it_doubtful():
+    mask = people.picture().mask(pose())
+    pixel = np.rint(people.picture().camera.project(people.picture().points_world(pose()[None])[0][LEFT_HAND])).astype(int)
+    more = mask.copy()
+    more[pixel[1] + 6 : pixel[1] + 30, pixel[0] - 10 : pixel[0] + 10] = True
+    (clean, _), (odd, _) = doubt(pose(), mask), doubt(pose(), more)
+    assert odd.joint_sd[LEFT_HAND].max() > 1.2 * clean.joint_sd[LEFT_HAND].max()
+
+
+def test_an_arm_outside_the_silhouette_is_doubtful():
+    without = people.picture().mask(pose(left_shoulder_abduction=0.0))
+    (clean, _), (odd, _) = doubt(pose()), doubt(pose(), without)
+    assert odd.joint_sd[LEFT_HAND].max() > 1.5 * clean.joint_sd[LEFT_HAND].max()
+    assert odd.limb_status[1] != "tracked"
+
+
+def test_a_silhouette_that_does_not_change_makes_all_limbs_doubtful_after_a_while():
+    before, found = None, []
+    for n in range(30):
+        now, before = doubt(pose(), before=before, seconds=n / 15)
+        found.append(now)
+    assert found[2].limb_status == found[0].limb_status == ("tracked",) * 3
+    assert found[-1].limb_status[1] != "tracked" and found[-1].limb_status[2] != "tracked"
+    assert (found[-1].joint_sd >= found[0].joint_sd - 1e-12).all()
+
+
+def test_the_mirror_image_of_a_bone_is_as_far_before_as_it_is_behind():
+    names = ("left_shoulder", "left_elbow", "left_wrist", "right_shoulder")
+    points = np.array([[0, 0, 3.0], [0.1, 0, 2.8], [0.1, 0.2, 2.8], [0.3, 0, 3.0]])
+    found = Chains.of(names).mirrored(points)
+    assert found[0] == found[3] == 0
+    assert found[1] == pytest.approx(2 * 0.2, abs=0.03)
+    assert found[2] >= found[1]
