@@ -23,9 +23,13 @@ def limbs_of(joints: Iterable[str]) -> tuple[str, ...]:
     return tuple(limb for limb in LIMBS if limb in found)
 
 
+def doubtful_limbs(joints: Iterable[str], statuses: Iterable[str] | None) -> list[str]:
+    """The limbs of joints whose status is one of `DOUBTFUL`. `statuses`: one for each of `limbs_of(joints)`; None: all vouched for."""
+    return [limb for limb, status in zip(limbs_of(joints), () if statuses is None else statuses) if status in DOUBTFUL]
+
+
 def doubtful_joints(joints: Iterable[str], statuses: Iterable[str] | None) -> frozenset[str]:
-    """Those of joints whose limb has one of the statuses `DOUBTFUL`. `statuses`: one for each of `limbs_of(joints)`; None: all vouched
-    for."""
+    """Those of joints that belong to `doubtful_limbs`."""
     joints = tuple(joints)
-    doubtful = {limb for limb, status in zip(limbs_of(joints), () if statuses is None else statuses) if status in DOUBTFUL}
+    doubtful = doubtful_limbs(joints, statuses)
     return frozenset(joint for joint in joints if limb_of(joint) in doubtful)

@@ -9,6 +9,7 @@ import numpy as np
 from shadowpuppet.camera.drawing import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, write_text
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.motion.limbs import doubtful_limbs
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
@@ -36,7 +37,9 @@ def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Pictur
         image, mask = frames.images[n], frames.masks[n]
         _fit(tile, None if image is None else _tile(image, mask, picture, pose, doubtful))
         write_text(tile, picture.camera.name if image is not None else f"{picture.camera.name}: no picture", 0, WHITE, size=height)
-    write_text(out, f"{frames.time:.2f} s  {found.status}", out.shape[0] - 40, WHITE, size=max(360, height))
+    named = ", ".join(doubtful_limbs(pictures[0].body.landmark_names, found.limb_status)).replace("_", " ")
+    words = found.status if not named else f"{found.status}, {named} doubtful"
+    write_text(out, f"{frames.time:.2f} s  {words}", out.shape[0] - 40, WHITE, size=max(360, height))
     return out
 
 

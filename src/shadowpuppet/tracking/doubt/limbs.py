@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.motion.limbs import DOUBTFUL, doubtful_joints, limbs_of
+from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs
 
 GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
           "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle",)}
@@ -39,5 +39,5 @@ def limb_of_part(part: str) -> str:
 def doubtful_names(body: Body, statuses: Sequence[str] | None) -> frozenset[str]:
     """Names of the landmarks and shape parts of a body's limbs of a status of `DOUBTFUL`, which are drawn dashed and pale. `statuses`: one
     for each limb of the body; None: all vouched for."""
-    limbs = {limb for limb, status in zip(limbs_of(body.landmark_names), () if statuses is None else statuses) if status in DOUBTFUL}
+    limbs = doubtful_limbs(body.landmark_names, statuses)
     return doubtful_joints(body.landmark_names, statuses) | {part for part in body.parts if limb_of_part(part) in limbs}
