@@ -1,20 +1,21 @@
 """The factors of doubt (`tracking.doubt`), chosen on made recordings, clean and spoiled, and how well they hold on recordings left out.
 
-    python benchmarks/calibrate_doubt.py [--kind monocular,multiview] [--write] [--again] [--workers 2]
+    python benchmarks/calibrate_doubt.py [--kind monocular,multiview] [--write] [--markdown docs/doubt.md]
 
 Every recording of the proving grounds (`synthetic.proving_ground`, `proving_rings`; made in build where they are missing) is tracked clean
 and with each fault of `FAULTS` in its silhouettes; components of doubt and errors are kept in build/doubt. The factors of a group of joints
-along an axis minimise the mean interval score of 90 % intervals (Gneiting and Raftery 2007), over all runs. The table is of recordings left
-out: a third at a time is tested with the factors of the others. `--write` writes src/shadowpuppet/tracking/doubt/factors.toml.
+along an axis minimise the mean interval score of 90 % intervals (Gneiting and Raftery 2007), over all runs. Tables and pictures are of
+recordings left out: a third at a time is tested with the factors of the others. `--write` writes
+src/shadowpuppet/tracking/doubt/factors.toml; `--markdown` the tables to their places in a page, and the pictures to assets beside it.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from multiprocessing import get_context
@@ -23,198 +24,17 @@ from typing import NamedTuple
 
 import numpy as np
 import smallest
-from cases import Case
-from proving_ground import HERE as GROUND
-from proving_ground import made as made_ground
-from spoiled import SPOILS
+from doubt_runs import BUILD, MADE, Tracked, collect, read_runs
+from faults import into_page
 
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR
-from shadowpuppet.motion.motion import BLANK, JointTable
-from shadowpuppet.motion.synchronization import at_times
-from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.person_rig import fit_multiview
-from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
-from shadowpuppet.pipeline.survey import survey_rig
-from shadowpuppet.synthetic import proving_rings, synthesize
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
-from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
-from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
-RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
-BUILD = GROUND.parent / "doubt"
-TABLE = GROUND.parent.parent / "src" / "shadowpuppet" / "tracking" / "doubt" / "factors.toml"
+TABLE = Path(__file__).resolve().parent.parent / "src" / "shadowpuppet" / "tracking" / "doubt" / "factors.toml"
 WIDTH = 1.6448536269514722
 """Half width of a 90 % interval, in standard deviations."""
-SECONDS = 2.0
-"""Length of a fault with a beginning and an end."""
-Fault = Callable[[np.random.Generator, list[Mask], float], list[Mask]]
-"""Masks of a film, one (H, W) a frame, and its rate, to spoiled ones."""
-
-
-def _all(name: str) -> Fault:
-    spoil = SPOILS[name]
-
-    def spoiled(rng: np.random.Generator, masks: list[Mask], rate: float) -> list[Mask]:
-        size = float(np.sqrt(np.median([mask.sum() for mask in masks])))
-        return [spoil(rng, mask, size) for mask in masks]
-
-    return spoiled
-
-
-def _during(change: Callable[[Mask, list[Mask], float], Mask]) -> Fault:
-    """A fault from the film's third on; `change`: of a mask, all masks and the share of the fault's time that has passed."""
-
-    def spoiled(rng: np.random.Generator, masks: list[Mask], rate: float) -> list[Mask]:
-        first, count = len(masks) // 3, max(1, min(round(SECONDS * rate), len(masks) // 3))
-        return [change(mask, masks, (n - first) / count) if first <= n < first + count else mask for n, mask in enumerate(masks)]
-
-    return spoiled
-
-
-def _second(mask: Mask, masks: list[Mask], passed: float) -> Mask:
-    """A second person, the first's silhouette at another time, passes from right to left."""
-    other, width = masks[round(passed * (len(masks) - 1)) // 2], mask.shape[1]
-    shift = round(width * (0.9 - 1.7 * passed))
-    moved = np.zeros_like(other)
-    if shift >= 0:
-        moved[:, shift:] = other[:, : width - shift]
-    else:
-        moved[:, :shift] = other[:, -shift:]
-    return mask | moved
-
-
-def _obstacle(mask: Mask, masks: list[Mask], passed: float) -> Mask:
-    """The left 30 % of the person are hidden."""
-    out, columns = mask.copy(), np.flatnonzero(mask.any(0))
-    if len(columns):
-        out[:, : int(columns[0] + 0.3 * (columns[-1] - columns[0]))] = False
-    return out
-
-
-def _thing(mask: Mask, masks: list[Mask], passed: float) -> Mask:
-    """Something beside the person belongs to the silhouette."""
-    out, (height, width) = mask.copy(), mask.shape
-    out[int(0.3 * height) : int(0.8 * height), int(0.6 * width) : int(0.75 * width)] = True
-    return out
-
-
-FAULTS: dict[str, Fault] = {
-    "clean": lambda rng, masks, rate: masks,
-    **{name: _all(name) for name in ("grown", "eroded", "holes", "flicker")},
-    "frozen": _during(lambda mask, masks, passed: masks[len(masks) // 3]),
-    "second person": _during(_second),
-    "obstacle": _during(_obstacle),
-    "thing": _during(_thing),
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Tracked:
-    """A run's components of doubt and errors, along the evidence's axes."""
-
-    recording: str
-    fault: str
-    joints: tuple[str, ...]
-    components: dict[str, Array]
-    """Of shape (T, L, 3), metres."""
-    errors: Array
-    """Truth less estimate (T, L, 3), metres; not a number where there is none."""
-
-
-def track_monocular(path: Path) -> Iterator[Tracked]:
-    """A recording of one camera with every fault."""
-    case, options = Case.read(path), make_options({})
-    picture = case.person(options, np.random.default_rng(0)).picture(case.camera, options.tracker.body)
-    names, rate = picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
-    turn = case.camera.T_camera_world[:3, :3]
-    for n, (fault, spoil) in enumerate(FAULTS.items()):
-        masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
-        tracker = MonocularTracker(picture, options.tracker)
-        doubt, state, before, rows, poses = MonocularDoubt(tracker), None, None, [], []
-        for seconds, mask in zip(case.times.tolist(), masks):
-            state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask)
-            found, before = doubt.evidence(state, mask, seconds, before)
-            rows.append(found.components)
-            poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
-        errors = _errors(case.truth, names, picture.points_world(np.array(poses))) @ turn.T
-        yield Tracked(path.name, fault, names, {name: np.array([row[name] for row in rows]) for name in rows[0]}, errors)
-
-
-ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
-"""Faults that, of several cameras, only the first has."""
-LATE = 5
-"""Frames by which the camera is late."""
-
-
-def track_multiview(path: Path) -> Iterator[Tracked]:
-    """A recording of several cameras with every fault."""
-    options = make_options({"overlay": False})
-    survey = survey_rig(open_rig(path, options), options)
-    subject = fit_multiview(np.random.default_rng(0), survey, options)
-    truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
-    frames = [(each.time, each.masks) for each in synchronized_frames(survey.rig, survey.silhouettes)]
-    films = [[masks[n] if masks[n] is not None else np.zeros(size[::-1], bool) for _, masks in frames]
-             for n, size in enumerate(camera.size for camera in subject.hull.cameras)]
-    times, names = [time for time, _ in frames], subject.body.landmark_names
-    late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
-    for n, (fault, spoil) in enumerate((FAULTS | {"late": late}).items()):
-        spoiled = [spoil(np.random.default_rng([n, m]), film, rate) if m == 0 or fault not in ONE_CAMERA else film
-                   for m, film in enumerate(films)]
-        rng, doubt, state, before, rows, poses = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, [], []
-        for seconds, masks in zip(times, zip(*spoiled)):
-            observation = subject.observe(masks)
-            state = subject.next_state(rng, state, observation)
-            if state is None:
-                poses.append(np.full(len(subject.body.skeleton.dofs), np.nan))
-                rows.append(None)
-                continue
-            found, before = doubt.evidence(state, observation.points, masks, seconds, before)
-            rows.append(found.components)
-            poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
-        errors = _errors(at_times(truth, np.array(times)), names, subject.body.points(np.array(poses)))
-        some = next(row for row in rows if row is not None)
-        components = {name: np.array([np.zeros((len(names), 3)) if row is None else row[name] for row in rows]) for name in some}
-        yield Tracked(path.name, fault, names, components, errors)
-
-
-def make_ring(path: Path) -> None:
-    """Make a recording of the proving ground of several cameras, its first `RING_SECONDS` at `RING_RATE`, where it is missing."""
-    number, spec = next((n, spec) for n, spec in enumerate(proving_rings()) if spec.name == path.name)
-    if not (done := path / "made").exists():
-        rate = min(spec.rate, RING_RATE)
-        synthesize(replace(spec, rate=rate, frames=round(RING_SECONDS * rate)), path, np.random.default_rng([2, number]))
-        done.touch()
-
-
-def _errors(truth: JointTable, names: Sequence[str], points: Array) -> Array:
-    """Truth less estimates (T, L, 3), which start with the truth's first frame."""
-    known = [truth.positions[: len(points), truth.names.index(name)] if name in truth.names else np.full((len(points), 3), np.nan)
-             for name in names]
-    return np.stack(known, 1) - points
-
-
-def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
-    """Files with the runs of a recording, one a fault, in a folder of `build`."""
-    folder = build / kind / path.name
-    if path.parent == RINGS:
-        make_ring(path)
-    if again or not (folder / "done").exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        for run in TRACK[kind](path):
-            np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
-                                names=list(run.components), components=np.stack(list(run.components.values()), 3).astype(np.float32))
-        (folder / "done").touch()
-    return sorted(folder.glob("*.npz"))
-
-
-TRACK = {"monocular": track_monocular, "multiview": track_multiview}
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND),
-                                             "multiview": lambda: [RINGS / spec.name for spec in proving_rings()]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,16 +51,6 @@ class Errors:
     """Components (n, F), metres."""
     errors: Array
     """Of shape (n,), metres."""
-
-
-def read_runs(files: Iterable[Path]) -> list[Tracked]:
-    """Runs from their files."""
-    found = []
-    for file in files:
-        data = np.load(file, allow_pickle=False)
-        components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
-        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"]))
-    return found
 
 
 def errors_of(runs: Iterable[Tracked]) -> list[Errors]:
@@ -419,6 +229,34 @@ def limb_table(tested: Sequence[LimbJoint]) -> str:
     return "\n".join(lines)
 
 
+def draw(path: Path, joints: Sequence[Tested], limbs: Sequence[LimbJoint]) -> None:
+    """Calibration curve and, by kind of limb, false alarms over silence (PNG)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from scipy.stats import norm
+
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    stated, share = np.linspace(0.05, 0.99, 40), np.concatenate([np.abs(each.run.errors) / each.sd for each in joints])
+    left.plot([0, 100], [0, 100], color="0.7", linewidth=1)
+    left.plot(100 * stated, [100 * (share <= norm.ppf(0.5 + part / 2)).mean() for part in stated])
+    left.set(xlabel="stated interval, %", ylabel="true positions in it, %", title="Calibration")
+    for kind in dict.fromkeys(each.kind for each in limbs):
+        own = [each for each in limbs if each.kind == kind]
+        errors, radius = (np.concatenate([getattr(each, name) for each in own]) for name in ("errors", "radius"))
+        limits = np.quantile(radius, np.linspace(0, 1, 200))
+        silent = [100 * ((errors > FAR_ERROR) & (radius <= limit)).mean() for limit in limits]
+        doubted = [100 * (radius[errors < NEAR] > limit).mean() for limit in limits]
+        (line,) = right.plot(silent, doubted, label=kind)
+        limit = float(np.mean([each.limit for each in own]))
+        right.plot(np.interp(limit, limits, silent), np.interp(limit, limits, doubted), "o", color=line.get_color())
+    right.set(xlabel="over 300 mm off and vouched for, % of the joints", ylabel="under 100 mm off, called doubtful, %", title="Limbs",
+              xlim=(-0.1, 5))
+    right.legend()
+    figure.savefig(path, dpi=110)
+
+
 def _rank_correlation(one: Array, other: Array) -> float:
     from scipy.stats import spearmanr
 
@@ -439,7 +277,9 @@ HEAD = "# Factors of the components of doubt, by group of joints and axis. Writt
 
 
 def _smallest(folder: Path) -> list[object]:
-    return ["--kind", "monocular", "--folder", folder, "--recordings", smallest.make(folder / "tiny")]
+    page = smallest.copy(Path(__file__).resolve().parent.parent / "docs" / "doubt.md", folder)
+    (folder / "assets").mkdir(exist_ok=True)
+    return ["--kind", "monocular", "--folder", folder, "--markdown", page, "--recordings", smallest.make(folder / "tiny")]
 
 
 def main() -> None:
@@ -449,6 +289,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=Path, nargs="*", help="folders; the proving grounds without")
     parser.add_argument("--folder", type=Path, default=BUILD, help="where components and errors are kept")
     parser.add_argument("--write", action="store_true", help="write the factors into the package")
+    parser.add_argument("--markdown", type=Path, help="page for the tables, at their places; pictures go to assets beside it")
     parser.add_argument("--again", action="store_true", help="track again what has been tracked")
     parser.add_argument("--workers", type=int, default=2)
     args, texts = smallest.parse(parser, _smallest), dict[str, str]()
@@ -459,7 +300,12 @@ def main() -> None:
         runs = read_runs(files)
         for title, own in (("clean", [run for run in runs if run.fault == "clean"]), ("clean and spoiled", runs)):
             joints, limbs = left_out(own)
-            print(f"\n{kind}, {title}\n\n{joint_table(joints)}\n\n{limb_table(limbs)}", flush=True)
+            text = f"{joint_table(joints)}\n\n{limb_table(limbs)}"
+            print(f"\n{kind}, {title}\n\n{text}", flush=True)
+            if args.markdown:
+                into_page(args.markdown, f"{kind}, {title}", text)
+        if args.markdown:
+            draw(args.markdown.parent / "assets" / f"doubt_{kind}.png", joints, limbs)
         factors = fit_all(errors_of(runs))
         texts[kind] = factors_text(kind, runs[0].components, factors, fit_limits(limb_joints(runs, factors)))
         print("\n" + texts[kind])

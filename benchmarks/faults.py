@@ -30,6 +30,7 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_truth
+from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR, joint_errors, overlap
 from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.pipeline.options import make_options
@@ -41,6 +42,8 @@ from shadowpuppet.video import open_frames
 
 HERE = Path(__file__).resolve().parent.parent / "build" / "faults"
 PLACE = r"(<!-- table: {} -->\n).*?(<!-- end of table -->)"
+NEAR = 0.1
+"""Joint error (m) below which a doubtful limb is a false alarm."""
 SURE = 3
 """Number of good frames after which a person is recovered."""
 ONE_CAMERA, FOUR_CAMERAS = "one camera", "four cameras"
@@ -57,6 +60,8 @@ class Measures(NamedTuple):
     """Greatest joint error of the frame, of shape (T,), metres; not a number where the person cannot be seen, or no joint is known."""
     status: np.ndarray
     """Of shape (T,)."""
+    judged: Array
+    """Number of joints (T, 5): all, far off, those of them in limbs that are `tracked`, near the truth, and those of them in others."""
     overlap: Array
     """Intersection over union of silhouettes and exact masks of the cameras as calibrated, mean of the cameras, of shape (T,); not a number
     where the person cannot be seen."""
@@ -92,10 +97,10 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
     except ShadowPuppetError as error:
         count = len(truth.times)
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
-                        np.full(count, np.nan), str(error))
-    errors = _errors(motion, truth)
+                        np.zeros((count, 5)), np.full(count, np.nan), str(error))
+    mean, worst, judged = _errors(motion, truth)
     seen = _upto(seen, len(motion))
-    mean, worst = np.where(seen, errors[0], np.nan), np.where(seen, errors[1], np.nan)
+    mean, worst, judged = np.where(seen, mean, np.nan), np.where(seen, worst, np.nan), judged * seen[:, None]
     alike = np.full(len(motion), np.nan)
     for frames in cache.frames((one for one in ()), options):
         n = int(np.abs(motion.times - frames.time).argmin())
@@ -103,18 +108,23 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
                   if mask is not None and round(frames.time * film.rate) < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
-    return Measures(motion.times, mean, worst, motion.status, np.where(seen, alike, np.nan))
+    return Measures(motion.times, mean, worst, motion.status, judged, np.where(seen, alike, np.nan))
 
 
-def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array]:
-    """Mean and greatest joint error of each frame of the run, (T,) each, metres; a missing joint counts 0.5 m in the mean only."""
+def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array, Array]:
+    """Mean and greatest joint error of each frame of the run, (T,) each, metres, and `Measures.judged` (T, 5); a missing joint counts
+    0.5 m in the mean, and is neither far off nor near."""
     nearest = np.abs(truth.times[None] - motion.times[:, None]).argmin(1)
     there = JointTable(motion.times, truth.names, truth.positions[nearest])
     found = joint_errors(motion.table, there)
     distance = np.where(found.known, found.distance, np.nan)
+    vouched = motion.limb_status[:, [motion.limbs.index(limb_of(name)) for name in found.names]] == "tracked"
+    given = found.known & ~found.lost
+    far, near = given & (distance > FAR_ERROR), given & (distance < NEAR)
+    judged = np.stack([found.known, far, far & vouched, near, near & ~vouched], 2).sum(1)
     blank = ~np.isfinite(distance).any(1)
     distance[blank] = LOST_ERROR
-    return np.nanmean(distance, 1), np.where(blank | found.lost.any(1), np.nan, np.nanmax(distance, 1))
+    return np.nanmean(distance, 1), np.where(blank | found.lost.any(1), np.nan, np.nanmax(distance, 1)), judged
 
 
 def _exact_masks(path: Path) -> list[list[np.ndarray]]:
@@ -175,12 +185,12 @@ class Figures(NamedTuple):
         status = self.pooled(1, lambda one: one.status)
         return "/".join(str(int((status == name).sum())) for name in ("tracked", "uncertain", "lost", "absent"))
 
-    def far(self) -> tuple[int, int]:
-        """Frames in and after the fault with a joint far off, and those of them that are called tracked."""
-        worst = np.concatenate([self.pooled(part, lambda one: one.worst) for part in (1, 2)])
-        status = np.concatenate([self.pooled(part, lambda one: one.status) for part in (1, 2)])
-        far = worst > FAR_ERROR
-        return int(far.sum()), int((far & (status == "tracked")).sum())
+    def judged(self) -> list[str]:
+        """In and after the fault, in per cent: joints far off, those of them that are vouched for, of all joints; and doubtful ones of
+        those near the truth."""
+        joints, far, silent, near, doubted = np.concatenate([self.pooled(part, lambda one: one.judged) for part in (1, 2)]).sum(0)
+        shares = far / max(joints, 1), silent / max(joints, 1), doubted / max(near, 1)
+        return [f"{100 * share:.{digits}f}" for share, digits in zip(shares, (1, 1, 0))]
 
     def noticed(self) -> str:
         """Mean time in seconds from its beginning to the first frame that is not called tracked."""
@@ -205,15 +215,14 @@ class Figures(NamedTuple):
 
     def line(self) -> str:
         """The row as Markdown."""
-        far, silent = self.far()
         name = self.row.name + (" (refused)" if any(one.refused for one, _ in self.runs) else "")
-        cells = [name, *(self.error(part) for part in range(3)), self.masks(), self.status(), str(far), str(silent), self.noticed(),
+        cells = [name, *(self.error(part) for part in range(3)), self.masks(), self.status(), *self.judged(), self.noticed(),
                  self.recovered()]
         return "| " + " | ".join(cells) + " |"
 
 
-HEAD = """| fault | before | in | after | masks | tracked/uncertain/lost/absent | far | silent | noticed | recovered |
-|---|---|---|---|---|---|---|---|---|---|"""
+HEAD = """| fault | before | in | after | masks | tracked/uncertain/lost/absent | far | silent | doubted | noticed | recovered |
+|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
 def tables(jobs: Sequence[tuple[str, Spec, Row]], folder: Path, workers: int, again: bool) -> Iterator[tuple[str, Figures]]:

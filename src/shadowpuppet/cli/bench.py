@@ -33,7 +33,7 @@ MULTI_ROWS = (
     ("forces_frame", "a frame of ni2008, silhouettes to pose", 1e3, "ms", ""),
     ("default_frame", "a frame of the default preset", 1e3, "ms", ""),
 )
-CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "write": "writing"}
+CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "doubt": "doubt", "write": "writing"}
 
 
 def bench(*, json: Path | None = None, quick: Switch = False, quiet: Quiet = False) -> None:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from shadowpuppet.body.models import MODELS
 from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
 from shadowpuppet.pipeline.subject import average_body
-from shadowpuppet.tracking.doubt.doubt import UNSEEN, limb_statuses, pose_deviations
+from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import PACE, STILL_ALLOWED, steps, stillness
+from shadowpuppet.tracking.doubt.steps import PACE, STILL_ALLOWED, is_frozen, steps, stillness
 from shadowpuppet.tracking.doubt.variance import VarianceModel, turned, variance_model
 
 JOINTS = ("neck", "left_shoulder", "left_elbow", "left_hand", "right_knee")
@@ -33,11 +33,12 @@ def test_every_joint_and_part_of_every_body_has_a_limb_a_group_and_a_lever(name)
 @pytest.mark.parametrize("kind", ["monocular", "multiview"])
 def test_the_calibrated_factors_are_whole(kind):
     model = variance_model(kind)
-    bodies = [average_body(name) for name in MODELS if kind == "monocular" and name in people.BODIES or kind == "multiview"
-              and name not in people.BODIES]
+    bodies = [average_body(name) for name in MODELS if (kind == "monocular" and name in people.BODIES) or (kind == "multiview"
+              and name not in people.BODIES)]
     assert {group_of(joint) for body in bodies for joint in body.landmark_names} <= set(model.groups)
     assert model.factors.shape == (len(model.groups), 3, len(model.names))
-    assert (model.factors >= 0).all() and (model.factors[:, :, model.names.index("constant")] > 0).all()
+    assert (model.factors >= 0).all()
+    assert (model.factors[:, :, model.names.index("constant")] > 0).all()
     assert {limb.rpartition("_")[2] for body in bodies for limb in limbs_of(body.landmark_names)} <= set(model.limits)
     assert all(0 < limit <= 0.3 for limit in model.limits.values())
 
@@ -62,8 +63,8 @@ def test_deviations_turn_with_the_axes():
 
 def deviations(pose, sd=0.02):
     picture = people.picture()
-    names = picture.body.skeleton.dof_names
-    return dict(zip(names, pose_deviations(picture.body.skeleton, picture.points, pose, np.full((len(picture.body.landmark_names), 3), sd))))
+    skeleton, joints = picture.body.skeleton, np.full((len(picture.body.landmark_names), 3), sd)
+    return dict(zip(skeleton.dof_names, pose_deviations(skeleton, picture.points, pose, joints)))
 
 
 def test_the_roll_of_a_straight_arm_is_unknown_within_its_limits_and_that_of_a_bent_one_is_known():
@@ -86,9 +87,9 @@ def test_the_deviation_of_an_angle_follows_from_that_of_what_it_moves():
 # Limbs
 
 
-def statuses(*radii: float, unseen: float = 0.0) -> tuple[str, ...]:
+def statuses(*radii: float, unseen: float = 0.0, frozen: bool = False) -> tuple[str, ...]:
     sd = np.outer(radii, [1, 0, 0]).astype(float)
-    return limb_statuses(LIMITS, JOINTS, sd, dict.fromkeys(LIMBS, unseen))
+    return limb_statuses(LIMITS, JOINTS, sd, Evidence({}, dict.fromkeys(LIMBS, unseen), frozen))
 
 
 def test_a_limb_is_as_doubtful_as_its_most_doubtful_joint():
@@ -101,6 +102,10 @@ def test_a_limb_is_as_doubtful_as_its_most_doubtful_joint():
 def test_a_doubtful_limb_that_no_silhouette_shows_is_predicted():
     assert statuses(0.1, 0.1, 0.1, 0.3, 0.1, unseen=UNSEEN + 0.01) == ("tracked", "predicted", "tracked")
     assert statuses(0.1, 0.1, 0.1, 0.1, 0.1, unseen=1.0) == ("tracked",) * 3
+
+
+def test_all_limbs_of_a_frozen_picture_are_predicted():
+    assert statuses(0.1, 0.1, 0.1, 0.1, 0.1, frozen=True) == ("predicted",) * 3
 
 
 # Steps
@@ -125,4 +130,13 @@ def test_the_first_frame_has_no_step():
 def test_few_repeated_pictures_are_no_fault_and_more_raise_the_doubt_to_a_bound():
     assert [stillness(n) for n in range(STILL_ALLOWED + 1)] == [0] * (STILL_ALLOWED + 1)
     later = [stillness(n) for n in range(STILL_ALLOWED, 100)]
-    assert sorted(later) == later and later[1] > 0 and later[-1] == 2
+    assert sorted(later) == later
+    assert later[1] > 0
+    assert later[-1] == 2
+
+
+def test_a_film_converted_to_a_higher_rate_is_not_frozen():
+    assert not is_frozen(3, 3 / 60)
+    assert not is_frozen(4, 4 / 120)
+    assert not is_frozen(2, 2.0)
+    assert is_frozen(4, 4 / 15)

@@ -8,9 +8,11 @@ import numpy as np
 import people
 import pytest
 
+from shadowpuppet.tracking.doubt.mirror import Mirrors
 from shadowpuppet.tracking.doubt.monocular import Chains, MonocularDoubt
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.silhouette_cost import Observation
 
 NAMES = people.picture().body.landmark_names
 LEFT_HAND, RIGHT_HAND = NAMES.index("left_hand"), NAMES.index("right_hand")
@@ -43,8 +45,11 @@ def doubt(at: np.ndarray, mask: np.ndarray | None = None, before=None, seconds: 
 def test_the_same_frame_has_the_same_doubt_and_a_fitting_estimate_of_a_stretched_body_little():
     (one, _), (other, _) = doubt(pose()), doubt(pose())
     assert all(np.array_equal(a, b) for a, b in zip(one, other))
-    assert one.joint_sd.shape == (len(NAMES), 3) and one.pose_sd.shape == (len(pose()),)
-    assert np.isfinite(one.joint_sd).all() and (one.joint_sd > 0).all() and np.isfinite(one.pose_sd).all()
+    assert one.joint_sd.shape == (len(NAMES), 3)
+    assert one.pose_sd.shape == (len(pose()),)
+    assert np.isfinite(one.joint_sd).all()
+    assert (one.joint_sd > 0).all()
+    assert np.isfinite(one.pose_sd).all()
     assert one.limb_status == ("tracked",) * 3
 
 
@@ -77,8 +82,23 @@ def test_a_silhouette_that_does_not_change_makes_all_limbs_doubtful_after_a_whil
         now, before = doubt(pose(), before=before, seconds=n / 15)
         found.append(now)
     assert found[2].limb_status == found[0].limb_status == ("tracked",) * 3
-    assert found[-1].limb_status[1] != "tracked" and found[-1].limb_status[2] != "tracked"
+    assert found[-1].limb_status == ("predicted",) * 3
     assert (found[-1].joint_sd >= found[0].joint_sd - 1e-12).all()
+
+
+def test_mirror_images_are_found_within_the_joints_limits_and_count_where_the_silhouette_allows_them():
+    forward = pose(left_shoulder_abduction=1.1, left_shoulder_forward=0.5, left_elbow_flexion=0.3)
+    points = people.picture().points(forward[None])[0]
+    mirrors = Mirrors(people.picture())
+    allowed = mirrors.displacements(forward, points, tracker().observe(people.picture().mask(forward), forward))
+    assert allowed[LEFT_HAND, 2] > 0.1 > 0.05 > allowed[NAMES.index("neck")].max()
+    low, high = people.picture().body.skeleton.limits
+    found = mirrors.nearest(forward, points)
+    assert (found >= low - 1e-9).all()
+    assert (found <= high + 1e-9).all()
+    wall = np.zeros_like(people.picture().mask(forward))
+    elsewhere = mirrors.displacements(forward, points, Observation.of(wall))
+    assert np.isfinite(elsewhere).all()
 
 
 def test_the_mirror_image_of_a_bone_is_as_far_before_as_it_is_behind():

@@ -29,6 +29,8 @@ class Evidence(NamedTuple):
     """Lengths (L, 3), metres, by name."""
     unseen: Mapping[str, float]
     """Share of each limb that no silhouette shows: hidden before or behind the body, or outside the picture."""
+    frozen: bool = False
+    """Whether the picture has not changed for longer than repeated frames explain."""
 
 
 class Doubt(NamedTuple):
@@ -49,7 +51,7 @@ def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: S
     """
     model = variance_model(kind)
     sd = model.sd(names, evidence.components)
-    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), limb_statuses(model.limits, names, sd, evidence.unseen))
+    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), limb_statuses(model.limits, names, sd, evidence))
 
 
 def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) -> Array:
@@ -66,15 +68,17 @@ def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) 
     return np.sqrt(np.diag(np.linalg.inv(jacobian @ jacobian.T + np.diag(1 / np.maximum(width, STEP) ** 2))))
 
 
-def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, unseen: Mapping[str, float]) -> tuple[str, ...]:
+def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, evidence: Evidence) -> tuple[str, ...]:
     """Status of each limb from the deviations (L, 3), metres, of its joints, named `names`.
 
     `tracked`, but `uncertain` if a joint's deviation, all axes together, is over the limit (m) for limbs of its kind; or `predicted` if
-    moreover most of the limb is `unseen`, a share by limb.
+    moreover most of the limb is unseen. All are `predicted` if the picture is frozen.
     """
+    if evidence.frozen:
+        return ("predicted",) * len(limbs_of(names))
     radius, out = np.sqrt((sd**2).sum(1)), list[str]()
     for limb in limbs_of(names):
         own = [n for n, name in enumerate(names) if limb_of(name) == limb]
         sure = radius[own].max() <= limits[limb.rpartition("_")[2]]
-        out.append("tracked" if sure else "predicted" if unseen.get(limb, 0.0) > UNSEEN else "uncertain")
+        out.append("tracked" if sure else "predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain")
     return tuple(out)

@@ -18,7 +18,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.doubt.mirror import Mirrors
+from shadowpuppet.tracking.doubt.steps import CONSTANT, is_frozen, steps, stillness
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
 SAMPLES = 24
@@ -51,6 +52,8 @@ class Before(NamedTuple):
     """Silhouette (H, W)."""
     still: int
     """Number of frames for which it has been the same, pixel by pixel."""
+    since: float
+    """Time (s) of the first of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +98,11 @@ class MonocularDoubt:
             "still": stillness(still) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
+        components["alternative"] = self._mirrors.displacements(state.pose, points, self.tracker.observe(mask, state.pose))
         components["distance"] = points * (0, 0, DISTANCE)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
-        return Evidence(components, unseen), Before(seconds, points, mask, still)
+        since = before.since if still and before is not None else seconds
+        return Evidence(components, unseen, is_frozen(still, seconds - since)), Before(seconds, points, mask, still, since)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -112,6 +117,10 @@ class MonocularDoubt:
     @cached_property
     def _chains(self) -> Chains:
         return Chains.of(self.names)
+
+    @cached_property
+    def _mirrors(self) -> Mirrors:
+        return Mirrors(self.tracker.picture)
 
     @cached_property
     def _limbs(self) -> dict[str, list[int]]:

@@ -16,6 +16,11 @@ STILL_ALLOWED, STILL_UNIT = 2, 15
 """Frames that may repeat a silhouette, and the number of further ones after which a joint may be off by its lever."""
 
 
+FROZEN_FRAMES, FROZEN_SECONDS = 4, 0.25
+"""Frames and time from which on a silhouette that is the same, pixel by pixel, is a frozen picture's: conversion to a higher frame rate
+repeats fewer."""
+
+
 class Earlier(Protocol):
     """A frame before."""
 
@@ -40,3 +45,8 @@ def steps(points: Array, seconds: float, before: Earlier | None) -> Array:
 def stillness(frames: int) -> float:
     """Share of its lever by which a joint may be off after so many frames with the same silhouette, 0 to 2."""
     return min(max(frames - STILL_ALLOWED, 0) / STILL_UNIT, 2.0)
+
+
+def is_frozen(frames: int, seconds: float) -> bool:
+    """Whether a silhouette that has been the same for some frames and seconds is a frozen picture's."""
+    return frames >= FROZEN_FRAMES and seconds >= FROZEN_SECONDS

@@ -1,0 +1,205 @@
+"""Runs for `calibrate_doubt.py`: recordings tracked with faults in their silhouettes, and the components of doubt beside the errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from cases import Case
+from proving_ground import HERE as GROUND
+from proving_ground import made as made_ground
+from spoiled import SPOILS
+
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.motion.motion import BLANK, JointTable
+from shadowpuppet.motion.synchronization import at_times
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.person_rig import fit_multiview
+from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
+from shadowpuppet.pipeline.survey import survey_rig
+from shadowpuppet.synthetic import proving_rings, synthesize
+from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
+from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+
+RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
+BUILD = GROUND.parent / "doubt"
+SECONDS = 2.0
+"""Length of a fault with a beginning and an end."""
+Fault = Callable[[np.random.Generator, list[Mask], float], list[Mask]]
+"""Masks of a film, one (H, W) a frame, and its rate, to spoiled ones."""
+
+
+def _all(name: str) -> Fault:
+    spoil = SPOILS[name]
+
+    def spoiled(rng: np.random.Generator, masks: list[Mask], rate: float) -> list[Mask]:
+        size = float(np.sqrt(np.median([mask.sum() for mask in masks])))
+        return [spoil(rng, mask, size) for mask in masks]
+
+    return spoiled
+
+
+def _during(change: Callable[[Mask, list[Mask], float], Mask]) -> Fault:
+    """A fault from the film's third on; `change`: of a mask, all masks and the share of the fault's time that has passed."""
+
+    def spoiled(rng: np.random.Generator, masks: list[Mask], rate: float) -> list[Mask]:
+        first, count = len(masks) // 3, max(1, min(round(SECONDS * rate), len(masks) // 3))
+        return [change(mask, masks, (n - first) / count) if first <= n < first + count else mask for n, mask in enumerate(masks)]
+
+    return spoiled
+
+
+def _second(mask: Mask, masks: list[Mask], passed: float) -> Mask:
+    """A second person, the first's silhouette at another time, passes from right to left."""
+    other, width = masks[round(passed * (len(masks) - 1)) // 2], mask.shape[1]
+    shift = round(width * (0.9 - 1.7 * passed))
+    moved = np.zeros_like(other)
+    if shift >= 0:
+        moved[:, shift:] = other[:, : width - shift]
+    else:
+        moved[:, :shift] = other[:, -shift:]
+    return mask | moved
+
+
+def _obstacle(mask: Mask, masks: list[Mask], passed: float) -> Mask:
+    """The left 30 % of the person are hidden."""
+    out, columns = mask.copy(), np.flatnonzero(mask.any(0))
+    if len(columns):
+        out[:, : int(columns[0] + 0.3 * (columns[-1] - columns[0]))] = False
+    return out
+
+
+def _thing(mask: Mask, masks: list[Mask], passed: float) -> Mask:
+    """Something beside the person belongs to the silhouette."""
+    out, (height, width) = mask.copy(), mask.shape
+    out[int(0.3 * height) : int(0.8 * height), int(0.6 * width) : int(0.75 * width)] = True
+    return out
+
+
+FAULTS: dict[str, Fault] = {
+    "clean": lambda rng, masks, rate: masks,
+    **{name: _all(name) for name in ("grown", "eroded", "holes", "flicker")},
+    "frozen": _during(lambda mask, masks, passed: masks[len(masks) // 3]),
+    "second person": _during(_second),
+    "obstacle": _during(_obstacle),
+    "thing": _during(_thing),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """A run's components of doubt and errors, along the evidence's axes."""
+
+    recording: str
+    fault: str
+    joints: tuple[str, ...]
+    components: dict[str, Array]
+    """Of shape (T, L, 3), metres."""
+    errors: Array
+    """Truth less estimate (T, L, 3), metres; not a number where there is none."""
+
+
+def track_monocular(path: Path) -> Iterator[Tracked]:
+    """A recording of one camera with every fault."""
+    case, options = Case.read(path), make_options({})
+    picture = case.person(options, np.random.default_rng(0)).picture(case.camera, options.tracker.body)
+    names, rate = picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
+    turn = case.camera.T_camera_world[:3, :3]
+    for n, (fault, spoil) in enumerate(FAULTS.items()):
+        masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
+        tracker = MonocularTracker(picture, options.tracker)
+        doubt, state, before, rows, poses = MonocularDoubt(tracker), None, None, [], []
+        for seconds, mask in zip(case.times.tolist(), masks):
+            state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask)
+            found, before = doubt.evidence(state, mask, seconds, before)
+            rows.append(found.components)
+            poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
+        errors = _errors(case.truth, names, picture.points_world(np.array(poses))) @ turn.T
+        yield Tracked(path.name, fault, names, {name: np.array([row[name] for row in rows]) for name in rows[0]}, errors)
+
+
+ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
+"""Faults that, of several cameras, only the first has."""
+LATE = 5
+"""Frames by which the camera is late."""
+
+
+def track_multiview(path: Path) -> Iterator[Tracked]:
+    """A recording of several cameras with every fault."""
+    options = make_options({"overlay": False})
+    survey = survey_rig(open_rig(path, options), options)
+    subject = fit_multiview(np.random.default_rng(0), survey, options)
+    truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
+    frames = [(each.time, each.masks) for each in synchronized_frames(survey.rig, survey.silhouettes)]
+    films = [[masks[n] if masks[n] is not None else np.zeros(size[::-1], bool) for _, masks in frames]
+             for n, size in enumerate(camera.size for camera in subject.hull.cameras)]
+    times, names = [time for time, _ in frames], subject.body.landmark_names
+    late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
+    for n, (fault, spoil) in enumerate((FAULTS | {"late": late}).items()):
+        spoiled = [spoil(np.random.default_rng([n, m]), film, rate) if m == 0 or fault not in ONE_CAMERA else film
+                   for m, film in enumerate(films)]
+        rng, doubt, state, before, rows, poses = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, [], []
+        for seconds, masks in zip(times, zip(*spoiled)):
+            observation = subject.observe(masks)
+            state = subject.next_state(rng, state, observation)
+            if state is None:
+                poses.append(np.full(len(subject.body.skeleton.dofs), np.nan))
+                rows.append(None)
+                continue
+            found, before = doubt.evidence(state, observation.points, masks, seconds, before)
+            rows.append(found.components)
+            poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
+        errors = _errors(at_times(truth, np.array(times)), names, subject.body.points(np.array(poses)))
+        some = next(row for row in rows if row is not None)
+        components = {name: np.array([np.zeros((len(names), 3)) if row is None else row[name] for row in rows]) for name in some}
+        yield Tracked(path.name, fault, names, components, errors)
+
+
+def make_ring(path: Path) -> None:
+    """Make a recording of the proving ground of several cameras, its first `RING_SECONDS` at `RING_RATE`, where it is missing."""
+    number, spec = next((n, spec) for n, spec in enumerate(proving_rings()) if spec.name == path.name)
+    if not (done := path / "made").exists():
+        rate = min(spec.rate, RING_RATE)
+        synthesize(replace(spec, rate=rate, frames=round(RING_SECONDS * rate)), path, np.random.default_rng([2, number]))
+        done.touch()
+
+
+def _errors(truth: JointTable, names: Sequence[str], points: Array) -> Array:
+    """Truth less estimates (T, L, 3), which start with the truth's first frame."""
+    known = [truth.positions[: len(points), truth.names.index(name)] if name in truth.names else np.full((len(points), 3), np.nan)
+             for name in names]
+    return np.stack(known, 1) - points
+
+
+def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
+    """Files with the runs of a recording, one a fault, in a folder of `build`."""
+    folder = build / kind / path.name
+    if path.parent == RINGS:
+        make_ring(path)
+    if again or not (folder / "done").exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        for run in TRACK[kind](path):
+            np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
+                                names=list(run.components), components=np.stack(list(run.components.values()), 3).astype(np.float32))
+        (folder / "done").touch()
+    return sorted(folder.glob("*.npz"))
+
+
+TRACK = {"monocular": track_monocular, "multiview": track_multiview}
+MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND),
+                                             "multiview": lambda: [RINGS / spec.name for spec in proving_rings()]}
+
+
+def read_runs(files: Iterable[Path]) -> list[Tracked]:
+    """Runs from their files."""
+    found = []
+    for file in files:
+        data = np.load(file, allow_pickle=False)
+        components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
+        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"]))
+    return found
