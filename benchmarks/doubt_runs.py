@@ -136,8 +136,8 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
     subject = fit_multiview(np.random.default_rng(0), survey, options)
     truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
     frames = [(each.time, each.masks) for each in synchronized_frames(survey.rig, survey.silhouettes)]
-    films = [[masks[n] if masks[n] is not None else np.zeros(size[::-1], bool) for _, masks in frames]
-             for n, size in enumerate(camera.size for camera in subject.hull.cameras)]
+    empty = [np.zeros(camera.size[::-1], bool) for camera in subject.hull.cameras]
+    films = [[none if (mask := masks[n]) is None else mask for _, masks in frames] for n, none in enumerate(empty)]
     times, names = [time for time, _ in frames], subject.body.landmark_names
     late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
     for n, (fault, spoil) in enumerate((FAULTS | {"late": late}).items()):

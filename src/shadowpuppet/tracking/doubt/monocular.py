@@ -163,7 +163,7 @@ class MonocularDoubt:
         outside = thick(body & ~mask & counted)
         R, t = picture.camera.T_camera_world[:3, :3], picture.camera.T_camera_world[:3, 3]
         pixels = picture.camera.project((points - t) @ R)
-        cut = ~((pixels >= 0) & (pixels < picture.camera.size)).all(1)
+        cut = ~np.asarray(((pixels >= 0) & (pixels < picture.camera.size)).all(1))
         shares = {}
         for limb, own in drawn.items():
             area = max(np.count_nonzero(own), 1)
@@ -217,7 +217,7 @@ class Chains:
     def foreshortened(self, points: Array, across: Array) -> Array:
         """Errors of depth (L,), metres, of landmarks (L, 3) if the bones above look longer or shorter by `SHORTENING`, and so half the line
         of the shoulders, `across` (3,)."""
-        shoulders = _depth_errors(np.array([np.linalg.norm(across) / 2]), across[2:] / 2)
+        shoulders = _depth_errors(np.array([float(np.linalg.norm(across)) / 2]), across[2:] / 2)
         return np.sqrt(self.bears @ _depth_errors(*self._along(points)) ** 2 + self.sided * shoulders**2)
 
     def _along(self, points: Array) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ class VarianceModel:
 @cache
 def variance_model(kind: str) -> VarianceModel:
     """The calibrated model of `monocular` or `multiview` tracking."""
-    table = tomllib.loads(resources.files(__package__).joinpath(TABLE).read_text("utf-8"))[kind]
+    table = tomllib.loads(resources.files("shadowpuppet.tracking.doubt").joinpath(TABLE).read_text("utf-8"))[kind]
     names, groups = tuple(table["components"]), tuple(group for group in GROUPS if group in table)
     return VarianceModel(names, groups, np.array([[table[group][axis] for axis in "xyz"] for group in groups], float), table["limits"])
 
