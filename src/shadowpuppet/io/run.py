@@ -116,7 +116,7 @@ class RunWriter:
         """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self._start()
         kept = self._motion.append(frame)
-        self._append((*map(csv_line, run_rows(kept)), self._intervals.lines(kept)))
+        self._append(run_rows(kept), self._intervals.lines(kept))
 
     def _start(self) -> None:
         """Replace an earlier run and write the headers, once."""
@@ -128,12 +128,12 @@ class RunWriter:
         self._write_info(complete=False)
         with self._system_errors():
             self._tables = [(self.folder / name).open("w", encoding="utf-8", newline="") for name in TABLES]
-        self._append((*map(csv_line, run_headers(self._motion.joint_names, self._motion.dof_names)), self._intervals.header()))
+        self._append(run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header())
 
-    def _append(self, texts: Sequence[str]) -> None:
-        """Append lines to each of the tables."""
+    def _append(self, rows: tuple[list[str], list[str]], intervals: str) -> None:
+        """Append a row to joints.csv and angles.csv, and lines to intervals.csv."""
         with self._system_errors():
-            for table, text in zip(self._tables, texts, strict=True):
+            for table, text in zip(self._tables, (*map(csv_line, rows), intervals), strict=True):
                 table.write(text)
                 table.flush()  # so that a killed run keeps it
 
