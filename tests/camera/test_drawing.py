@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,7 +14,7 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.upper_body import CardboxSizes
 from shadowpuppet.camera import drawing
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import draw_model, matching, overlay_frame
+from shadowpuppet.camera.drawing import draw_model, draw_skeleton, matching, overlay_frame
 from shadowpuppet.camera.rasterize import Picture, unpack
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
@@ -117,6 +119,44 @@ def test_the_skeleton_is_drawn_over_the_raw_picture(rng):
         near[max(y - 40, 0) : y + 41, max(x - 40, 0) : x + 41] = True
     near[:LABEL] = True
     np.testing.assert_array_equal(bottom[~near], image[~near])
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_doubtful_parts_are_pale_and_the_others_as_before(body):
+    picture = a_picture(body=body)
+    pose, images = a_pose(picture), []
+    arm = [part for part in picture.body.parts if part.startswith("left_")]
+    for doubtful in ([], arm):
+        images.append(np.zeros((120, 160, 3), np.uint8))
+        draw_model(images[-1], picture, pose, doubtful)
+    changed = (images[0] != images[1]).any(2)
+    limb = unpack(picture.draw(pose, shapes_of(picture.body, *set(arm))), 160)
+    assert changed[limb].mean() > 0.5
+    assert not changed[:, 80:][~limb[:, 80:]].any() or not changed[:, :80][~limb[:, :80]].any()
+    saturation = [np.ptp(image[limb & changed].astype(int), axis=1).mean() for image in images]
+    assert saturation[1] < 0.5 * saturation[0]
+
+
+def test_bones_to_doubtful_landmarks_are_dashed_and_pale():
+    picture = replace(a_picture(distance=1.5), camera=CAMERA.resized((640, 480)))
+    pose, images = a_pose(picture), []
+    for doubtful in ((), ("left_elbow", "left_wrist")):
+        images.append(np.full((480, 640, 3), 30, np.uint8))
+        draw_skeleton(images[-1], picture, pose, doubtful)
+    points = dict(zip(picture.body.landmark_names, drawing._pixels(picture, picture.body.points(pose[None], picture.T_camera_base)[0])))
+    for end, dashed in (("left", True), ("right", False)):
+        start, stop = points[f"{end}_shoulder"], points[f"{end}_elbow"]
+        x, y = np.round(start + np.linspace(0.15, 0.85, 60)[:, None] * (stop - start)).astype(int).T
+        gaps = (images[1][y, x] == 30).all(1)
+        assert gaps.any() == dashed
+        assert not (images[0][y, x] == 30).all(1).any()
+        assert ((images[0][y, x] == images[1][y, x]).all(1).mean() > 0.9) != dashed
+
+
+def test_a_dashed_bone_that_leads_far_away_takes_no_time():
+    image = np.zeros((60, 80, 3), np.uint8)
+    drawing.draw_bone(image, np.array([40.0, 30.0]), np.array([1e9, 30.0]), drawing.WHITE, 2, True)
+    assert image[30, 40:].any(1).all()
 
 
 def test_without_a_pose_nothing_is_drawn(rng):

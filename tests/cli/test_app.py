@@ -117,7 +117,8 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert not any(line.endswith(" ") for line in out.splitlines())
     for word in ("camera       cam, 160 x 120 pixels, 60 degrees wide, calibrated",
                  f"film         {made.FRAMES} frames, 8 frames/s", "scale",
-                 "exact masks", "person", f"frames   {made.FRAMES}", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
+                 "exact masks", "person", f"frames   {made.FRAMES}",
+                 "doubt    outline fits in", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
         assert word in out
     assert "run-tiny/joints.csv" in out
     assert (tmp_path / "run-tiny" / "joints.csv").exists()

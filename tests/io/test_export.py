@@ -5,24 +5,29 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+import warnings
 from pathlib import Path
 
 import acclaim
 import biovision
+import c3d
 import numpy as np
 import pytest
 import runs
 
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.export import FORMATS, export_run
+from shadowpuppet.io.files.table import read_table
 from shadowpuppet.io.motion import EXPORTS
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.c3d import read_c3d, read_header
 from shadowpuppet.io.motion.motion_files import read_motion
+from shadowpuppet.io.motion.npz import read_motion_npz
 from shadowpuppet.io.motion.opensim import read_mot
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Y_UP
+from shadowpuppet.motion.limbs import limb_of
 
 LOST = (0, 6, 7)
 
@@ -103,6 +108,25 @@ def test_units_of_bvh(shell, whole, tmp_path):
     assert shell("export", whole, "--to", "bvh", "--unit", "cm", "-o", tmp_path)[0] == 0
     hips = read_bvh(tmp_path / "walk.bvh").joints().select(["pelvis"]).positions
     assert 80 < hips[:, 0, 1].mean() < 110
+
+
+def test_limbs_that_are_not_vouched_for_keep_their_places_and_have_the_greatest_residual(shell, tmp_path):
+    doubtful = {2: {"left_arm": "uncertain"}, 3: {"right_leg": "predicted", "trunk": "uncertain"}}
+    folder = runs.make_run(tmp_path / "walk", "anatomical", frames=6, lost=(5,), spread=True, doubtful=doubtful)
+    assert shell("export", folder, "--to", "c3d,csv,npz", "-o", tmp_path / "out")[0] == 0
+    motion = read_run(folder).motion
+    with (tmp_path / "out" / "walk.c3d").open("rb") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of theirs
+        residuals = np.stack([points[:, 3] for _, points, _ in c3d.Reader(file).read_frames()])
+    doubted = np.array([[doubtful.get(t, {}).get(limb_of(name)) is not None for name in motion.joint_names] for t in range(6)])
+    assert (residuals[doubted] == 255).all()
+    assert (residuals[5] == -1).all()
+    np.testing.assert_allclose(residuals[:5][~doubted[:5]], 1000 * np.sqrt((motion.joint_sd[:5]**2).mean(2))[~doubted[:5]], atol=0.51)
+    np.testing.assert_allclose(read_c3d(tmp_path / "out" / "walk.c3d").positions, motion.joints, atol=1e-6)
+    table = read_table(tmp_path / "out" / "walk.csv")
+    for limb, status in zip(motion.limbs, motion.limb_status.T):
+        assert table.texts(f"{limb}_status") == status.tolist()
+    np.testing.assert_array_equal(read_motion_npz(tmp_path / "out" / "walk.npz").limb_status, motion.limb_status)
 
 
 def test_angles_are_analog_channels_in_degrees(shell, whole, tmp_path):

@@ -16,6 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.io.intervals import IntervalWriter, read_intervals
+from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.motion.motion import STATUSES, Motion, MotionFrame
 
@@ -28,7 +30,8 @@ PLACES = [f"{joint}{kind}_{axis}" for joint in JOINTS for kind in ("", "_sd") fo
 def a_frame(i: int, status: str = "tracked") -> MotionFrame:
     rng = np.random.default_rng(i)
     sd = {"pose_sd": rng.random(2), "joint_sd": rng.random((2, 3))} if i % 2 else {}
-    return MotionFrame(i / 15, status, rng.normal(size=2), rng.normal(size=(2, 3)), cost=900.5, overlap=rng.random(), **sd)
+    limbs = {"limb_status": ("tracked", "predicted")} if i % 3 else {}
+    return MotionFrame(i / 15, status, rng.normal(size=2), rng.normal(size=(2, 3)), cost=900.5, overlap=rng.random(), **sd, **limbs)
 
 
 FIELDS = [field.name for field in dataclasses.fields(Motion)]
@@ -66,18 +69,21 @@ def test_what_is_written_is_read_exactly_and_from_the_tables_nearly(tmp_path, st
         kept = status not in ("lost", "absent")
         np.testing.assert_array_equal(run.motion.joints[i], frame.joints if kept else np.full((2, 3), np.nan))
         np.testing.assert_array_equal(run.motion.pose_sd[i], frame.pose_sd if kept and i % 2 else [np.nan] * 2)
+        assert tuple(run.motion.limb_status[i]) == ((frame.limb_status if kept else None) or (status, status))
     (tmp_path / "run" / "motion.npz").unlink()
     assert_same(read_run(tmp_path / "run").motion, run.motion, atol=5.1e-7)
 
 
 def test_the_files_are_as_documented(tmp_path):
     folder = write(tmp_path / "new" / "run")
-    assert {path.name for path in folder.iterdir()} == {"angles.csv", "joints.csv", "metrics.json", "motion.npz", "run.toml"}
+    assert {path.name for path in folder.iterdir()} == {"angles.csv", "intervals.csv", "joints.csv", "metrics.json", "motion.npz",
+                                                              "run.toml"}
     joints, angles = ((folder / name).read_text().splitlines() for name in ("joints.csv", "angles.csv"))
-    assert joints[0].split(",") == ["time", *PLACES, "status", "cost", "overlap"]
+    assert joints[0].split(",") == ["time", *PLACES, "status", "cost", "overlap", "trunk_status", "left_arm_status"]
     assert angles[0] == "time,torso_y,torso_bow,torso_y_sd,torso_bow_sd"
     assert joints[2].split(",")[:13] == ["0.066667", *[""] * 12]
     assert joints[2].split(",")[13] == "lost"
+    assert [line.split(",")[-2:] for line in joints[1:4]] == [["tracked"] * 2, ["lost"] * 2, ["tracked", "predicted"]]
     assert joints[1].split(",")[4:7] == ["", "", ""]
     info = tomllib.loads((folder / "run.toml").read_text())
     assert info["versions"].keys() >= {"python", "numpy", "shadowpuppet"}
@@ -87,6 +93,8 @@ def test_the_files_are_as_documented(tmp_path):
                     "body": "cardbox", "sizes": {"head_width": 0.17}}
     assert json.loads((folder / "metrics.json").read_text()) == {
         "complete": True, "frames": 5, "status": dict.fromkeys(STATUSES, 1),
+        "limb_status": {"trunk": {"tracked": 3, "lost": 1, "absent": 1},
+                        "left_arm": {"tracked": 1, "predicted": 2, "lost": 1, "absent": 1}},
         "timings": {"silhouette_s": 0.25, "unknown": None}}
     with np.load(folder / "motion.npz", allow_pickle=False) as arrays:
         assert {f.name for f in dataclasses.fields(Motion)} == set(arrays)
@@ -168,7 +176,7 @@ def child(folder: Path, frames: int, before: str = "", after: str = "") -> subpr
 def test_a_killed_run_is_read_from_its_tables(tmp_path):
     folder = write(tmp_path / "run")  # an earlier one, of which nothing must come through
     assert child(folder, 7, after="os.kill(os.getpid(), signal.SIGKILL)").returncode == -signal.SIGKILL
-    assert sorted(path.name for path in folder.iterdir()) == ["angles.csv", "joints.csv", "run.toml"]
+    assert sorted(path.name for path in folder.iterdir()) == ["angles.csv", "intervals.csv", "joints.csv", "run.toml"]
     whole = read_run(write(tmp_path / "whole", ["tracked"] * 7))
     found = read_run(folder)
     assert not found.complete
@@ -289,6 +297,8 @@ def put(content: bytes):
     ("metrics.json", put(b'{"a": '), "metrics.json: not valid JSON"),
     ("metrics.json", put(b"\xff\xff"), "metrics.json: not valid JSON"),
     ("joints.csv", replaced("uncertain", "asleep"), "csv: line 4, column 'status': found 'asleep', expected one of tracked, "),
+    ("joints.csv", replaced("tracked,predicted", "tracked,asleep"), "joints.csv: line 4, column 'left_arm_status': found 'asleep'"),
+    ("joints.csv", replaced("left_arm_status", "left_arm"), "joints.csv: no column 'left_arm_status'; columns there: time, neck_x"),
     ("joints.csv", replaced(",overlap", ",over"), "joints.csv: no column 'overlap'; columns there: time, neck_x"),
     ("joints.csv", replaced("0.066667", "0.06x"), "joints.csv: line 3, column 'time': found '0.06x'"),
     ("joints.csv", replaced(",lost,", ",tracked,"), None),
@@ -309,6 +319,62 @@ def test_what_is_malformed_is_said(tmp_path, name, change, said):
         return
     with pytest.raises(FormatError, match=said):
         read_run(folder)
+
+
+def test_a_run_made_before_limbs_had_statuses_has_those_of_its_frames(tmp_path):
+    folder = write(tmp_path / "run")
+    with np.load(folder / "motion.npz") as arrays:
+        kept = {name: arrays[name] for name in arrays if name != "limb_status"}
+    np.savez(folder / "motion.npz", **kept)
+    lines = (folder / "joints.csv").read_text().splitlines()
+    (folder / "joints.csv").write_text("".join(line.rsplit(",", 2)[0] + "\n" for line in lines))
+    for _ in ("motion.npz", "joints.csv"):
+        motion = read_run(folder).motion
+        np.testing.assert_array_equal(motion.limb_status, np.repeat(motion.status[:, None], 2, axis=1))
+        (folder / "motion.npz").unlink(missing_ok=True)
+
+
+def test_intervals_hold_nine_tenths_around_each_joint(tmp_path):
+    folder = write(tmp_path / "run", ["tracked", "tracked", "lost", "uncertain"])
+    motion, found = read_run(folder).motion, read_intervals(folder / "intervals.csv")
+    stated = [1, 3]  # the odd frames state deviations
+    assert found.names == JOINTS
+    np.testing.assert_allclose(found.times, motion.times[stated], atol=5.1e-7)
+    for bound, side in ((found.low, -1), (found.high, 1)):
+        np.testing.assert_allclose(bound, motion.joints[stated] + side * 1.645 * motion.joint_sd[stated], atol=5.1e-7)
+    lines = (folder / "intervals.csv").read_text().splitlines()
+    assert lines[0] == "time,joint,x_low,x_high,y_low,y_high,z_low,z_high"
+    assert [line.split(",")[:2] for line in lines[1:]] == [[f"{t / 15:.6f}", name] for t in stated for name in JOINTS]
+    with pytest.raises(FormatError, match=r"intervals\.csv: no joints"):
+        read_joints(folder / "intervals.csv")  # bounds are nobody's places
+
+
+@pytest.mark.parametrize("name", ["50 % off", "a, b", 'say "no"'])
+def test_intervals_of_joints_of_any_name(tmp_path, name):
+    writer = IntervalWriter(["neck", name])
+    frame = MotionFrame(0.5, "tracked", joints=[[0, 1, 2], [3, 4, 5]], joint_sd=[[0.1] * 3, [0.0, np.nan, 0.2]])
+    half = frame._replace(time=1.0, joint_sd=[[np.nan] * 3, [0.1] * 3])
+    (tmp_path / "a.csv").write_text(writer.header() + writer.lines(frame) + writer.lines(half) + "1.5,ne", encoding="utf-8")
+    found = read_intervals(tmp_path / "a.csv", cut=True)
+    assert found.names == ("neck", name)
+    np.testing.assert_allclose(found.low[1, 1], [2.8355, 3.8355, 4.8355])
+    assert np.isnan(found.high[0, 1]).all()
+    assert np.isnan(found.high[1, 0]).all()
+
+
+@pytest.mark.parametrize(("row", "said"), [
+    ("0.1,neck,1,0,0,0,0,0", "line 3, column 'x_low': found 1, expected at most the 0 of 'x_high'"),
+    ("0.1,neck,0,0,0,0,0,zero", "line 3, column 'z_high': found 'zero', expected a number or nothing"),
+    ("0.0,neck,0,0,0,0,0,0", "line 3, column 'joint': found 'neck' twice at 0 s, expected each joint once"),
+    ("-1,neck,0,0,0,0,0,0", "line 3, column 'time': found -1, expected seconds that do not decrease"),
+    (",neck,0,0,0,0,0,0", "line 3, column 'time': found no number, expected seconds"),
+    ("0.1,neck,0", "line 3: found 3 cells, expected 8"),
+])
+def test_malformed_intervals_are_said(tmp_path, row, said):
+    path = tmp_path / "intervals.csv"
+    path.write_text(f"{IntervalWriter([]).header()}0.0,neck,0,0,0,0,0,0\n{row}\n")
+    with pytest.raises(FormatError, match=rf"intervals\.csv: {said}"):
+        read_intervals(path)
 
 
 def test_measures_can_be_added_later(tmp_path):

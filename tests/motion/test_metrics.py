@@ -248,6 +248,7 @@ def test_an_evaluation_is_all_plain_numbers():
     assert_allclose([said["errors"]["mean_mm"], said["errors"]["plane_mm"], said["errors"]["depth_mm"]], 100 * np.sqrt([3, 2, 1]))
     assert_allclose(said["jitter_m_s2"], said["truth_jitter_m_s2"])
     assert (said["frames"], said["status"], said["overlap"]["mean"], said["cost_px"]["p95"]) == (8, {"tracked": 8}, 0.9, 100)
+    assert said["limb_status"] == {"left_arm": {"tracked": 8}, "right_arm": {"tracked": 8}}
     assert "errors" not in evaluate(builder.build())
 
 

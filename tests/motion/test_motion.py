@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.motion.limbs import doubtful_joints, limbs_of
 from shadowpuppet.motion.motion import BLANK, PER_FRAME, STATUSES, JointTable, Motion, MotionBuilder, MotionFrame
 
 DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand", "right_hand")
@@ -67,6 +68,40 @@ def test_a_part_by_a_mask_and_the_joints_alone():
     seen = motion[~np.isin(motion.status, BLANK)]
     assert seen.status_counts == {"tracked": 1, "uncertain": 1, "predicted": 1}
     np.testing.assert_array_equal(seen.table.select(["left_hand"]).positions[:, 0], seen.joints[:, 1])
+
+
+@given(st.lists(st.sampled_from(STATUSES), min_size=1, max_size=6), st.data())
+def test_limbs_have_statuses_of_their_own_or_their_frames(words, data):
+    builder, wanted = MotionBuilder("cardbox", DOFS, JOINTS), []
+    for i, status in enumerate(words):
+        own = data.draw(st.none() | st.tuples(*[st.sampled_from(STATUSES)] * 3))
+        builder.append(a_frame(i, i / 15)._replace(status=status, limb_status=own))
+        wanted.append((status,) * 3 if own is None or status in BLANK else own)
+    motion = builder.build()
+    assert motion.limbs == ("trunk", "left_arm", "right_arm")
+    assert list(map(tuple, motion.limb_status.tolist())) == wanted
+    for k, limb in enumerate(motion.limbs):
+        counts = motion.limb_status_counts[limb]
+        assert sum(counts.values()) == len(words)
+        assert all(count == sum(row[k] == status for row in wanted) for status, count in counts.items())
+
+
+@pytest.mark.parametrize(("limbs", "said"), [
+    (("tracked",), r"limb_status: found shape \(1,\), expected \(3,\)"),
+    (("tracked", "tracked", "asleep"), "status: found 'asleep', expected one of"),
+])
+def test_malformed_limb_statuses_are_refused_and_nothing_added(limbs, said):
+    builder = MotionBuilder("cardbox", DOFS, JOINTS)
+    with pytest.raises(ShadowPuppetError, match=said):
+        builder.append(a_frame(0, 0.0)._replace(limb_status=limbs))
+    assert len(builder.build()) == 0
+
+
+def test_doubtful_joints_are_those_of_doubtful_limbs():
+    joints = ("neck", "left_hand", "right_hand", "right_elbow", "left_ankle")
+    assert limbs_of(joints) == ("trunk", "left_arm", "right_arm", "left_leg")
+    assert doubtful_joints(joints, ("tracked", "lost", "uncertain", "predicted")) == {"right_hand", "right_elbow", "left_ankle"}
+    assert doubtful_joints(joints, None) == frozenset()
 
 
 def test_what_is_left_out_is_not_a_number():

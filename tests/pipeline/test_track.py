@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.io.intervals import read_intervals
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
@@ -48,10 +49,19 @@ def test_a_run_has_a_row_for_every_frame_at_its_time(recording, run):
     assert motion.times == pytest.approx(times, abs=1e-6)
     assert set(motion.joint_names) == JOINTS
     assert np.isfinite(motion.joints).all()
-    assert np.isnan(motion.joint_sd).all()  # no honest value
-    header, row = (run.folder / "joints.csv").read_text().splitlines()[:2]
-    empty = [name for name, cell in zip(header.split(","), row.split(",")) if not cell]
-    assert empty == [name for name in header.split(",") if "_sd_" in name]
+    assert "" not in (run.folder / "joints.csv").read_text().splitlines()[1].split(",")
+
+
+def test_every_joint_has_an_interval_and_every_limb_a_status(run):
+    motion, found = read_run(run.folder).motion, read_intervals(run.folder / "intervals.csv")
+    assert ((motion.joint_sd > 0) & (motion.joint_sd < 1)).all()
+    assert (motion.pose_sd > 0).all()
+    assert found.names == motion.joint_names
+    np.testing.assert_allclose((found.high - found.low) / 2, 1.645 * motion.joint_sd, atol=2e-6)
+    np.testing.assert_allclose((found.high + found.low) / 2, motion.joints, atol=2e-6)
+    assert motion.limbs == ("trunk", "left_arm", "right_arm")
+    assert run.metrics["limb_status"] == motion.limb_status_counts
+    assert sum(run.metrics["limb_status"]["left_arm"].values()) == len(motion)
 
 
 def test_joints_are_in_the_world_of_the_calibration(recording, run):

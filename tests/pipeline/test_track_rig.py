@@ -14,6 +14,7 @@ from measured import evaluate_run
 from shadowpuppet.errors import RecordingError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
@@ -53,6 +54,9 @@ def test_a_run_has_a_row_for_every_set_at_its_time(whole):
     pelvis = motion.table.select(["pelvis"]).positions[:, 0]
     true = np.array([made_rig.place(n) for n in range(made_rig.FRAMES)])
     assert np.linalg.norm(pelvis - true, axis=1).max() < 0.35
+    assert (motion.joint_sd > 0).all()
+    assert motion.limbs == LIMBS
+    assert whole.metrics["limb_status"] == motion.limb_status_counts
 
 
 def test_a_run_says_how_it_was_made(recording, whole):

@@ -11,6 +11,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import RunWriter
+from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import MotionFrame
 
 BODIES = tuple(MODELS)
@@ -41,8 +42,9 @@ def root_of(body: Body) -> Array:
 
 
 def make_run(folder: Path, name: str = "anatomical", frames: int = 40, seed: int = 1, lost: tuple[int, ...] = (), spread: bool = False,
-             times: Array | None = None, person: bool = True) -> Path:  # fmt: skip
-    """A finished run of a body's smooth poses; `lost`: frames that are; `spread`: with standard deviations."""
+             times: Array | None = None, person: bool = True, doubtful: dict[int, dict[str, str]] | None = None) -> Path:  # fmt: skip
+    """A finished run of a body's smooth poses; `lost`: frames that are; `spread`: with standard deviations; `doubtful`: statuses, by frame
+    and limb, of limbs that are not tracked."""
     body, rng = body_of(name), np.random.default_rng(seed)
     poses = smooth_poses(body, frames, rng)
     joints = [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
@@ -56,5 +58,6 @@ def make_run(folder: Path, name: str = "anatomical", frames: int = 40, seed: int
                 run.write(MotionFrame(times[t], "lost"))
             else:
                 sd = {"joint_sd": rng.uniform(0.001, 0.03, places[t].shape)} if spread else {}
-                run.write(MotionFrame(times[t], "tracked", poses[t], places[t], cost=10.0, overlap=0.9, **sd))
+                limbs = [(doubtful or {}).get(t, {}).get(limb, "tracked") for limb in limbs_of(joints)]
+                run.write(MotionFrame(times[t], "tracked", poses[t], places[t], cost=10.0, overlap=0.9, limb_status=limbs, **sd))
     return folder

@@ -107,3 +107,22 @@ def test_only_silhouette_that_the_body_does_not_cover_becomes_left_out(seed, loo
         fresh = found.left_out & ~(before.stays if before is not None else np.zeros(SIZE, bool))
         assert not (fresh & (near(BODY) | ~mask)).any()
         assert found.counts.max() <= looks
+
+
+def test_a_picture_that_is_silhouette_all_over_adds_nothing_and_what_left_is_forgotten_while_the_person_is_absent():
+    drawn = np.zeros((60, 80), bool)
+    drawn[10:50, 30:45] = True
+    last = None
+    for _ in range(5):
+        last = look_beside(last, drawn, drawn, 3)
+    for _ in range(9):
+        last = look_beside(last, np.ones_like(drawn), drawn, 3)
+    assert left_out(last) is None
+    thing = drawn.copy()
+    thing[20:50, 55:75] = True
+    for _ in range(9):
+        last = look_beside(last, thing, drawn, 3)
+    assert left_out(last) is not None
+    for _ in range(5):
+        last = look_beside(last, np.zeros_like(drawn), np.zeros_like(drawn), 3)
+    assert left_out(last) is None

@@ -28,6 +28,7 @@ from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
@@ -528,7 +529,13 @@ def test_what_is_wished_for_is_drawn(tracked, rig):
         assert (stage._hull.visible, stage.frustums[0].handle.visible) == (False, False)
         stage.close()
         server.scene.reset()
-        scene = open_scene(tracked)
+        stated = open_scene(tracked)
+        stage = SceneView(server, stated, ViewOptions(uncertainty=True))
+        stage.to(float(stated.times[14]))
+        assert stage._ellipsoids.batched_positions == pytest.approx(stated.figures[0].joints[14], abs=1e-5)
+        stage.close()
+        server.scene.reset()
+        scene = replace(stated, figures=(replace(stated.figures[0], joint_sd=None), *stated.figures[1:]))  # as of an older run
         stage = SceneView(server, scene, ViewOptions(particles=True, uncertainty=True))
         stage.to(float(scene.times[14]))
         cloud = scene.cloud(float(scene.times[14]))
@@ -543,6 +550,49 @@ def test_what_is_wished_for_is_drawn(tracked, rig):
         stage.close()
     finally:
         close_server(server)
+
+
+@pytest.mark.parametrize("person", [True, False])
+def test_limbs_that_are_not_vouched_for_are_pale_in_their_frames(tmp_path, person):
+    pytest.importorskip("viser")
+    from shadowpuppet.viewer.web.scene_view import SceneView
+    from shadowpuppet.viewer.web.server import close_server, open_server
+
+    doubtful = {2: {"left_arm": "uncertain"}, 3: {"left_arm": "predicted", "right_leg": "uncertain"}}
+    scene = open_scene(make_run(tmp_path / "run", frames=5, person=person, doubtful=doubtful))
+    (figure,) = scene.figures
+    assert figure.doubtful is not None
+    assert [figure.doubtful.named(n) for n in range(5)] == [[], [], ["left arm"], ["left arm", "right leg"], []]
+    server = open_server(port=0)
+    try:
+        stage = SceneView(server, scene)
+        for n in (0, 3, 2, 4):
+            stage.to(float(scene.times[n]))
+            for part in stage.figures[0].parts:
+                limb = LIMBS[part.limb]
+                pale = limb in doubtful.get(n, {})
+                assert part.solid.visible != pale
+                assert (part.pale is not None) == (limb in ("left_arm", "right_leg"))
+                assert part.pale is None or part.pale.visible == pale
+                at = (part.pale if pale else part.solid).bones[0].position
+                assert at == pytest.approx(figure.places[n, part.joints[0]], abs=1e-5)
+        stage.close()
+    finally:
+        close_server(server)
+
+
+def test_a_live_figure_is_pale_where_its_view_is(rng):
+    pytest.importorskip("viser")
+    from shadowpuppet.motion.mesh import body_mesh
+    from shadowpuppet.viewer.web.live import posed
+
+    body = body_of("anatomical")
+    pose = smooth_poses(body, 1, rng)[0]
+    every = [limb.replace("_", " ") for limb in LIMBS]
+    for doubtful, named in ((), []), (("left_elbow", "left_forearm"), ["left arm"]), (body.landmark_names, every):
+        figure = posed(body, BodyTree(body), body_mesh(body), pose, np.eye(4), frozenset(doubtful))
+        assert figure.doubtful is not None
+        assert figure.doubtful.named(0) == named
 
 
 def test_a_file_says_what_may_be_fetched_and_its_title():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,12 +16,18 @@ if TYPE_CHECKING:  # slow to import
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image
 
-# Colours (blue, green, red) that colour-blind people can tell apart: Okabe & Ito 2008.
+Colour = tuple[int, int, int]
+"""Blue, green, red."""
+# Colours that colour-blind people can tell apart: Okabe & Ito 2008.
 BLACK, GREY, WHITE = (0, 0, 0), (96, 96, 96), (255, 255, 255)
 MODEL_ONLY, SILHOUETTE_ONLY = (0, 159, 230), (233, 180, 86)
 SIDE_COLOURS = {"left": (115, 158, 0), "right": (167, 121, 204)}
 MIDDLE_COLOUR = (66, 228, 240)
 """The colour of parts that are neither left nor right."""
+PALE, PALENESS = (190, 190, 190), 0.7
+"""The colour mixed into that of a limb that is not vouched for, and its share."""
+DASH = 8
+"""Length of the dashes and gaps of such a limb's bones, in pictures 240 pixels high, pixels."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
 SUBPIXEL = 4
@@ -28,13 +35,13 @@ SUBPIXEL = 4
 
 
 def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLike, *, status: str, time: float,
-                  overlap: float = np.nan, ignore: ArrayLike | None = None) -> Image:
+                  overlap: float = np.nan, ignore: ArrayLike | None = None, doubtful: Container[str] = ()) -> Image:
     """The three rows (3 H, W, 3), blue green red, of a frame.
 
     Top: the model over the darkened picture, cards brighter the more they face the camera. Middle: where model and silhouette `mask` (H,
     W) agree (white) or differ, and ignored pixels, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
-    the status and the overlap. A `pose` (D,) that is not finite is not drawn. Raises `ShadowPuppetError` for a picture that is not of
-    the camera's size.
+    the status and the overlap. A `pose` (D,) that is not finite is not drawn; shapes and bones whose names are `doubtful` are pale, and the
+    bones dashed. Raises `ShadowPuppetError` for a picture that is not of the camera's size.
     """
     image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
     size = picture.camera.size
@@ -47,8 +54,8 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
     out = np.empty((3 * height, size[0], 3), np.uint8)
     out[:height], out[2 * height :] = _darkened(image), image
     if known:
-        draw_model(out[:height], picture, pose)
-        draw_skeleton(out[2 * height :], picture, pose)
+        draw_model(out[:height], picture, pose, doubtful)
+        draw_skeleton(out[2 * height :], picture, pose, doubtful)
     out[height : 2 * height] = matching(picture.mask(pose) if known else np.zeros_like(mask), mask, ignore)
     _label(out, height, status, time, overlap)
     return out
@@ -62,13 +69,13 @@ def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLik
     return MATCHING[index]
 
 
-def draw_model(image: Image, picture: Picture, pose: Array) -> None:
-    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, farthest shapes first."""
+def draw_model(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
+    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, farthest shapes first; `doubtful` parts are pale."""
     import cv2
 
     from shadowpuppet.body.shapes import Quads
 
-    pieces = _of_quads(picture, pose) if isinstance(picture.body.shapes, Quads) else _of_hulls(picture, pose)
+    pieces = (_of_quads if isinstance(picture.body.shapes, Quads) else _of_hulls)(picture, pose, doubtful)
     width = max(1, round(image.shape[0] / 300))
     for piece in sorted(pieces, key=lambda piece: -piece.depth):
         for corners, colour in piece.fills:
@@ -76,24 +83,36 @@ def draw_model(image: Image, picture: Picture, pose: Array) -> None:
         cv2.polylines(image, [_fixed(piece.edge)], False, (25, 25, 25), width, cv2.LINE_AA, SUBPIXEL)
 
 
-def draw_skeleton(image: Image, picture: Picture, pose: Array) -> None:
-    """Draw the bones and joints of the pose (D,) into an image (H, W, 3)."""
+def draw_skeleton(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
+    """Draw the bones and joints of the pose (D,) into an image (H, W, 3); bones that lead to `doubtful` landmarks are dashed and pale."""
     import cv2
 
     points = picture.body.points(pose[None], picture.T_camera_base)[0]
     names = picture.body.landmark_names
     pixels = dict(zip(names, _pixels(picture, points)))
     visible = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
-    bones = [(visible[a], visible[b], _side(b)) for a, b in BONES if a in visible and b in visible]
+    bones = [(visible[a], visible[b], b) for a, b in BONES if a in visible and b in visible]
     joints = {name for bone in BONES for name in bone}
     dots = [_point(visible[name]) for name in names if name in visible and name in joints]
     unit = max(1.0, image.shape[0] / 240)
     for extra, dark in ((2, True), (0, False)):  # a dark rim, so that bones stand out from any clothes
-        for a, b, colour in bones:
-            cv2.line(image, _point(a), _point(b), BLACK if dark else colour, round(2 * unit) + extra, cv2.LINE_AA, SUBPIXEL)
+        for a, b, name in bones:
+            draw_bone(image, a, b, BLACK if dark else colour_of(name, doubtful), round(2 * unit) + extra, name in doubtful)
     for radius, colour in ((3, BLACK), (2, WHITE)):
         for dot in dots:
             cv2.circle(image, dot, round(radius * unit) << SUBPIXEL, colour, -1, cv2.LINE_AA, SUBPIXEL)
+
+
+def draw_bone(image: Image, start: Array, end: Array, colour: Colour, width: int, dashed: bool) -> None:
+    """Draw the line between two pixels (2,) into an image (H, W, 3)."""
+    import cv2
+
+    pieces = 1
+    if dashed and (length := float(np.hypot(*(end - start)))) < 10 * image.shape[0]:  # else it is mostly far outside the picture
+        pieces = 2 * round(length / (2 * DASH * max(1.0, image.shape[0] / 240))) + 1  # odd: a dash at both ends
+    ends = start + np.linspace(0, 1, pieces + 1)[:, None] * (end - start)
+    for n in range(0, pieces, 2):
+        cv2.line(image, _point(ends[n]), _point(ends[n + 1]), colour, width, cv2.LINE_AA, SUBPIXEL)
 
 
 def in_colour(image: Image) -> Image:
@@ -110,8 +129,13 @@ def _darkened(image: Image) -> Image:
     return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
 
 
-def _side(name: str) -> tuple[int, int, int]:
-    return SIDE_COLOURS.get(name.split("_")[0], MIDDLE_COLOUR)
+def colour_of(name: str, doubtful: Container[str] = ()) -> Colour:
+    """The colour of a landmark's bone or of a part by its side, pale if it is `doubtful`."""
+    colour = SIDE_COLOURS.get(name.split("_")[0], MIDDLE_COLOUR)
+    if name not in doubtful:
+        return colour
+    blue, green, red = (round((1 - PALENESS) * own + PALENESS * pale) for own, pale in zip(colour, PALE))
+    return blue, green, red
 
 
 class _Piece(NamedTuple):
@@ -125,18 +149,18 @@ class _Piece(NamedTuple):
     """The line (K, 2), pixels, that is outlined."""
 
 
-def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
+def _of_quads(picture: Picture, pose: Array, doubtful: Container[str]) -> list[_Piece]:
     """Pieces of quads, each cut in four: crossing cards overlap, their quarters mostly do not."""
     body = picture.body
     quarters = _quarters(picture.transforms(pose[None])[0], body.shapes.arrays[0], body.shapes.joints[:, 0])
     pixels, depths = _pixels(picture, quarters), quarters[..., 2].mean(2)
     shades = _shades(quarters)
     # The first three corners of a quarter lie on the card's edge; only this edge is outlined.
-    return [_Piece(depths[q, k], [(pixels[q, k], _shaded(part, shades[q, k]))], pixels[q, k, :3])
+    return [_Piece(depths[q, k], [(pixels[q, k], _shaded(colour_of(part, doubtful), shades[q, k]))], pixels[q, k, :3])
             for q, part in enumerate(body.parts) for k in range(4) if np.isfinite(pixels[q, k]).all()]
 
 
-def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
+def _of_hulls(picture: Picture, pose: Array, doubtful: Container[str]) -> list[_Piece]:
     """Pieces of hulls: their outlines, brighter toward the middle."""
     body, T = picture.body, picture.transforms(pose[None])
     corners, counts = picture.polygons(T, np.arange(len(body.parts)))
@@ -146,7 +170,8 @@ def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
     for i in np.flatnonzero(counts[0]):
         outline, part = corners[0, i, : counts[0, i]], body.parts[i]
         middle = outline.mean(0)
-        fills = [(middle + size * (outline - middle), _shaded(part, 1 - 0.45 * size**2)) for size in (1.0, 0.8, 0.6, 0.4, 0.2)]
+        colour = colour_of(part, doubtful)
+        fills = [(middle + size * (outline - middle), _shaded(colour, 1 - 0.45 * size**2)) for size in (1.0, 0.8, 0.6, 0.4, 0.2)]
         pieces.append(_Piece(depths[i], fills, np.concatenate([outline, outline[:1]])))
     return pieces
 
@@ -168,8 +193,8 @@ def _shades(pieces: Array) -> Array:
     return 0.4 + 0.6 * np.abs((normals * view).sum(2)) / np.maximum(sizes, 1e-12)
 
 
-def _shaded(part: str, shade: float) -> tuple[float, ...]:
-    return tuple(shade * value for value in _side(part))
+def _shaded(colour: Colour, shade: float) -> tuple[float, ...]:
+    return tuple(shade * value for value in colour)
 
 
 def _pixels(picture: Picture, points_camera: Array) -> Array:

@@ -70,6 +70,7 @@ def error_table(errors: Mapping[str, Any]) -> RenderableType:
 
 def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     """Metrics of a run, with and without a truth."""
+    from shadowpuppet.evaluation.summary_text import doubt_text
     from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 
     multiview = "cost_m2" in metrics
@@ -79,6 +80,7 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     truth_jitter = metrics.get("truth_jitter_m_s2")
     rows: list[tuple[str, str | None]] = [
         ("frames", f"{metrics['frames']}: {statuses}" if statuses else "none"),
+        ("doubt", doubt_text(metrics)),
         ("overlap", f"{overlap['mean']:.3f} (5 % of frames under {overlap['p5']:.3f})" if overlap["count"] else None),
         ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (5 % of frames over {scale * cost['p95']:.{digits}f})" if cost["count"]
                  else None),

@@ -159,7 +159,7 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     stages = ", ".join(f"{stage} {value:.1f}" for stage, value in metrics["ms_per_frame"].items())
     speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
-    files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv")
+    files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv", "intervals.csv")
     show(metrics_table(metrics), *errors, pairs([("speed", speed), files]))
 
 

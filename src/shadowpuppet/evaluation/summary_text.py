@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.evaluation.interval_coverage import LEVELS
+from shadowpuppet.motion.limbs import DOUBTFUL
+from shadowpuppet.motion.motion import BLANK
 
 WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved",
         "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled"}
@@ -26,6 +28,26 @@ def coverage_text(coverage: Mapping[str, Any] | None) -> str:
     shares = ", ".join(f"{100 * coverage[f'within_{level}']:.0f} % within those of {level} %" for level in LEVELS)
     verdict = "too narrow" if coverage["rms_z"] > 1.1 else "too wide" if coverage["rms_z"] < 0.9 else "right"
     return f"{shares}; errors are {coverage['rms_z']:.2f} of the stated deviations (rms): {verdict}"
+
+
+def doubt_text(metrics: Mapping[str, Any]) -> str | None:
+    """In how many frames the outline fits, and in what share of frames each limb is not vouched for; None if unknown or without frames."""
+    limbs, frames = metrics.get("limb_status"), metrics["frames"]
+    if not limbs or not frames:
+        return None
+    shares = {limb.replace("_", " "): sum(counts.get(status, 0) for status in DOUBTFUL) / max(_placed(counts), 1)
+              for limb, counts in limbs.items()}
+    doubtful = ", ".join(f"{limb} in {_percent(share)}" for limb, share in shares.items() if share).replace(" in ", " doubtful in ", 1)
+    return f"outline fits in {metrics['status'].get('tracked', 0)} of {frames} frames; {doubtful or 'no limb doubtful'}"
+
+
+def _placed(counts: Mapping[str, int]) -> int:
+    """Number of frames in which a limb has a place."""
+    return sum(count for status, count in counts.items() if status not in BLANK)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
 
 
 def losses_text(losses: Mapping[str, Any]) -> str:

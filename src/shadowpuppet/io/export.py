@@ -17,7 +17,7 @@ from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, S
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.io.motion.bvh_writer import write_bvh
-from shadowpuppet.io.motion.c3d_writer import write_c3d
+from shadowpuppet.io.motion.c3d_writer import MAX_RESIDUAL, MM, write_c3d
 from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import write_motion_npz, write_npz
@@ -32,6 +32,7 @@ from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation
 from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.limbs import DOUBTFUL, limb_of
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
 
@@ -147,8 +148,11 @@ class _RunExport:
 
     @property
     def spread(self) -> Array:
-        """Standard deviations of the joints (T, J), metres: root mean square over the axes."""
-        return np.sqrt((self.run.motion.joint_sd**2).mean(2))
+        """Standard deviations of the joints (T, J), metres: root mean square over the axes; of limbs that are not vouched for the greatest
+        that a C3D file holds, so that programs which drop points of large residuals drop them."""
+        motion = self.run.motion
+        doubtful = np.isin(motion.limb_status, DOUBTFUL)[:, [motion.limbs.index(limb_of(name)) for name in motion.joint_names]]
+        return np.where(doubtful, MAX_RESIDUAL / MM, np.sqrt((motion.joint_sd**2).mean(2)))
 
     @property
     def angles(self) -> dict[str, tuple[str, Array]]:

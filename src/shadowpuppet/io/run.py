@@ -1,10 +1,11 @@
 """Reads and writes run folders: a tracked motion, written frame by frame, with its settings and metrics.
 
-    joints.csv    time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1)
-    angles.csv    time, every degree of freedom (rad or m), then <dof>_sd
-    motion.npz    the fields of `Motion`, arrays only
-    run.toml      complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
-    metrics.json  complete, frames, status (number of frames of each), timings, errors, ...
+    joints.csv     time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1), <limb>_status
+    angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
+    intervals.csv  time, joint, x_low, x_high, y_low, y_high, z_low, z_high (m, world): 90 % bounds, a row for each joint of a frame
+    motion.npz     the fields of `Motion`, arrays only
+    run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
+    metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
 The tables grow with every frame; the other files are written at the end, also after an error. `complete` in run.toml says whether all
 frames were tracked. A killed run is read from its tables.
@@ -27,11 +28,13 @@ from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.io.files.plain import for_json, for_toml, plain
 from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
 from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
+from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
 from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 
-FILES = ("joints.csv", "angles.csv", "motion.npz", "metrics.json", "overlay.mp4")
+TABLES = ("joints.csv", "angles.csv", "intervals.csv")
+FILES = (*TABLES, "motion.npz", "metrics.json", "overlay.mp4")
 """Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
 OWN_KEYS = ("complete", "frames", "body", "versions")
 """Keys of run.toml that the writer sets."""
@@ -75,6 +78,7 @@ class RunWriter:
         self.folder, self.metrics = Path(folder), dict[str, Any]()
         self.info = for_toml(plain(info, "info")) | {"body": body_name, "versions": versions()}
         self._motion = MotionBuilder(body_name, dof_names, joint_names)
+        self._intervals = IntervalWriter(joint_names)
         self._tables: list[TextIO] = []
         self._earlier = False
 
@@ -111,7 +115,8 @@ class RunWriter:
     def write(self, frame: MotionFrame) -> None:
         """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self._start()
-        self._append(run_rows(self._motion.append(frame)))
+        kept = self._motion.append(frame)
+        self._append(run_rows(kept), self._intervals.lines(kept))
 
     def _start(self) -> None:
         """Replace an earlier run and write the headers, once."""
@@ -122,13 +127,14 @@ class RunWriter:
                 (self.folder / name).unlink(missing_ok=True)
         self._write_info(complete=False)
         with self._system_errors():
-            self._tables = [(self.folder / name).open("w", encoding="utf-8", newline="") for name in FILES[:2]]
-        self._append(run_headers(self._motion.joint_names, self._motion.dof_names))
+            self._tables = [(self.folder / name).open("w", encoding="utf-8", newline="") for name in TABLES]
+        self._append(run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header())
 
-    def _append(self, rows: tuple[list[str], list[str]]) -> None:
+    def _append(self, rows: tuple[list[str], list[str]], intervals: str) -> None:
+        """Append a row to joints.csv and angles.csv, and lines to intervals.csv."""
         with self._system_errors():
-            for table, row in zip(self._tables, rows):
-                table.write(csv_line(row))
+            for table, text in zip(self._tables, (*map(csv_line, rows), intervals), strict=True):
+                table.write(text)
                 table.flush()  # so that a killed run keeps it
 
     def _finish(self, complete: bool) -> None:
@@ -138,7 +144,8 @@ class RunWriter:
         motion = self._motion.build()
         # The most important file first, in case the disk is full.
         write_motion_npz(self.folder / "motion.npz", motion)
-        counts = {"complete": complete, "frames": len(motion), "status": motion.status_counts}
+        counts = {"complete": complete, "frames": len(motion), "status": motion.status_counts,
+                  "limb_status": motion.limb_status_counts}
         write_metrics(self.folder, counts | self.metrics)
         self._write_info(complete)
 
@@ -201,7 +208,7 @@ def _check_folder(folder: Path) -> bool:
 def _read_tables(folder: Path, body_name: str, cut: bool) -> Motion:
     if cut and not (folder / "joints.csv").exists():
         raise FormatError(f"{folder}: the run ended before its first frame, so that there is nothing to read")
-    joints, angles = (read_table(folder / name, cut) for name in FILES[:2])
+    joints, angles = (read_table(folder / name, cut) for name in TABLES[:2])
     with errors_named(f"{folder}: joints.csv and angles.csv"):
         return read_run_tables(joints, angles, _common_frames(joints, angles, cut), body_name)
 

@@ -21,6 +21,7 @@ from shadowpuppet.live.timing import Timing
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
+from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.video import Image
 
 GONE = 2.0
@@ -198,11 +199,13 @@ class LiveSession(ABC):
               latency: float = np.nan) -> View:
         pose = None if frame is None or frame.pose is None else np.asarray(frame.pose)
         message, countdown = self._message(masks)
+        doubtful = doubtful_names(self.subject.body, frame.limb_status) if frame and self.subject else frozenset[str]()
         angles = _angles(self.subject.body, pose) if self.phase == "tracking" and self.subject else ()
         return View(
             phase=self.phase, message=message, countdown=countdown, trouble=self.trouble, status=frame.status if frame else "",
             overlap=frame.overlap if frame and pose is not None else np.nan, angles=angles, latency=latency, rate=self.timing.rate,
-            interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, **self._shown(images, masks, frame),
+            interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, doubtful=doubtful,
+            **self._shown(images, masks, frame),
         )  # fmt: skip
 
     @property

@@ -91,7 +91,7 @@ def _frames(motion: Motion, loop: bool) -> Iterator[tuple[int, MotionFrame]]:
     for turn in count() if loop else (0,):
         for n in range(len(motion)):
             yield n, MotionFrame(float(motion.times[n]) + turn * length, str(motion.status[n]), motion.poses[n], motion.joints[n],
-                                 cost=float(motion.cost[n]), overlap=float(motion.overlap[n]))
+                                 cost=float(motion.cost[n]), overlap=float(motion.overlap[n]), limb_status=motion.limb_status[n].tolist())
 
 
 def _is_world(base: Array) -> bool:

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 LIMBS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Limbs that have a status of their own: an arm is shoulder to hand, a leg hip to foot, the trunk is the rest."""
+DOUBTFUL = ("uncertain", "predicted")
+"""Statuses of a limb that keeps its place without being vouched for."""
 ARM, LEG = ("shoulder", "elbow", "wrist", "hand", "fist"), ("hip", "knee", "ankle", "heel", "toe")
 
 
@@ -19,3 +21,15 @@ def limbs_of(joints: Iterable[str]) -> tuple[str, ...]:
     """The limbs to which joints belong, in the order of `LIMBS`."""
     found = set(map(limb_of, joints))
     return tuple(limb for limb in LIMBS if limb in found)
+
+
+def doubtful_limbs(joints: Iterable[str], statuses: Iterable[str] | None) -> list[str]:
+    """The limbs of joints whose status is one of `DOUBTFUL`. `statuses`: one for each of `limbs_of(joints)`; None: all vouched for."""
+    return [limb for limb, status in zip(limbs_of(joints), () if statuses is None else statuses) if status in DOUBTFUL]
+
+
+def doubtful_joints(joints: Iterable[str], statuses: Iterable[str] | None) -> frozenset[str]:
+    """Those of joints that belong to `doubtful_limbs`."""
+    joints = tuple(joints)
+    doubtful = doubtful_limbs(joints, statuses)
+    return frozenset(joint for joint in joints if limb_of(joint) in doubtful)

@@ -150,7 +150,8 @@ def evaluate(motion: Motion, truth: JointTable | None = None, joints: Sequence[s
     errors = None if truth is None else joint_errors(run, truth, joints, camera=camera)
     names = errors.names if errors else joints or default_joints(run, run)
     figures: dict[str, Any] = {"cameras": cameras, "frames": len(motion), "status": motion.status_counts,
-                            "overlap": statistics(motion.overlap), "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
+                            "limb_status": motion.limb_status_counts, "overlap": statistics(motion.overlap),
+                            "cost_px" if cameras == 1 else "cost_m2": statistics(motion.cost),
                             "jitter_m_s2": jitter(run.select(names)), "bones_m": bone_lengths(motion.table)}
     if truth is not None and errors is not None:
         figures |= {"truth_jitter_m_s2": jitter(truth.select(names)), "errors": errors.summary(across=cameras == 1)}

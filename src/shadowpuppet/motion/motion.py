@@ -141,6 +141,12 @@ class Motion:
         return {status: int(count) for status in STATUSES if (count := (self.status == status).sum())}
 
     @property
+    def limb_status_counts(self) -> dict[str, dict[str, int]]:
+        """Number of frames of each status that occurs, by limb."""
+        return {limb: {status: int(count) for status in STATUSES if (count := (column == status).sum())}
+                for limb, column in zip(self.limbs, self.limb_status.T)}
+
+    @property
     def known(self) -> NDArray[np.bool_]:
         """Whether pose and joints are known in a frame, of shape (T,)."""
         return np.asarray(np.isfinite(self.poses).all(1) & np.isfinite(self.joints).all((1, 2)))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
 from shadowpuppet.camera.drawing import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, write_text
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.motion.limbs import doubtful_limbs
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
+from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.video import Image
 
 WIDEST, TALLEST = 1600, 1000
@@ -22,18 +24,22 @@ SHOWN = 0.55
 def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Picture]) -> Image:
     """An image (H, W, 3), blue green red, with a tile for each camera that shows the model in its pose and the silhouette's outline.
 
-    `pictures`: the body as each camera sees it. A camera without a frame is black; without a pose no model is drawn.
+    `pictures`: the body as each camera sees it; limbs that are not vouched for are pale. A camera without a frame is black; without a
+    pose no model is drawn.
     """
     columns, rows, (width, height) = grid_of([picture.camera.size for picture in pictures])
     out = np.zeros((rows * height, columns * width, 3), np.uint8)
     pose = None if found.pose is None else np.asarray(found.pose, float)
+    doubtful = doubtful_names(pictures[0].body, found.limb_status)
     for n, picture in enumerate(pictures):
         y, x = divmod(n, columns)
         tile = out[y * height : (y + 1) * height, x * width : (x + 1) * width]
         image, mask = frames.images[n], frames.masks[n]
-        _fit(tile, None if image is None else _tile(image, mask, picture, pose))
+        _fit(tile, None if image is None else _tile(image, mask, picture, pose, doubtful))
         write_text(tile, picture.camera.name if image is not None else f"{picture.camera.name}: no picture", 0, WHITE, size=height)
-    write_text(out, f"{frames.time:.2f} s  {found.status}", out.shape[0] - 40, WHITE, size=max(360, height))
+    named = ", ".join(doubtful_limbs(pictures[0].body.landmark_names, found.limb_status)).replace("_", " ")
+    words = found.status if not named else f"{found.status}, {named} doubtful"
+    write_text(out, f"{frames.time:.2f} s  {words}", out.shape[0] - 40, WHITE, size=max(360, height))
     return out
 
 
@@ -47,13 +53,13 @@ def grid_of(sizes: Sequence[tuple[int, int]]) -> tuple[int, int, tuple[int, int]
     return columns, rows, (max(2, 2 * round(scale * wide / 2)), max(2, 2 * round(scale * high / 2)))
 
 
-def _tile(image: Image, mask: Mask | None, picture: Picture, pose: np.ndarray | None) -> Image:
+def _tile(image: Image, mask: Mask | None, picture: Picture, pose: np.ndarray | None, doubtful: Container[str]) -> Image:
     import cv2
 
     image = in_colour(image).copy()
     if pose is not None and np.isfinite(pose).all():
         drawn = image.copy()
-        draw_model(drawn, picture, pose)
+        draw_model(drawn, picture, pose, doubtful)
         image = np.asarray(cv2.addWeighted(drawn, SHOWN, image, 1 - SHOWN, 0), np.uint8)
     if mask is not None:
         contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]

@@ -30,6 +30,7 @@ from shadowpuppet.pipeline.subject import TrackedSubject
 from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.tracking.doubt.doubt import Doubt
+from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.pose_search import search_pose
@@ -130,7 +131,8 @@ class MonocularSubject(TrackedSubject):
         assert image is not None
         pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
         ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None
-        return overlay_frame(image, mask, self.picture, pose, status=found.status, time=found.time, overlap=found.overlap, ignore=ignored)
+        return overlay_frame(image, mask, self.picture, pose, status=found.status, time=found.time, overlap=found.overlap, ignore=ignored,
+                             doubtful=doubtful_names(self.body, found.limb_status))
 
 
 def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) -> MonocularSubject:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, may_be_person
 
 REACH = 0.07
 """Distance beside the drawn body that clothes, hair and small errors explain, over the square root of the body's area (some 5 cm)."""
@@ -66,11 +66,14 @@ def near(drawn: Mask) -> Mask:
 def look_beside(last: Unexplained | None, silhouette: Mask, drawn: Mask, looks: int, ignored: Mask | None = None) -> Unexplained:
     """The unexplained parts after another picture's silhouette (H, W) and the body drawn in its estimated pose (H, W).
 
-    `looks`: number of pictures after which a part is left out; `ignored`: pixels (H, W) of which the body says nothing.
+    `looks`: number of pictures after which a part is left out; `ignored`: pixels (H, W) of which the body says nothing. Nothing is drawn
+    while the person is absent: what is no silhouette any more is then forgotten, too.
     """
     looks = min(max(looks, 1), MOST_LOOKS)
     nothing = np.zeros(silhouette.shape, bool)
     last = last or Unexplained(nothing.astype(np.uint8), nothing, nothing)
+    if silhouette.any() and not may_be_person(silhouette):
+        return last  # nearly all of the picture: the light went out
     area = int(np.count_nonzero(drawn))
     counts = np.where(silhouette, last.counts, np.maximum(last.counts, FORGET) - FORGET).astype(np.uint8)
     ratio, least, seen = last.ratio, last.least, last.seen

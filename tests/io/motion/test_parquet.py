@@ -25,7 +25,7 @@ ENDINGS = ("parquet", "npz")
 
 @pytest.fixture
 def motion(tmp_path) -> Motion:
-    return read_run(runs.make_run(tmp_path / "run", "rounded", lost=(2, 3), spread=True)).motion
+    return read_run(runs.make_run(tmp_path / "run", "rounded", lost=(2, 3), spread=True, doubtful={5: {"left_arm": "predicted"}})).motion
 
 
 def table(rng) -> JointTable:
@@ -57,6 +57,9 @@ def test_a_run_as_columns_has_everything_with_units_in_the_names_and_nulls_in_ga
     write_parquet(tmp_path / "a.parquet", motion_columns(motion))
     found = pyarrow.parquet.read_table(tmp_path / "a.parquet")
     assert found.column("status").to_pylist() == motion.status.tolist()
+    for limb, status in zip(motion.limbs, motion.limb_status.T):
+        assert found.column(f"{limb}_status").to_pylist() == status.tolist()
+    assert found.column("left_arm_status").to_pylist()[2:6] == ["lost", "lost", "tracked", "predicted"]
     assert found.column("neck_x").null_count == 2
     np.testing.assert_array_equal(found.column("neck_sd_z").to_numpy(), motion.joint_sd[:, motion.joint_names.index("neck"), 2])
     np.testing.assert_array_equal(found.column("torso_y [m]").to_numpy(), motion.poses[:, motion.dof_names.index("torso_y")])

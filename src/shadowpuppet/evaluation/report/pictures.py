@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.bones import BONES
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import BLACK, MIDDLE_COLOUR, SIDE_COLOURS, SUBPIXEL, WHITE, in_colour, write_text
+from shadowpuppet.camera.drawing import BLACK, WHITE, colour_of, draw_bone, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import doubtful_joints
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import BLANK, JointTable
 from shadowpuppet.motion.synchronization import at_times, match, step_of
@@ -149,8 +150,9 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
         footage = camera_footage(recording, view, options)
         for frame, image in _nearest_images(footage.frames(False), motion.times, sorted(wanted)):
             image = _scaled(np.array(in_colour(image)), height=max(image.shape[0], 2 * MIN_HEIGHT))
+            doubtful = doubtful_joints(motion.joint_names, motion.limb_status[frame])
             for places, own in _tables(of, frame):
-                draw_bones(image, footage.camera, places, own)
+                draw_bones(image, footage.camera, places, own, doubtful)
             by_frame[frame][footage.camera] = image
     for frame, images in by_frame.items():
         if len(views) == 1:
@@ -173,21 +175,17 @@ def _nearest_images(shots: Iterator, times: Array, frames: list[int]) -> Iterato
         yield waiting[0], held.image
 
 
-def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False) -> None:
-    """Draw the bones of one frame into a picture (H, W, 3) of a camera, at any size; `own`: the run's, in the sides' colours, else thin and
-    white."""
-    import cv2
-
+def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False, doubtful: Container[str] = ()) -> None:
+    """Draw the bones of one frame into a picture (H, W, 3) of a camera, at any size; `own`: the run's, in the sides' colours, those to
+    `doubtful` joints dashed and pale; else thin and white."""
     pixels = dict(zip(places.names, _pixels(image, camera, places)))
     unit = image.shape[0] / 400
     for a, b in BONES:
         ends = [pixels[name] for name in (a, b) if name in pixels]
         if len(ends) < 2 or not np.isfinite(ends).all():
             continue
-        start, end = (tuple(np.clip(np.round(point * (1 << SUBPIXEL)), -(1 << 20), 1 << 20).astype(int).tolist()) for point in ends)
-        colour = SIDE_COLOURS.get(b.split("_")[0], MIDDLE_COLOUR) if own else WHITE
-        for ink, extra in ((BLACK, 2), (colour, 0)):
-            cv2.line(image, start, end, ink, max(1, round((4 if own else 1.6) * unit)) + extra, cv2.LINE_AA, SUBPIXEL)
+        for ink, extra in ((BLACK, 2), (colour_of(b, doubtful) if own else WHITE, 0)):
+            draw_bone(image, ends[0], ends[1], ink, max(1, round((4 if own else 1.6) * unit)) + extra, own and b in doubtful)
 
 
 def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:

@@ -22,6 +22,8 @@ MM = 1000.0
 """Millimetres, the file's unit, per metre."""
 MAX_BLOCKS, MAX_NAMES, MAX_LETTERS = 255, 255, 120
 """The format's limits: blocks of parameters, names in a list, letters of a name."""
+MAX_RESIDUAL = 255
+"""Greatest residual, millimetres: a byte in the format's integer files."""
 UNKNOWN_RESIDUAL = -1.0
 """Marks an unknown position."""
 Parameter = tuple[str, int, Sequence[int], bytes]
@@ -81,7 +83,7 @@ def _at_constant_rate(path: Path, times: Array, values: Array) -> tuple[float, A
 def _points(places: Array, deviations: Array) -> Array:
     """Positions (T, J, 3) with their residuals, (T, J, 4), in the file's unit."""
     known: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(2))
-    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), 255)), 0.0)
+    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), MAX_RESIDUAL)), 0.0)
     return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNKNOWN_RESIDUAL)[..., None]], 2)
 
 

@@ -60,7 +60,7 @@ def _draw_body(out: Image, view: View) -> None:
     picture = _scaled(view.picture, (out.shape[1], out.shape[0]))
     body = picture.mask(view.pose)
     out[body] = (out[body] * (1 - TINT) + np.array(BODY_COLOUR) * TINT).astype(np.uint8)
-    draw_skeleton(out, picture, view.pose)
+    draw_skeleton(out, picture, view.pose, view.doubtful)
 
 
 @lru_cache(maxsize=2)

@@ -62,6 +62,8 @@ class View:
     """The body as the camera sees it; None before it is known."""
     pose: NDArray[np.float64] | None = None
     """Degrees of freedom (D,); None without a trustworthy pose."""
+    doubtful: frozenset[str] = frozenset()
+    """Names of the landmarks and shape parts that belong to limbs that are not vouched for."""
 
     @property
     def chip(self) -> str:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs
 
 GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
           "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle",)}
@@ -30,3 +34,10 @@ def limb_of_part(part: str) -> str:
     if side not in SIDES or not name:
         return "trunk"
     return f"{side}_leg" if name in LEG_PARTS else f"{side}_arm"
+
+
+def doubtful_names(body: Body, statuses: Sequence[str] | None) -> frozenset[str]:
+    """Names of the landmarks and shape parts of a body's limbs of a status of `DOUBTFUL`, which are drawn dashed and pale. `statuses`: one
+    for each limb of the body; None: all vouched for."""
+    limbs = doubtful_limbs(body.landmark_names, statuses)
+    return doubtful_joints(body.landmark_names, statuses) | {part for part in body.parts if limb_of_part(part) in limbs}

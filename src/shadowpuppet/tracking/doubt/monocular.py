@@ -19,7 +19,7 @@ from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.mirror import Mirrors
-from shadowpuppet.tracking.doubt.steps import CONSTANT, is_frozen, steps, stillness
+from shadowpuppet.tracking.doubt.steps import CONSTANT, is_frozen, same_silhouette, steps, stillness
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
 SAMPLES = 24
@@ -51,7 +51,7 @@ class Before(NamedTuple):
     mask: Mask
     """Silhouette (H, W)."""
     still: int
-    """Number of frames for which it has been the same, pixel by pixel."""
+    """Number of frames for which it has been the same."""
     since: float
     """Time (s) of the first of them."""
 
@@ -81,7 +81,7 @@ class MonocularDoubt:
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), self.levers
-        still = before.still + 1 if before is not None and np.array_equal(before.mask, mask) else 0
+        still = before.still + 1 if before is not None and same_silhouette(before.mask, mask) else 0
         spread = self._spread(state, points)
         shares = self._shares(state.pose, points, mask)
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]

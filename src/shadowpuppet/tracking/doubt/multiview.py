@@ -17,7 +17,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.doubt.steps import CONSTANT, same_silhouette, steps, stillness
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.resampling import normalise
@@ -179,5 +179,5 @@ def count_still(before: Before | None, masks: Sequence[Mask | None]) -> int:
     """Number of frames for which the silhouette of some camera with a person has not changed."""
     if before is None:
         return 0
-    same = [now is not None and last is not None and now.any() and np.array_equal(now, last) for now, last in zip(masks, before.masks)]
+    same = [now is not None and last is not None and now.any() and same_silhouette(now, last) for now, last in zip(masks, before.masks)]
     return before.still + 1 if any(same) else 0

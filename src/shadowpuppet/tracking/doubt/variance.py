@@ -15,6 +15,8 @@ from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
 
 TABLE = "factors.toml"
 """The factors, as `benchmarks/calibrate_doubt.py` writes them."""
+LIKE = {"hip": "shoulder", "knee": "elbow", "ankle": "hand"}
+"""Groups of the arms whose factors the legs' have where none are calibrated: one camera is calibrated on upper bodies."""
 Components = Mapping[str, Array]
 """Lengths (L, 3), metres, by name: of each joint along each of three axes."""
 
@@ -47,8 +49,9 @@ class VarianceModel:
 def variance_model(kind: str) -> VarianceModel:
     """The calibrated model of `monocular` or `multiview` tracking."""
     table = tomllib.loads(resources.files("shadowpuppet.tracking.doubt").joinpath(TABLE).read_text("utf-8"))[kind]
-    names, groups = tuple(table["components"]), tuple(group for group in GROUPS if group in table)
-    return VarianceModel(names, groups, np.array([[table[group][axis] for axis in "xyz"] for group in groups], float), table["limits"])
+    own = [table[group if group in table else LIKE[group]] for group in GROUPS]
+    factors = np.array([[group[axis] for axis in "xyz"] for group in own], float)
+    return VarianceModel(tuple(table["components"]), tuple(GROUPS), factors, {"leg": table["limits"]["arm"], **table["limits"]})
 
 
 def turned(sd: Array, R: Array) -> Array:

@@ -115,7 +115,7 @@ class MonocularTracker:
     def unexplained(self, last: Unexplained | None, mask: Mask, state: State) -> Unexplained | None:
         """What a mask (H, W) has beside the body of a new state; `last`: the same of the frame before."""
         if state.status == "absent":
-            return last
+            return look_beside(last, mask, np.zeros_like(mask), self.looks)
         legs = self.picture.legs(state.pose) if self.settings.ignore_legs and self.picture.body.hem is not None else None
         return look_beside(last, mask, self.picture.mask(state.pose), self.looks, legs)
 

@@ -106,10 +106,12 @@ class MultiviewTracker:
                     state: MultiviewState) -> tuple[Unexplained | None, ...]:
         """What the masks (H, W) have beside the body of a new state, by camera; `last`: the same of the frame before."""
         last = tuple(last) or (None,) * len(masks)
-        if state.status == "absent":
-            return last
-        return tuple(before if mask is None else look_beside(before, half_size(mask), picture.mask(state.pose), self.looks)
-                     for before, mask, picture in zip(last, masks, self.views.pictures, strict=True))
+        absent, found = state.status == "absent", list[Unexplained | None]()
+        for before, mask, picture in zip(last, masks, self.views.pictures, strict=True):
+            small = None if mask is None else half_size(mask)
+            drawn = None if small is None else np.zeros_like(small) if absent else picture.mask(state.pose)
+            found.append(before if small is None or drawn is None else look_beside(before, small, drawn, self.looks))
+        return tuple(found)
 
     def cycle(self, rng: np.random.Generator, state: MultiviewState, observation: MultiviewObservation) -> MultiviewState:
         """The filter's loop body (V-A), `cycles` times; the steps are numbered as in the paper."""

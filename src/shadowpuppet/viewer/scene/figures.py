@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.limbs import DOUBTFUL, LIMBS, limb_of
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.viewer.scene.scene import Figure
+from shadowpuppet.viewer.scene.scene import Figure, LimbDoubt
 
 DOT = 0.06
 """Length of the mark of a joint without bones, metres."""
@@ -21,10 +24,28 @@ MIDPOINTS = {"neck": ("left_shoulder", "right_shoulder"), "pelvis": ("left_hip",
 """Joints that, if missing, are added midway between two others."""
 
 
-def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, kind: str = "estimate", **more) -> Figure:
+class LimbStatuses(NamedTuple):
+    """The statuses of a motion's limbs."""
+
+    limbs: Sequence[str]
+    """Of `LIMBS`, K of them."""
+    status: NDArray[np.str_]
+    """Of `motion.STATUSES`, of shape (T, K)."""
+
+
+def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, kind: str = "estimate",
+                     statuses: LimbStatuses | None = None, **more) -> Figure:
     """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `Figure`."""
     places, turns = animation.world()
-    return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind, **more)
+    doubtful = None if statuses is None else limb_doubt(animation.names, statuses)
+    return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind, doubtful=doubtful, **more)
+
+
+def limb_doubt(names: Sequence[str], statuses: LimbStatuses) -> LimbDoubt:
+    """Which limbs of a figure with joints of these names are not vouched for."""
+    frames = np.zeros((len(statuses.status), len(LIMBS)), bool)
+    frames[:, [LIMBS.index(limb) for limb in statuses.limbs]] = np.isin(statuses.status, DOUBTFUL)
+    return LimbDoubt(frames, np.array([LIMBS.index(limb_of(name)) for name in names]))
 
 
 def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, kind: str = "estimate") -> Figure:
@@ -33,7 +54,8 @@ def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, 
 
 
 def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -> Figure:
-    """Figure of joints without a skeleton: a stick for every bone between them, a dot for each other joint. `more`: fields of `Figure`."""
+    """Figure of joints without a skeleton: a stick for every bone between them, a dot for each other joint. `more`: as of
+    `animation_figure`."""
     table = _with_midpoints(table)
     names = list(table.names)
     pairs = [(names.index(a), names.index(b)) for a, b in BONES if a in names and b in names]
@@ -44,7 +66,8 @@ def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -
     return _of_sticks(name, table.times, ends, kind, **more)
 
 
-def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]], kind: str, **more) -> Figure:
+def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]], kind: str,
+               statuses: LimbStatuses | None = None, **more) -> Figure:
     """Figure of sticks between moving points (T, 3), each of constant length: the median."""
     T, J = len(times), len(ends) + 1
     lengths = [_median(np.linalg.norm(b - a, axis=1)) for a, b, _ in ends]
@@ -57,7 +80,8 @@ def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]]
     for n, (a, b, _) in enumerate(ends):
         places[:, n + 1], turns[:, n + 1] = a, _rotations_along(b - a)
         places[~np.isfinite(b).all(1), n + 1] = np.nan
-    return Figure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, **more)
+    doubtful = None if statuses is None else limb_doubt(frame.names, statuses)
+    return Figure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, doubtful=doubtful, **more)
 
 
 def _rotations_along(along: Array) -> Array:

@@ -23,7 +23,7 @@ from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.footage import open_recording
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure
+from shadowpuppet.viewer.scene.figures import LimbStatuses, animation_figure, joint_figure
 from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_recording import cameras_of
 from shadowpuppet.viewer.scene.particles import ParticleRerun
@@ -87,9 +87,10 @@ class _Run:
 
     @property
     def known(self) -> dict:
-        """Fields of `Figure` for the estimate: status, overlap, joints and their standard deviations."""
+        """Arguments of `animation_figure` for the estimate: statuses, overlap, joints and their standard deviations."""
         motion = self.run.motion
-        return {"status": motion.status, "overlap": motion.overlap, "joints": motion.joints, "joint_sd": motion.joint_sd}
+        return {"statuses": LimbStatuses(motion.limbs, motion.limb_status),
+                "status": motion.status, "overlap": motion.overlap, "joints": motion.joints, "joint_sd": motion.joint_sd}
 
     @cached_property
     def options(self) -> Options:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.mesh import Mesh
 from shadowpuppet.motion.synchronization import step_of
 from shadowpuppet.video import Image
@@ -31,6 +32,19 @@ class Ellipsoids(NamedTuple):
     """Standard deviations along the axes of the ellipsoids, metres, of shape (K, 3)."""
     turns: Array
     """Rotations (K, 3, 3) from these axes to the world."""
+
+
+class LimbDoubt(NamedTuple):
+    """Limbs of a figure that are not vouched for."""
+
+    frames: NDArray[np.bool_]
+    """Whether a limb is not, of shape (T, K), for the K `LIMBS`."""
+    limbs: NDArray[np.int64]
+    """The limb that each joint of the mesh belongs to, of shape (J,)."""
+
+    def named(self, n: int) -> list[str]:
+        """Limbs that are not vouched for in a frame, in words."""
+        return [LIMBS[k].replace("_", " ") for k in np.flatnonzero(self.frames[n])]
 
 
 class ParticleCloud(NamedTuple):
@@ -77,6 +91,8 @@ class Figure:
     """Joints with a stated uncertainty, of shape (T, K, 3), metres."""
     joint_sd: Array | None = None
     """Their standard deviations along the world's axes, of shape (T, K, 3), metres."""
+    doubtful: LimbDoubt | None = None
+    """Which limbs are not vouched for; None: all are."""
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Offset at which it is drawn, metres."""
 

@@ -15,7 +15,9 @@ from shadowpuppet.live.display.choice import FOOTERS
 from shadowpuppet.live.display.drawing import drawn
 from shadowpuppet.live.display.view import Display, View
 from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.limbs import limb_of, limbs_of
 from shadowpuppet.motion.mesh import body_mesh
+from shadowpuppet.viewer.scene.figures import LimbStatuses, animation_figure
 from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
 from shadowpuppet.viewer.web.frustum_images import Undistorter
 from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
@@ -112,7 +114,8 @@ class _LiveScene:
         self.root = inverse(picture.camera.T_camera_world) @ picture.T_camera_base
         self.tree, self.mesh = BodyTree(picture.body), body_mesh(picture.body)
         rest = picture.body.skeleton.clamp(np.zeros((1, len(picture.body.skeleton.dofs))))
-        self.figure = posed(picture.body, self.tree, self.mesh, rest[0], self.root)
+        every = frozenset(picture.body.landmark_names)  # so that there are pale nodes for all limbs
+        self.figure = posed(picture.body, self.tree, self.mesh, rest[0], self.root, every)
         server.scene.reset()
         show = Scene(title="live", times=np.zeros(1), figures=(self.figure,), cameras=(SceneCamera(picture.camera),))
         self.stage = SceneView(server, show, ViewOptions(), width=WIDE)
@@ -122,7 +125,7 @@ class _LiveScene:
 
     def to(self, view: View) -> None:
         """Draw a view."""
-        figure = None if view.pose is None else posed(self.picture.body, self.tree, self.mesh, view.pose, self.root)
+        figure = None if view.pose is None else posed(self.picture.body, self.tree, self.mesh, view.pose, self.root, view.doubtful)
         puppet, eye = self.stage.figures[0], self.stage.frustums[0]
         image = drawn(View(phase=view.phase, image=view.image, mask=view.mask))
         with self.stage.server.atomic():
@@ -146,11 +149,12 @@ def open_viewer(listen: str = "127.0.0.1", port: int | None = None, record: bool
     return ViewerDisplay(listen, port, FOOTERS[record])
 
 
-def posed(body: Body, tree: BodyTree, mesh: Any, pose: Array, root: Array) -> Figure:
-    """Figure of a body in one pose (D,); `root` (4, 4): the body's frame to the world."""
-    animation = tree.animation(np.zeros(1), np.asarray(pose, float)[None], root)
-    places, turns = animation.world()
-    return Figure(body.name, animation.times, mesh, animation.rest, places, turns)
+def posed(body: Body, tree: BodyTree, mesh: Any, pose: Array, root: Array, doubtful: frozenset[str] = frozenset()) -> Figure:
+    """Figure of a body in one pose (D,), limbs of `doubtful` landmarks pale; `root` (4, 4): the body's frame to the world."""
+    animation, limbs = tree.animation(np.zeros(1), np.asarray(pose, float)[None], root), limbs_of(body.landmark_names)
+    pale = {limb_of(name) for name in body.landmark_names if name in doubtful}
+    statuses = LimbStatuses(limbs, np.array([["uncertain" if limb in pale else "tracked" for limb in limbs]]))
+    return animation_figure(body.name, animation, mesh, statuses=statuses)
 
 
 def _small(image: np.ndarray) -> np.ndarray:

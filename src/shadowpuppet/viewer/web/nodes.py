@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,19 +26,23 @@ BY_CAMERA = np.array([(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 16
 """Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
 TRANSPARENT_OPACITY = 0.5
 """Opacity of transparent figures."""
+PALE_OPACITY = 0.35
+"""Opacity of limbs that are not vouched for."""
 
 
 class FigureNodes:
-    """Nodes of a figure: a skinned mesh for each colour."""
+    """Nodes of a figure: a skinned mesh for each limb and colour, and a pale one for each that is not vouched for in some frames. One of
+    both is visible: the page would build a mesh whose opacity changed anew."""
 
     def __init__(self, server: viser.ViserServer, figure: Figure, name: str, transparent: bool) -> None:
         """`transparent`: set at the start, as the page rebuilds a mesh if this changes; in a file that would be visible at every loop."""
         self.figure = figure
         self.frame = server.scene.add_frame(name, show_axes=False, position=figure.shift)
         mesh, opacity = figure.mesh, TRANSPARENT_OPACITY if transparent and figure.kind != "truth" else None
-        colours, which = np.unique(mesh.colours, axis=0, return_inverse=True)
+        limbs = np.zeros(len(mesh.joints), np.int64) if figure.doubtful is None else figure.doubtful.limbs[mesh.joints]
+        groups, which = np.unique(np.column_stack([limbs, mesh.colours]), axis=0, return_inverse=True)
         self.parts = []
-        for k in range(len(colours)):
+        for k, (limb, *colour) in enumerate(groups):
             points = np.flatnonzero(which.ravel() == k)
             back = np.full(len(mesh.points), -1)
             back[points] = np.arange(len(points))
@@ -49,12 +53,14 @@ class FigureNodes:
             joints, carried = np.unique(mesh.joints[points], return_inverse=True)
             weights = np.zeros((len(points), len(joints)), np.float32)
             weights[np.arange(len(points)), carried.ravel()] = 1
-            handle = server.scene.add_mesh_skinned(
-                f"{name}/{k}", mesh.points[points].astype(np.float32), faces.astype(np.uint32), skin_weights=weights,
-                bone_wxyzs=np.tile([1.0, 0, 0, 0], (len(joints), 1)), bone_positions=figure.rest[joints].astype(np.float32),
-                color=colour_of(figure.kind, colours[k]), opacity=opacity,
+            made = partial(
+                server.scene.add_mesh_skinned, vertices=mesh.points[points].astype(np.float32), faces=faces.astype(np.uint32),
+                skin_weights=weights, bone_wxyzs=np.tile([1.0, 0, 0, 0], (len(joints), 1)),
+                bone_positions=figure.rest[joints].astype(np.float32), color=colour_of(figure.kind, np.array(colour)),
                 side="double" if mesh.two_sided else "front", cast_shadow=False, receive_shadow=False)  # fmt: skip
-            self.parts.append((handle, joints))
+            ever = figure.doubtful is not None and bool(figure.doubtful.frames[:, int(limb)].any())
+            pale = made(f"{name}/{k} pale", opacity=PALE_OPACITY, visible=False) if ever else None
+            self.parts.append(_Part(made(f"{name}/{k}", opacity=opacity), pale, joints, int(limb)))
 
     def to(self, time: float, visible: bool) -> None:
         """Show the figure at a time, seconds; hide it if not `visible` or unknown then."""
@@ -63,16 +69,35 @@ class FigureNodes:
         if n is None:
             return
         places, turns = self.figure.places[n], self.figure.quaternions[n]
-        for handle, joints in self.parts:
-            for bone, j in zip(handle.bones, joints.tolist()):
+        for part in self.parts:
+            for bone, j in zip(part.shown(self.figure, n).bones, part.joints.tolist()):
                 known = bool(np.isfinite(places[j]).all())
                 bone.position = places[j] if known else NOWHERE
                 bone.wxyz = turns[j]
 
     def set_opacity(self, opacity: float | None) -> None:
         """0 to 1; None: solid."""
-        for handle, _ in self.parts:
-            handle.opacity = opacity
+        for part in self.parts:
+            part.solid.opacity = opacity
+
+
+class _Part(NamedTuple):
+    """Nodes of a part of a figure."""
+
+    solid: Any
+    pale: Any
+    """None if the limb is always vouched for."""
+    joints: NDArray[np.int64]
+    """Joints of the figure that carry it, of shape (B,)."""
+    limb: int
+
+    def shown(self, figure: Figure, n: int) -> Any:
+        """Make the node for a frame visible, and the other one not; returns it."""
+        if self.pale is None or figure.doubtful is None:
+            return self.solid
+        doubtful = bool(figure.doubtful.frames[n, self.limb])
+        self.solid.visible, self.pale.visible = not doubtful, doubtful
+        return self.pale if doubtful else self.solid
 
 
 class Frustum:
