@@ -60,6 +60,8 @@ class Measures(NamedTuple):
     """Greatest joint error of the frame, of shape (T,), metres; not a number where the person cannot be seen, or no joint is known."""
     status: np.ndarray
     """Of shape (T,)."""
+    vouched: np.ndarray
+    """Whether any limb is vouched for, of shape (T,)."""
     judged: Array
     """Number of joints (T, 5): all, far off, those of them in limbs that are `tracked`, near the truth, and those of them in others."""
     overlap: Array
@@ -97,7 +99,7 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
     except ShadowPuppetError as error:
         count = len(truth.times)
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
-                        np.zeros((count, 5)), np.full(count, np.nan), str(error))
+                        np.zeros(count, bool), np.zeros((count, 5)), np.full(count, np.nan), str(error))
     mean, worst, judged = _errors(motion, truth)
     seen = _upto(seen, len(motion))
     mean, worst, judged = np.where(seen, mean, np.nan), np.where(seen, worst, np.nan), judged * seen[:, None]
@@ -108,7 +110,7 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
                   if mask is not None and round(frames.time * film.rate) < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
-    return Measures(motion.times, mean, worst, motion.status, judged, np.where(seen, alike, np.nan))
+    return Measures(motion.times, mean, worst, motion.status, (motion.limb_status == "tracked").any(1), judged, np.where(seen, alike, np.nan))
 
 
 def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array, Array]:
@@ -193,8 +195,8 @@ class Figures(NamedTuple):
         return [f"{100 * share:.{digits}f}" for share, digits in zip(shares, (1, 1, 0))]
 
     def noticed(self) -> str:
-        """Mean time in seconds from its beginning to the first frame that is not called tracked."""
-        return self._after(self.row.begin, lambda one, n: one.status[n] != "tracked") if self.row.begin else ""
+        """Mean time in seconds from its beginning to the first frame that is not called tracked, or of which no limb is vouched for."""
+        return self._after(self.row.begin, lambda one, n: one.status[n] != "tracked" or not one.vouched[n]) if self.row.begin else ""
 
     def recovered(self) -> str:
         """Mean time in seconds from its end to the first of some good frames."""

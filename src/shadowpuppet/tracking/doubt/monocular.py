@@ -94,7 +94,7 @@ class MonocularDoubt:
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
             "step": steps(points, seconds, before),
-            "misfit": max(1 - state.overlap - GOOD_MISFIT, 0.0) * lever,
+            "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * lever,
             "still": stillness(still) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}

@@ -79,7 +79,7 @@ class MultiviewDoubt:
         spread = np.sqrt(np.einsum("n,nla->la", weights, (body.points(state.particles.poses) - points) ** 2))
         shares = self._limb_shares(state.pose, surface, masks)
         columns = dict(zip(("bare", "unexplained", "outside", "unseen"), shares[self._limbs_of_joints].T * self.levers))
-        columns |= {"constant": np.full(len(points), CONSTANT), "misfit": max(1 - state.overlap - GOOD_MISFIT, 0.0) * self.levers,
+        columns |= {"constant": np.full(len(points), CONSTANT), "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * self.levers,
                     "still": stillness(still) * self.levers, "step": steps(points, seconds, before)}
         found = {name: np.repeat(values[:, None], 3, axis=1) for name, values in columns.items()} | {"spread": spread}
         other = np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]
