@@ -110,7 +110,8 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
                   if mask is not None and round(frames.time * film.rate) < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
-    return Measures(motion.times, mean, worst, motion.status, (motion.limb_status == "tracked").any(1), judged, np.where(seen, alike, np.nan))
+    vouched = (motion.limb_status == "tracked").any(1)
+    return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(seen, alike, np.nan))
 
 
 def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -77,8 +78,13 @@ def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, 
     if evidence.frozen:
         return ("predicted",) * len(limbs_of(names))
     radius, out = np.sqrt((sd**2).sum(1)), list[str]()
-    for limb in limbs_of(names):
-        own = [n for n, name in enumerate(names) if limb_of(name) == limb]
+    for limb, own in _joints_of_limbs(tuple(names)).items():
         sure = radius[own].max() <= limits[limb.rpartition("_")[2]]
         out.append("tracked" if sure else "predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain")
     return tuple(out)
+
+
+@cache
+def _joints_of_limbs(names: tuple[str, ...]) -> dict[str, list[int]]:
+    """Indices of each limb's joints."""
+    return {limb: [n for n, name in enumerate(names) if limb_of(name) == limb] for limb in limbs_of(names)}

@@ -83,7 +83,8 @@ class MonocularDoubt:
         at, lever = dict(zip(self.names, points)), self.levers
         still = before.still + 1 if before is not None and same_silhouette(before.mask, mask) else 0
         spread = self._spread(state, points)
-        shares = self._shares(state.pose, points, mask)
+        observation = self.tracker.observe(mask, state.pose)
+        shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
@@ -98,7 +99,7 @@ class MonocularDoubt:
             "still": stillness(still) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
-        components["alternative"] = self._mirrors.displacements(state.pose, points, self.tracker.observe(mask, state.pose))
+        components["alternative"] = self._mirrors.displacements(state.pose, points, observation)
         components["distance"] = points * (0, 0, DISTANCE)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
@@ -143,17 +144,17 @@ class MonocularDoubt:
             poses[:, stage.dofs] = particles.poses[np.random.default_rng(n).permutation(drawn)]  # stages are independent
         return np.sqrt(((self.tracker.picture.points(poses) - points) ** 2).mean(0))
 
-    def _shares(self, pose: Array, points: Array, mask: Mask) -> dict[str, tuple[float, float, float, float]]:
+    def _shares(self, pose: Array, points: Array, mask: Mask, ignored: Mask) -> dict[str, tuple[float, float, float, float]]:
         """Of each limb, drawn in a pose (D,), the share that is hidden before or behind others, the silhouette near it that nothing
         explains over its area, and the shares outside the mask (H, W) and outside the picture. `points` (L, 3): the joints in the
-        camera's frame."""
+        camera's frame; `ignored` (H, W): pixels that do not count."""
         import cv2
 
         picture, width = self.tracker.picture, self.tracker.picture.camera.size[0]
         drawn = {limb: unpack(picture.draw(pose, parts), width) for limb, parts in self._parts.items()}
         times = np.add.reduce([limb.view(np.uint8) for limb in drawn.values()])
         body = times > 0
-        counted = ~picture.legs(pose) if self.tracker.settings.ignore_legs else np.ones_like(body)
+        counted = ~ignored
         square = np.ones((2 * max(1, round(THIN * float(np.sqrt(np.count_nonzero(body))))) + 1,) * 2, np.uint8)
 
         def thick(pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -52,7 +52,7 @@ def stillness(frames: int) -> float:
 
 def same_silhouette(one: Mask, other: Mask) -> bool:
     """Whether two masks (H, W) are of the same picture, up to what a codec changes."""
-    return one.shape == other.shape and np.count_nonzero(one ^ other) <= SAME * np.count_nonzero(other)
+    return one.shape == other.shape and bool(np.count_nonzero(one ^ other) <= SAME * np.count_nonzero(other))
 
 
 def is_frozen(frames: int, seconds: float) -> bool:
