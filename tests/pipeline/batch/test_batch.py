@@ -214,13 +214,13 @@ def test_a_full_disk_fails_the_runs_that_it_hits(recording, tmp_path, monkeypatc
     """As the writer meets it: no room for a row. Seed 1 finds room at its second try; seed 2 never does."""
     hit, append = [], RunWriter._append
 
-    def full(self, rows):
+    def full(self, *rows):
         seed = self.info["settings"]["seed"]
         if len(self._motion) == 3 and (seed == 2 or (seed == 1 and 1 not in hit)):
             hit.append(seed)
             with self._system_errors():
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        append(self, rows)
+        append(self, *rows)
 
     monkeypatch.setattr(RunWriter, "_append", full)
     notes = Notes()

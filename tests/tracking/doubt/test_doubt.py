@@ -87,9 +87,9 @@ def test_the_deviation_of_an_angle_follows_from_that_of_what_it_moves():
 # Limbs
 
 
-def statuses(*radii: float, unseen: float = 0.0, frozen: bool = False) -> tuple[str, ...]:
+def statuses(*radii: float, unseen: float = 0.0, frozen: bool = False, status: str = "tracked") -> tuple[str, ...]:
     sd = np.outer(radii, [1, 0, 0]).astype(float)
-    return limb_statuses(LIMITS, JOINTS, sd, Evidence({}, dict.fromkeys(LIMBS, unseen), frozen))
+    return limb_statuses(LIMITS, JOINTS, sd, Evidence({}, dict.fromkeys(LIMBS, unseen), frozen), status)
 
 
 def test_a_limb_is_as_doubtful_as_its_most_doubtful_joint():
@@ -102,6 +102,10 @@ def test_a_limb_is_as_doubtful_as_its_most_doubtful_joint():
 def test_a_doubtful_limb_that_no_silhouette_shows_is_predicted():
     assert statuses(0.1, 0.1, 0.1, 0.3, 0.1, unseen=UNSEEN + 0.01) == ("tracked", "predicted", "tracked")
     assert statuses(0.1, 0.1, 0.1, 0.1, 0.1, unseen=1.0) == ("tracked",) * 3
+
+
+def test_no_limb_of_an_uncertain_frame_is_vouched_for():
+    assert statuses(0.1, 0.1, 0.1, 0.1, 0.1, status="uncertain") == ("uncertain",) * 3
 
 
 def test_all_limbs_of_a_frozen_picture_are_predicted():

@@ -45,14 +45,16 @@ class Doubt(NamedTuple):
     """Of `motion.STATUSES`, for each of the limbs that the landmarks belong to."""
 
 
-def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: Skeleton, points: Points, pose: Array, R: Array) -> Doubt:
-    """Doubt about a pose (D,), of which `points` gives the landmarks along the axes of the evidence's components, and `names` their names.
+def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: Skeleton, points: Points, pose: Array, status: str,
+                R: Array) -> Doubt:
+    """Doubt about a pose (D,), of which `points` gives the landmarks along the axes of the evidence's components, and `names` their names;
+    `status` is the frame's.
 
     `kind`: of the calibrated model, `monocular` or `multiview`; `R` (3, 3) takes vectors from the components' axes to the world's.
     """
     model = variance_model(kind)
     sd = model.sd(names, evidence.components)
-    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), limb_statuses(model.limits, names, sd, evidence))
+    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), limb_statuses(model.limits, names, sd, evidence, status))
 
 
 def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) -> Array:
@@ -69,17 +71,17 @@ def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) 
     return np.sqrt(np.diag(np.linalg.inv(jacobian @ jacobian.T + np.diag(1 / np.maximum(width, STEP) ** 2))))
 
 
-def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, evidence: Evidence) -> tuple[str, ...]:
+def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, evidence: Evidence, status: str) -> tuple[str, ...]:
     """Status of each limb from the deviations (L, 3), metres, of its joints, named `names`.
 
-    `tracked`, but `uncertain` if a joint's deviation, all axes together, is over the limit (m) for limbs of its kind; or `predicted` if
-    moreover most of the limb is unseen. All are `predicted` if the picture is frozen.
+    `tracked`, but `uncertain` if the frame's `status` is, or a joint's deviation, all axes together, is over the limit (m) for limbs of its
+    kind; or `predicted` if moreover most of the limb is unseen. All are `predicted` if the picture is frozen.
     """
     if evidence.frozen:
         return ("predicted",) * len(limbs_of(names))
     radius, out = np.sqrt((sd**2).sum(1)), list[str]()
     for limb, own in _joints_of_limbs(tuple(names)).items():
-        sure = radius[own].max() <= limits[limb.rpartition("_")[2]]
+        sure = status == "tracked" and radius[own].max() <= limits[limb.rpartition("_")[2]]
         out.append("tracked" if sure else "predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain")
     return tuple(out)
 

@@ -67,7 +67,7 @@ class MonocularDoubt:
         picture = self.tracker.picture
         evidence, now = self.evidence(state, mask, seconds, before)
         R = picture.camera.T_camera_world[:3, :3].T
-        return state_doubt("monocular", evidence, self.names, picture.body.skeleton, picture.points, state.pose, R), now
+        return state_doubt("monocular", evidence, self.names, picture.body.skeleton, picture.points, state.pose, state.status, R), now
 
     def evidence(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Evidence, Before]:
         """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.

@@ -59,7 +59,7 @@ class MultiviewDoubt:
         """Doubt about the estimate from surface points and masks (H, W) at a time (s); and what the next frame needs."""
         body = self.tracker.body
         evidence, now = self.evidence(state, surface, masks, seconds, before)
-        return state_doubt("multiview", evidence, self.names, body.skeleton, body.points, state.pose, np.eye(3)), now
+        return state_doubt("multiview", evidence, self.names, body.skeleton, body.points, state.pose, state.status, np.eye(3)), now
 
     def evidence(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
                  before: Before | None) -> tuple[Evidence, Before]:
