@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import STAGES, Listener
-from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.track import MULTIVIEW, look_at, run
 from shadowpuppet.video import open_frames
 
@@ -188,3 +188,18 @@ def test_nobody_at_all_is_refused(tmp_path):
     with pytest.raises(TrackingError, match="camera 'cam1': the silhouette is empty"):
         track(recording, tmp_path / "run")
     assert look_at(recording, Options(masks=True)).refusal is not None
+
+
+def test_a_camera_that_freezes_is_set_aside_and_named(recording, tmp_path, monkeypatch):
+    def frozen(*arguments, **named):
+        held = None
+        for n, seen in enumerate(read_frames(*arguments, **named)):
+            held = seen.masks[1] if n < 3 else held
+            yield seen._replace(masks=(seen.masks[0], held, *seen.masks[2:]))
+
+    monkeypatch.setattr("shadowpuppet.pipeline.track.read_frames", frozen)
+    with pytest.warns(ShadowPuppetWarning, match="set aside for a time \\(camera 'cam2', frozen from"):
+        done = track(recording, tmp_path / "run")
+    (found,) = done.metrics["set_aside"]
+    assert (found["camera"], found["why"]) == ("cam2", "frozen")
+    assert found["to_s"] == pytest.approx((made_rig.FRAMES - 1) / made_rig.RATE, abs=1e-3)

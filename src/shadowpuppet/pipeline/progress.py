@@ -23,6 +23,7 @@ from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.tracking.frozen import CameraWatch
 
 Item = TypeVar("Item")
 STAGES = ("decode", "segment", "wait", "hull", "track", "doubt", "write")
@@ -160,6 +161,21 @@ def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
         warn(f"parts of the silhouettes that stayed, and that no pose of the body explains, were left out ({places}): a thing, a shadow or "
              "another person; if it was the person, give --tracker.patience 0 (with several cameras --multiview.patience 0)",
              ShadowPuppetWarning, stacklevel=3)
+
+
+def set_aside(watch: CameraWatch, names: Sequence[str]) -> dict[str, Any]:
+    """The entry `set_aside` of metrics.json, none if no camera was: camera, why, number of frames, times of the first and last (s)."""
+    found = [{"camera": names[each.camera], "why": each.why, "frames": each.frames, "from_s": round(each.begin, 3),
+              "to_s": round(each.end, 3)} for each in watch.intervals]
+    return {"set_aside": found} if found else {}
+
+
+def warn_of_set_aside(found: Sequence[Mapping[str, Any]]) -> None:
+    """Warn of cameras that were set aside; `found`: the entry of metrics.json."""
+    if found:
+        when = "; ".join(f"camera {one['camera']!r}, {one['why']} from {one['from_s']:.1f} to {one['to_s']:.1f} s" for one in found)
+        warn(f"cameras were set aside for a time ({when}): frozen is a picture that does not change while the person moves in others, "
+             "blind one of which nearly all is silhouette, as when it turns black", ShadowPuppetWarning, stacklevel=3)
 
 
 def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:

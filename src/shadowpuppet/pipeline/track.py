@@ -28,10 +28,12 @@ from shadowpuppet.pipeline.progress import (
     evaluated,
     generators,
     json_text,
+    set_aside,
     timings,
     tracked,
     warn_of_left_out,
     warn_of_losses,
+    warn_of_set_aside,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
@@ -40,6 +42,7 @@ from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_na
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.tracking.frozen import CameraWatch
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -172,6 +175,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     metrics = written.metrics | evaluated(rig, written.motion)
     warn_of_losses(written.motion)
     warn_of_left_out(metrics.get("left_out", []))
+    warn_of_set_aside(metrics.get("set_aside", []))
     write_metrics(folder, metrics)
     return Summary(Path(folder), written.motion, metrics, prepared.look)
 
@@ -193,6 +197,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
            cache: SilhouetteCache | None) -> None:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
     subject, survey, timer, state, before, count = prepared.check(), prepared.survey, StageTimer(), None, None, 0
+    watch = CameraWatch(len(survey.rig.footage))
     left_out = LeftOut([footage.view.camera for footage in survey.rig.footage])
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
@@ -204,6 +209,8 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             frames = stack.enter_context(closing(read_frames(survey.rig, segment, ready=options.masks, every=options.every)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
+            if survey.rig.is_multiview:
+                frames = (seen._replace(masks=watch(seen.time, seen.masks)) for seen in frames)
             observed = stack.enter_context(closing(subject.observations(frames)))
             for seen, observation, seconds in timer.each("wait", observed):
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
@@ -220,4 +227,4 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 listener.advance(count)
     finally:
         writer.metrics |= timings(timer, kind.stages, count, time.perf_counter() - began)
-        writer.metrics |= left_out.metrics()
+        writer.metrics |= left_out.metrics() | set_aside(watch, survey.rig.names)

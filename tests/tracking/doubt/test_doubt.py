@@ -13,7 +13,7 @@ from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
 from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import PACE, STILL_ALLOWED, is_frozen, steps, stillness
+from shadowpuppet.tracking.doubt.steps import PACE, STILL_ALLOWED, steps, stillness
 from shadowpuppet.tracking.doubt.variance import VarianceModel, turned, variance_model
 
 JOINTS = ("neck", "left_shoulder", "left_elbow", "left_hand", "right_knee")
@@ -137,10 +137,3 @@ def test_few_repeated_pictures_are_no_fault_and_more_raise_the_doubt_to_a_bound(
     assert sorted(later) == later
     assert later[1] > 0
     assert later[-1] == 2
-
-
-def test_a_film_converted_to_a_higher_rate_is_not_frozen():
-    assert not is_frozen(3, 3 / 60)
-    assert not is_frozen(4, 4 / 120)
-    assert not is_frozen(2, 2.0)
-    assert is_frozen(4, 4 / 15)

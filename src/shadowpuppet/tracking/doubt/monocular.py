@@ -19,7 +19,8 @@ from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.mirror import Mirrors
-from shadowpuppet.tracking.doubt.steps import CONSTANT, is_frozen, same_silhouette, steps, stillness
+from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
 SAMPLES = 24

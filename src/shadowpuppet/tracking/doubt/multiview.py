@@ -17,7 +17,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import CONSTANT, same_silhouette, steps, stillness
+from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.frozen import same_silhouette
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.resampling import normalise

@@ -1,0 +1,88 @@
+"""Frozen pictures: silhouettes that stay the same, and cameras that are set aside while they are frozen or see nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.camera.mask import Mask, may_be_person
+
+FROZEN_FRAMES, FROZEN_SECONDS = 4, 0.25
+"""Frames and time from which on a silhouette that is the same is a frozen picture's: conversion to a higher frame rate repeats fewer."""
+SAME = 1e-3
+"""Share of the silhouette that may differ in a frozen picture, which a codec encodes anew now and then. A person who stands still, and the
+noise at the outline, change some five times as much."""
+MOVES = 1e-2
+"""Share of another camera's silhouette that must differ for the person to have moved."""
+LEAST = 2
+"""Number of cameras that are never set aside as frozen."""
+
+
+def same_silhouette(one: Mask, other: Mask, share: float = SAME) -> bool:
+    """Whether two masks (H, W) are of the same picture, up to a `share` of the silhouette: what a codec changes."""
+    return one.shape == other.shape and bool(np.count_nonzero(one ^ other) <= share * np.count_nonzero(other))
+
+
+def is_frozen(frames: int, seconds: float) -> bool:
+    """Whether a silhouette that has been the same for some frames and seconds is a frozen picture's."""
+    return frames >= FROZEN_FRAMES and seconds >= FROZEN_SECONDS
+
+
+class Interval(NamedTuple):
+    """When a camera was set aside."""
+
+    camera: int
+    """Its index."""
+    why: str
+    """`frozen` or `blind`."""
+    begin: float
+    """Seconds, of the first frame."""
+    end: float
+    """Seconds, of the last."""
+    frames: int
+
+
+class CameraWatch:
+    """Sets cameras aside, and takes them back: `frozen` ones, whose silhouette stays the same while the person moves in another camera's,
+    and `blind` ones, of which nearly all is silhouette, as when the picture turns black.
+
+    `watch(seconds, masks)` has None in place of their masks. Frames are given in order.
+    """
+
+    def __init__(self, number: int) -> None:
+        """For a number of cameras."""
+        self.intervals: list[Interval] = []
+        self._last: list[Mask | None] = [None] * number
+        self._still, self._since = [0] * number, [0.0] * number
+        self._aside: list[int | None] = [None] * number
+        """Index of the present interval of each camera."""
+
+    def __call__(self, seconds: float, masks: Sequence[Mask | None]) -> tuple[Mask | None, ...]:
+        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside."""
+        moved = [now is not None and last is not None and not same_silhouette(last, now, MOVES) for now, last in zip(masks, self._last)]
+        for n, (now, last) in enumerate(zip(masks, self._last)):
+            if now is None or last is None or not now.any() or not same_silhouette(last, now):
+                self._still[n], self._since[n] = 0, seconds
+            elif any(moved):
+                self._still[n] += 1
+        blind = [mask is not None and bool(mask.any()) and not may_be_person(mask) for mask in masks]
+        frozen = [is_frozen(still, seconds - since) and not full for still, since, full in zip(self._still, self._since, blind)]
+        self._last = [last if now is None else now for now, last in zip(masks, self._last)]
+        if sum(mask is not None and not one and not other for mask, one, other in zip(masks, frozen, blind)) < LEAST:
+            frozen = [False] * len(frozen)
+        for n in range(len(masks)):
+            self._note(n, seconds, "blind" if blind[n] else "frozen" if frozen[n] else "")
+        return tuple(None if one or other else mask for mask, one, other in zip(masks, frozen, blind))
+
+    def _note(self, camera: int, seconds: float, why: str) -> None:
+        place = self._aside[camera]
+        if not why:
+            self._aside[camera] = None
+        elif place is None or self.intervals[place].why != why:
+            self._aside[camera] = len(self.intervals)
+            self.intervals.append(Interval(camera, why, seconds, seconds, 1))
+        else:
+            before = self.intervals[place]
+            self.intervals[place] = before._replace(end=seconds, frames=before.frames + 1)
