@@ -13,6 +13,7 @@ from shadowpuppet.io.intervals import read_intervals
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
@@ -30,6 +31,17 @@ QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 2
 @pytest.fixture(scope="module")
 def run(recording, tmp_path_factory):
     return track_recording(recording, tmp_path_factory.mktemp("run") / "run", Options(overlay=True))
+
+
+def test_most_true_positions_are_within_the_intervals_and_few_wrong_joints_are_vouched_for(recording, run):
+    motion, truth = run.motion, read_joints(recording / "truth.csv")
+    names = [name for name in motion.joint_names if name in truth.names]
+    own, theirs = ([of.index(name) for name in names] for of in (motion.joint_names, truth.names))
+    off = motion.joints[:, own] - truth.positions[: len(motion)][:, theirs]
+    assert 0.8 < np.mean(np.abs(off) < 1.645 * motion.joint_sd[:, own]) <= 1
+    vouched = motion.limb_status[:, [motion.limbs.index(limb_of(name)) for name in names]] == "tracked"
+    assert np.mean(vouched & (np.linalg.norm(off, axis=2) > 0.3)) < 0.01
+    assert vouched.mean() > 0.3
 
 
 class Stops(Listener):
