@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 
 LIMBS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Limbs that have a status of their own: an arm is shoulder to hand, a leg hip to foot, the trunk is the rest."""
@@ -21,6 +22,12 @@ def limbs_of(joints: Iterable[str]) -> tuple[str, ...]:
     """The limbs to which joints belong, in the order of `LIMBS`."""
     found = set(map(limb_of, joints))
     return tuple(limb for limb in LIMBS if limb in found)
+
+
+@cache
+def joints_of_limbs(joints: tuple[str, ...]) -> dict[str, list[int]]:
+    """Indices of the joints of each of `limbs_of(joints)`. Not to be changed: kept for the next call."""
+    return {limb: [n for n, joint in enumerate(joints) if limb_of(joint) == limb] for limb in limbs_of(joints)}
 
 
 def doubtful_limbs(joints: Iterable[str], statuses: Iterable[str] | None) -> list[str]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.limbs import limb_of, limbs_of
+from shadowpuppet.motion.limbs import joints_of_limbs, limbs_of
 from shadowpuppet.tracking.doubt.variance import Components, turned, variance_model
 
 STEP = 1e-4
@@ -80,13 +79,7 @@ def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, 
     if evidence.frozen:
         return ("predicted",) * len(limbs_of(names))
     radius, out = np.sqrt((sd**2).sum(1)), list[str]()
-    for limb, own in _joints_of_limbs(tuple(names)).items():
+    for limb, own in joints_of_limbs(tuple(names)).items():
         sure = status == "tracked" and radius[own].max() <= limits[limb.rpartition("_")[2]]
         out.append("tracked" if sure else "predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain")
     return tuple(out)
-
-
-@cache
-def _joints_of_limbs(names: tuple[str, ...]) -> dict[str, list[int]]:
-    """Indices of each limb's joints."""
-    return {limb: [n for n, name in enumerate(names) if limb_of(name) == limb] for limb in limbs_of(names)}

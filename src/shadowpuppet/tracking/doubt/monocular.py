@@ -15,7 +15,7 @@ from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.limbs import LIMBS, limb_of
+from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.mirror import Mirrors
@@ -125,11 +125,6 @@ class MonocularDoubt:
         return Mirrors(self.tracker.picture)
 
     @cached_property
-    def _limbs(self) -> dict[str, list[int]]:
-        """Indices of each limb's joints."""
-        return {limb: [n for n, name in enumerate(self.names) if limb_of(name) == limb] for limb in LIMBS}
-
-    @cached_property
     def _parts(self) -> dict[str, NDArray[np.int64]]:
         """Indices of the shapes of each limb that the body has."""
         limbs = [limb_of_part(name) for name in self.tracker.picture.body.parts]
@@ -172,12 +167,12 @@ class MonocularDoubt:
             (x, y), reach = self._reach(limb, points, pixels)
             near = np.count_nonzero((columns - x) ** 2 + (rows - y) ** 2 < reach**2)
             shares[limb] = (np.count_nonzero(own & (times > 1)) / area, min(near / area, MOST_UNEXPLAINED),
-                            np.count_nonzero(own & outside) / area, float(cut[self._limbs[limb]].mean()))
+                            np.count_nonzero(own & outside) / area, float(cut[joints_of_limbs(self.names)[limb]].mean()))
         return shares
 
     def _reach(self, limb: str, points: Array, pixels: Array) -> tuple[Array, float]:
         """Centre (2,) and radius, pixels, of the region in which a limb may be."""
-        focal, own = float(self.tracker.picture.camera.matrix[0, 0]), self._limbs[limb]
+        focal, own = float(self.tracker.picture.camera.matrix[0, 0]), joints_of_limbs(self.names)[limb]
         root = self.names.index("neck") if limb == "trunk" else own[0]
         length = TRUNK_REACH if limb == "trunk" else REACH * float(np.sqrt((np.diff(points[own], axis=0) ** 2).sum(1)).sum())
         return pixels[root], length * focal / points[root, 2]
