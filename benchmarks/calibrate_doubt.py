@@ -98,7 +98,7 @@ SILENT = 0.005
 NEAR = 0.1
 """Error (m) below which a doubtful joint is a false alarm."""
 PARTS = 3
-"""Number of parts of the recordings, each of which is tested with the factors of the others."""
+"""Number of parts of the recordings; each is tested with the factors of the others."""
 NEGLIGIBLE = 0.02
 """Factor below which a component is left out."""
 

@@ -196,7 +196,7 @@ class Figures(NamedTuple):
         return [f"{100 * share:.{digits}f}" for share, digits in zip(shares, (1, 1, 0))]
 
     def noticed(self) -> str:
-        """Mean time in seconds from its beginning to the first frame that is not called tracked, or of which no limb is vouched for."""
+        """Mean time in seconds from its beginning to the first frame that is not `tracked`, or has no limb that is."""
         return self._after(self.row.begin, lambda one, n: one.status[n] != "tracked" or not one.vouched[n]) if self.row.begin else ""
 
     def recovered(self) -> str:

@@ -178,7 +178,7 @@ class Light:
 
     @cached_property
     def _few(self) -> _Sampled:
-        """Every so many-th of them."""
+        """A regular share of them: every n-th."""
         rows, columns, levels, informative, terms = self._all
         return _Sampled(rows[::SPARSE].copy(), columns[::SPARSE].copy(), levels[:, ::SPARSE].copy(), informative[:, ::SPARSE].copy(),
                         terms[:, ::SPARSE].copy())

@@ -15,7 +15,7 @@ from shadowpuppet.tracking.doubt.variance import Components, turned, variance_mo
 STEP = 1e-4
 """Step (rad or m) of the derivatives of joints by degrees of freedom."""
 UNBOUNDED = 1.0
-"""Standard deviation (m or rad) of a degree of freedom without limits of which the joints tell nothing."""
+"""Standard deviation (m or rad) of a degree of freedom without limits that moves no joint."""
 UNSEEN = 0.7
 """Share of a limb that no silhouette shows from which on a doubtful limb is `predicted`."""
 Points = Callable[[Array], Array]
@@ -46,10 +46,10 @@ class Doubt(NamedTuple):
 
 def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: Skeleton, points: Points, pose: Array, status: str,
                 R: Array) -> Doubt:
-    """Doubt about a pose (D,), of which `points` gives the landmarks along the axes of the evidence's components, and `names` their names;
-    `status` is the frame's.
+    """Doubt about a pose (D,).
 
-    `kind`: of the calibrated model, `monocular` or `multiview`; `R` (3, 3) takes vectors from the components' axes to the world's.
+    `kind`: of the calibrated model, `monocular` or `multiview`; `names`: of the landmarks; `points`: from poses to landmarks along the axes
+    of the evidence's components; `status`: the frame's; `R` (3, 3) takes vectors from those axes to the world's.
     """
     model = variance_model(kind)
     sd = model.sd(names, evidence.components)

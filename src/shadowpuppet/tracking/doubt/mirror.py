@@ -77,7 +77,7 @@ class Mirrors:
 
 
 def _mirrored(chain: Array, flips: tuple[int, int]) -> Array:
-    """Elbow and wrist (6,) of a chain (3, 3) of which some bones point as far forward along the view as they did backward."""
+    """Elbow and wrist (6,) of a chain (3, 3) in which the part along the view of some bones has the other sign."""
     found, place = [], chain[0]
     for sign, start, end in zip(flips, chain[:-1], chain[1:], strict=True):
         view, bone = end / np.linalg.norm(end), end - start

@@ -38,5 +38,5 @@ def steps(points: Array, seconds: float, before: Earlier | None) -> Array:
 
 
 def stillness(frames: int) -> float:
-    """Share of its lever by which a joint may be off after so many frames with the same silhouette, 0 to 2."""
+    """Factor of the joints' levers, 0 to 2, after a number of frames with the same silhouette."""
     return min(max(frames - STILL_ALLOWED, 0) / STILL_UNIT, 2.0)
