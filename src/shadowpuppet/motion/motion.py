@@ -138,13 +138,12 @@ class Motion:
     @property
     def status_counts(self) -> dict[str, int]:
         """Number of frames of each status that occurs."""
-        return {status: int(count) for status in STATUSES if (count := (self.status == status).sum())}
+        return _counts(self.status)
 
     @property
     def limb_status_counts(self) -> dict[str, dict[str, int]]:
         """Number of frames of each status that occurs, by limb."""
-        return {limb: {status: int(count) for status in STATUSES if (count := (column == status).sum())}
-                for limb, column in zip(self.limbs, self.limb_status.T)}
+        return {limb: _counts(column) for limb, column in zip(self.limbs, self.limb_status.T)}
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -208,8 +207,8 @@ class MotionBuilder:
             _check_shape(name, arrays[name], shape)
         for name in ("cost", "overlap"):
             _check_shape(name, np.asarray(getattr(frame, name), float), ())
-        own = frame.limb_status is not None and frame.status not in BLANK
-        limbs = tuple(frame.limb_status or ()) if own else (frame.status,) * len(self.limbs)
+        stated = None if frame.status in BLANK else frame.limb_status
+        limbs = (frame.status,) * len(self.limbs) if stated is None else tuple(stated)
         _check_shape("limb_status", _statuses(limbs), (len(self.limbs),))
         return frame._replace(time=float(frame.time), cost=float(frame.cost), overlap=float(frame.overlap), limb_status=limbs, **arrays)
 
@@ -244,6 +243,11 @@ def _statuses(status: ArrayLike) -> NDArray[np.str_]:
     if len(unknown):
         raise ShadowPuppetError(f"status: found {str(unknown[0])!r}, expected one of {choices(STATUSES)}")
     return status.astype(np.array(STATUSES).dtype)
+
+
+def _counts(status: NDArray[np.str_]) -> dict[str, int]:
+    """Number of each status that occurs in some (T,)."""
+    return {each: int(count) for each in STATUSES if (count := (status == each).sum())}
 
 
 def _check_shape(what: str, values: NDArray, shape: tuple[int, ...]) -> None:

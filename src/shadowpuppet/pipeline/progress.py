@@ -23,6 +23,7 @@ from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.silhouette.cleanup import bounding_window
 from shadowpuppet.tracking.frozen import CameraWatch
 
 Item = TypeVar("Item")
@@ -117,8 +118,8 @@ class LeftOut:
 
 def _box(mask: Mask, size: tuple[int, int]) -> list[int]:
     """Left, top, right and bottom of a mask (H, W), pixels of a picture of another size (width, height)."""
-    (height, width), (rows, columns) = mask.shape, (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
-    (x0, x1), (y0, y1) = ((each[0], each[-1] + 1) for each in (columns, rows))
+    (height, width), (rows, columns) = mask.shape, bounding_window(mask.view(np.uint8), 0)
+    (x0, x1), (y0, y1) = (columns.start, columns.stop), (rows.start, rows.stop)
     return [round(x0 * size[0] / width), round(y0 * size[1] / height), round(x1 * size[0] / width), round(y1 * size[1] / height)]
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.silhouette.background import Floats, Image, to_planes
+from shadowpuppet.silhouette.cleanup import bounding_window
 from shadowpuppet.silhouette.recovery.colours import colour_model, log_ratio
 
 STILL_SHARE = 0.85
@@ -80,8 +81,8 @@ class AddedParts(NamedTuple):
 
     def described(self, scale: tuple[float, float]) -> str:
         """Where it is, in words; `scale`: the film's pixels over the mask's, across and down."""
-        rows, columns = np.flatnonzero(self.mask.any(1)), np.flatnonzero(self.mask.any(0))
-        x, y = ((round(each[0] * factor), round((each[-1] + 1) * factor)) for each, factor in zip((columns, rows), scale))
+        rows, columns = bounding_window(self.mask.view(np.uint8), 0)
+        x, y = ((round(each.start * factor), round(each.stop * factor)) for each, factor in zip((columns, rows), scale))
         return f"something that never moves within x {x[0]} to {x[1]}, y {y[0]} to {y[1]}, and is not in the empty scene"
 
 

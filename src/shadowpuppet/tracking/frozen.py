@@ -12,8 +12,8 @@ from shadowpuppet.camera.mask import Mask, may_be_person
 FROZEN_FRAMES, FROZEN_SECONDS = 4, 0.25
 """Frames and time from which on a silhouette that is the same is a frozen picture's: conversion to a higher frame rate repeats fewer."""
 SAME = 1e-3
-"""Share of the silhouette that may differ in a frozen picture: a codec encodes key frames anew. The noise at the outline of a person who
-stands still changes some five times as much."""
+"""Share of the silhouette that may differ in a frozen picture: a codec's key frames differ from those before. The noise at the outline of a
+person who stands still changes some five times as much."""
 MOVES = 1e-2
 """Share of another camera's silhouette that must differ for the person to have moved."""
 LEAST = 2

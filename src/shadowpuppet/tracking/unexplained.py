@@ -26,7 +26,7 @@ MORE = 0.25
 """Least growth of the silhouette's area, in areas of the drawn body, by which something came beside the person: a limb that the body
 misses adds less."""
 FORGET = 5
-"""An unexplained part is taken back so many times as fast as it was left out, once it is no silhouette any more."""
+"""Speed at which a part that is no silhouette any more is taken back, over that at which it was left out."""
 MOST_LOOKS = 250
 """Greatest number of pictures that is counted."""
 

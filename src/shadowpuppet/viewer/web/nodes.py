@@ -32,7 +32,7 @@ PALE_OPACITY = 0.35
 
 class FigureNodes:
     """Nodes of a figure: a skinned mesh for each limb and colour, and a pale one for each that is not vouched for in some frames. One of
-    both is visible: the page would build a mesh whose opacity changed anew."""
+    both is visible: the page builds a new mesh if its opacity changes."""
 
     def __init__(self, server: viser.ViserServer, figure: Figure, name: str, transparent: bool) -> None:
         """`transparent`: set at the start, as the page rebuilds a mesh if this changes; in a file that would be visible at every loop."""
