@@ -12,7 +12,7 @@ from shadowpuppet.cli.tables import error_table, metrics_table, pairs, show, sho
 DOFS_IN_ROW = 2
 
 
-def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0, end: int | None = None,
+def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: str = "0", end: str | None = None,
              offset: float = 0.0, sync: Switch = False, align: Switch = False, angles: Switch = False,
              file: Annotated[Path | None, output("File that gets all figures (.json).")] = None,
              report: Annotated[Path | None, flag("File that gets a page with plots and pictures (.html); needs matplotlib.")] = None,
@@ -29,9 +29,9 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     joints
         Joints to compare, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
-        First frame of the truth to compare.
+        First frame of the truth to compare: its number (120 or 120f), or its time (3.5s).
     end
-        Last frame of the truth to compare. [default: its last]
+        Last frame of the truth to compare, likewise. [default: its last]
     offset
         Seconds to add to the truth's times.
     sync

@@ -23,7 +23,8 @@ GROUPS = {
     **dict.fromkeys(("height", "distance", "body", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
-    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size", "every"), PICTURES),
+    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size", "every"),
+                    PICTURES),
 }
 
 

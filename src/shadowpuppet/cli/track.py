@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     DemoFlags = SessionFlags = LiveFlags = Any
 else:
-    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay")
+    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
     SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "training")))

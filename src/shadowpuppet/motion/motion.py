@@ -18,6 +18,8 @@ STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
 """Statuses of a frame: tracked; tracked but doubtful; extrapolated without a picture; position unknown; no person visible."""
 BLANK = ("lost", "absent")
 """Statuses of frames without pose and joints."""
+ROUNDING = 1e-6
+"""Rounding error of a time, seconds."""
 PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status", "limb_status")
 """Fields of a `Motion` with one row a frame."""
 
@@ -44,6 +46,11 @@ class JointTable:
         if missing:
             raise ShadowPuppetError(f"unknown joint {missing[0]!r}; there are: {choices(self.names)}")
         return JointTable(self.times, tuple(names), self.positions[:, [self.names.index(name) for name in names]])
+
+    def between(self, begin: float, end: float) -> JointTable:
+        """The frames from `begin` on and before `end`, seconds."""
+        chosen = (self.times > begin - ROUNDING) & (self.times < end - ROUNDING)
+        return JointTable(self.times[chosen], self.names, self.positions[chosen])
 
 
 class MotionFrame(NamedTuple):

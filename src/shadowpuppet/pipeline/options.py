@@ -20,6 +20,7 @@ from shadowpuppet.settings import checked, plain_values, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.tracking.monocular.settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
+from shadowpuppet.video.moments import moment_text
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
@@ -80,6 +81,10 @@ class Options:
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
     region: Annotated[tuple[int, int, int, int], BeforeValidator(_corners)] | None = None
     """Region of interest x0,y0,x1,y1, pixels of the film; everything outside is background."""
+    start: Annotated[str, BeforeValidator(moment_text)] | None = None
+    """Where to begin, on the recording's clock: 3.5 (seconds) or 120f (frames). Times in the results stay the recording's."""
+    end: Annotated[str, BeforeValidator(moment_text)] | None = None
+    """Where to end, likewise; the frame at that moment is left out."""
     max_size: Annotated[int, Field(ge=64, le=8192)] = 640
     """Longest side of a frame, pixels; larger frames are scaled down."""
     every: Annotated[int, Field(ge=1, le=1000)] = 1

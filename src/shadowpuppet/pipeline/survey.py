@@ -145,7 +145,7 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     sample, camera = film.sample, footage.camera
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
-        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.film().count,
+        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.count,
         looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
         plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
         refusal=_doubted(film.silhouettes) or film.values["quality"].refusal(), **film.values,

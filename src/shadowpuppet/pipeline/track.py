@@ -161,7 +161,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
-            "truth": recording.truth and recording.truth.resolve()}
+            "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
     with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as writer:
         listener.begin("looking")
         start = time.perf_counter()
