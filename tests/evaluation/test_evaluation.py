@@ -93,7 +93,8 @@ def test_all_figures_fit_a_terminal(shell, folder):
     code, out, err = shell(folder / "run")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
-    for words in ("joint errors, mm", "run and truth laid over", "each frame moved and turned", "from the pelvis", "HumanEva ",
+    for words in ("joint errors, mm", "mean error (MPJPE), mm, after alignment", "(PA-MPJPE)", "0.810, fair (IoU of body",
+                  "from the pelvis", "HumanEva ",
                   "no pose    no frame", "axes ", "left_knee", "intervals  none stated: the run has no standard deviations",
                   "moves ", "compared at 180 times"):
         assert words in out, words

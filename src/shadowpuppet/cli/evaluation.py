@@ -76,7 +76,7 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
     if "errors" in measured:
         aligned = measured["aligned_mm"]
         yield error_table(measured["errors"])
-        yield table("mean error, mm, run and truth laid over each other", ("", "mm"),
+        yield table("mean error (MPJPE), mm, after alignment", ("", "mm"),
                     ((text.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
     if "angles_deg" in measured:
         yield table("", ("turned at", "by degrees, rmse"), ((name, f"{value:.1f}") for name, value in measured["angles_deg"].items()))

@@ -48,6 +48,7 @@ Switch = Annotated[bool, Parameter(negative=(), show_default=False)]
 Config = Annotated[Path | None, flag("Settings file, TOML, as `shadowpuppet settings` prints it, or an earlier run's run.toml. Flags "
                                      "override it.", OTHER)]
 Quiet = Annotated[bool, switch("Show only warnings and errors.", OTHER)]
+Verbose = Annotated[bool, switch("Show all that was found, and all warnings.", OTHER)]
 AsJson = Annotated[bool, switch("Print JSON.", OTHER, "--json")]
 Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
 

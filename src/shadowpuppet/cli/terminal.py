@@ -12,11 +12,12 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from shadowpuppet.cli.look_tables import look_table, rig_look_table
-from shadowpuppet.cli.tables import show
+from shadowpuppet.cli.look_tables import look_table
+from shadowpuppet.cli.tables import show, verdict_table
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.pipeline.look import Look, RigLook
+from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
 
 REPEAT_AFTER = 10.0
 """Seconds after which the same note is printed again."""
@@ -25,9 +26,9 @@ REPEAT_AFTER = 10.0
 class Terminal(LiveListener):
     """Shows the look on standard output, progress and warnings on standard error."""
 
-    def __init__(self, quiet: bool = False) -> None:
-        """`quiet`: show only warnings."""
-        self.quiet, self.frames = quiet, 0
+    def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
+        """`quiet`: show only warnings; `verbose`: also all that a look found."""
+        self.quiet, self.verbose, self.frames = quiet, verbose, 0
         self.console = Console(stderr=True, highlight=False)
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
                                   TimeRemainingColumn(), console=self.console, transient=True,
@@ -54,11 +55,12 @@ class Terminal(LiveListener):
             self._progress.update(self._task, completed=frames, done=f"{frames}{total}{speed}")
 
     def look(self, look: Look | RigLook) -> None:
-        """Show the look and its doubts."""
+        """Show the verdict on a recording and its reasons, and what it holds; if `verbose`, all that was found."""
         if not self.quiet:
             self.stop()
-            show(rig_look_table(look) if isinstance(look, RigLook) else look_table(look))
-        self.doubt(look)
+            show(verdict_table(verdict_of_look(look)), look_table(look, self.verbose))
+        if self.quiet or self.verbose:
+            self.doubt(look)
 
     def doubt(self, look: Look | RigLook) -> None:
         """Warn of everything that may harm a run."""
@@ -97,12 +99,13 @@ class Terminal(LiveListener):
 
 
 @contextmanager
-def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written") -> Iterator[Terminal]:
+def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written",
+             verbose: bool = False) -> Iterator[Terminal]:
     """A listener that shows progress and warnings.
 
     After Ctrl-C it names `folder`, which has the frames so far, or says `nothing` before the first frame.
     """
-    listener = Terminal(quiet)
+    listener = Terminal(quiet, verbose)
     with warnings.catch_warnings():
         warnings.simplefilter("always", ShadowPuppetWarning)
         warnings.showwarning = listener._show_warning

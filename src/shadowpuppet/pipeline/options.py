@@ -89,6 +89,8 @@ class Options:
     """Longest side of a frame, pixels; larger frames are scaled down."""
     every: Annotated[int, Field(ge=1, le=1000)] = 1
     """Only every Nth frame is tracked, which saves time with films of a high frame rate."""
+    anyway: bool = False
+    """Track even where the examination of the recording says that it cannot work."""
     overlay: bool = False
     """Also write overlay.mp4: model, matching result and raw picture, one below the other."""
     tracker: MonocularSettings = MonocularSettings()

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
@@ -40,6 +41,7 @@ from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
+from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.frozen import CameraWatch
@@ -83,8 +85,8 @@ class Prepared(NamedTuple):
 
     def check(self) -> TrackedSubject:
         """The fitted person. Raises `TrackingError` if tracking is hopeless."""
-        self.survey.check()
-        assert self.subject is not None
+        if self.subject is None:
+            raise TrackingError(f"{self.look.recording}: {self.look.refusal}; --anyway tries it")
         return self.subject
 
 
@@ -132,7 +134,7 @@ def kind_of(rig: Rig) -> Kind:
 def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None) -> Prepared:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
     survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
-    if survey.look.refusal is not None:
+    if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
     subject = kind.fit(rng, survey, options)
     for _ in range(LOOKS_AGAIN):
@@ -173,6 +175,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         _track(writer, prepared, kind, options, listener, for_track, cache)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
+    metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
     warn_of_losses(written.motion)
     warn_of_left_out(metrics.get("left_out", []))
     warn_of_set_aside(metrics.get("set_aside", []))
