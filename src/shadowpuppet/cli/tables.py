@@ -57,7 +57,8 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], rig
 
 def verdict_table(verdict: Verdict) -> RenderableType:
     """One word, and the reasons below it."""
-    return pairs([("verdict", verdict.word), *(("" if n else "because", reason) for n, reason in enumerate(verdict.reasons))])
+    joined = "but" if verdict.word == "good" else "because"
+    return pairs([("verdict", verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
 
 
 def files_in(folder: Path, *names: str) -> tuple[str, str]:

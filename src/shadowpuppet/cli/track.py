@@ -142,6 +142,17 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
     for summary in () if quiet else summaries:
         print(f"\n{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
         _show_run(summary.folder, summary.metrics, "overlay.png")
+    if not quiet:
+        _show_next(folder)
+
+
+def _show_next(folder: Path) -> None:
+    """Commands to try after the demo, as they are to be typed here."""
+    import os
+
+    program, run = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet"), folder / "run-ring"
+    print(f"\nnext\n  {program} view {run}\n  {program} evaluate {run} --report {folder / 'run-ring.html'}\n"
+          f"  {program} export {run} --to bvh,trc\n  {program} track YOUR-FILM.mp4 --fov 65 --height 1.75 --overlay")
 
 
 def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),

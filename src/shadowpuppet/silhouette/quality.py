@@ -103,7 +103,7 @@ class MaskQuality:
     def _unsteady(self) -> Iterator[Caution]:
         remedy = ("the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
-        short = "parts of the person come and go: film the empty scene"
+        short = "parts of the person vanish: film the empty scene"
         if self.area_jumps > WARN_JUMPS:
             yield Caution(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
                           f"frames, as parts are lost and found: {remedy}", short, HARMFUL)
