@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.cli import app as cli
+from shadowpuppet.cli import terminal as terminal_module
 from shadowpuppet.errors import PERSON_LOST
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import UPPER_JOINTS
@@ -131,6 +132,24 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
                                   "export", "convert", "batch", "play"])
 def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
     assert "--quiet" in shell(name, "--help")[1]
+
+
+def test_progress_is_printed_where_there_is_no_terminal(capsys, monkeypatch):
+    monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
+    with terminal_module.terminal() as listener:
+        listener.begin("looking at 4 films")
+        time.sleep(0.1)
+        listener.begin("tracking", 80)
+        listener.advance(20)
+        time.sleep(0.1)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "... looking at 4 films, 0 s"
+    assert lines[-1].startswith("... tracking 20/80, ")
+    time.sleep(0.1)
+    with terminal_module.terminal(quiet=True) as listener:
+        listener.begin("tracking")
+        time.sleep(0.1)
+    assert capsys.readouterr().err == ""
 
 
 def test_quiet_is_quiet(shell, recording):
@@ -422,7 +441,7 @@ def test_control_c_leaves_a_run_that_can_be_read(recording, tmp_path):
     child.send_signal(signal.SIGINT)
     _, err = child.communicate()
     assert child.returncode == 130
-    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}\n", err)
+    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}", err.splitlines()[-1])
     left = read_run(folder)
     assert not left.complete
     assert 2 <= len(left.motion) < made.FRAMES

@@ -71,7 +71,7 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
 
     with terminal(quiet=as_json, verbose=verbose) as listener:
         listener.begin("looking")
-        look = look_at(recording, options_from(flags, config))
+        look = look_at(recording, options_from(flags, config), listener)
         listener.look(look)
     if as_json:
         show_json(look)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,8 +20,39 @@ from shadowpuppet.live.run import LiveListener
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
 
+LOG_EVERY = 2.0
+"""Seconds between lines of progress where there is no terminal."""
+PROGRESS = "..."
+"""Beginning of such a line."""
 REPEAT_AFTER = 10.0
 """Seconds after which the same note is printed again."""
+
+
+class _Log:
+    """Progress as lines, for output that is no terminal: what is being done, every `LOG_EVERY` seconds."""
+
+    def __init__(self, console: Console) -> None:
+        self.console, self.what, self.total, self.done, self.began = console, "", None, 0, 0.0
+        self._end: threading.Event | None = None
+
+    def begin(self, what: str, total: int | None) -> None:
+        """A phase begins; the thread that prints starts with the first."""
+        self.what, self.total, self.done, self.began = what, total, 0, monotonic()
+        if self._end is None:
+            self._end = threading.Event()
+            threading.Thread(target=self._run, args=(self._end,), name="progress", daemon=True).start()
+
+    def stop(self) -> None:
+        """Print no more, until the next phase begins."""
+        if self._end is not None:
+            self._end.set()
+            self._end = None
+
+    def _run(self, end: threading.Event) -> None:
+        while not end.wait(LOG_EVERY):
+            seconds = monotonic() - self.began
+            count = f" {self.done}{f'/{self.total}' if self.total else ''}, {self.done / seconds:.1f} a second" if self.done else ""
+            self.console.print(f"{PROGRESS} {self.what}{count}, {seconds:.0f} s", markup=False, soft_wrap=True)
 
 
 class Terminal(LiveListener):
@@ -33,12 +65,15 @@ class Terminal(LiveListener):
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
                                   TimeRemainingColumn(), console=self.console, transient=True,
                                   disable=quiet or not self.console.is_terminal)
+        self._log = None if quiet or self.console.is_terminal else _Log(self.console)
         self._task: TaskID | None = None
         self._said: set[str] = set()
         self._noted: dict[str, float] = {}
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """Start the progress bar of a phase."""
+        """Start the progress bar of a phase; without a terminal, lines of progress."""
+        if self._log is not None:
+            self._log.begin(what, total)
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._task = self._progress.add_task(what, total=total, done="")
@@ -48,6 +83,8 @@ class Terminal(LiveListener):
     def advance(self, frames: int) -> None:
         """Show the number of frames done and the speed."""
         self.frames = frames
+        if self._log is not None:
+            self._log.done = frames
         if self._task is not None and not self._progress.disable:
             task = self._progress.tasks[-1]
             total = f"/{task.total:.0f}" if task.total else ""
@@ -88,7 +125,9 @@ class Terminal(LiveListener):
         self.console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
 
     def stop(self) -> None:
-        """Remove the progress bar."""
+        """Remove the progress bar, or end the lines of progress."""
+        if self._log is not None:
+            self._log.stop()
         if not self._progress.disable:  # rich 14.0 ends with an empty line even then
             self._progress.stop()
 

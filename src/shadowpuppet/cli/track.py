@@ -165,7 +165,7 @@ def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File th
 
     with terminal(quiet) as listener:
         listener.begin("looking")
-        found, look = fit_person(recording, file, options_from(flags, config))
+        found, look = fit_person(recording, file, options_from(flags, config), listener)
         listener.doubt(look)
     if not quiet:
         curves, rows = _fit_tables(found) if isinstance(found, MonocularSubject) else ((), _rig_fit_rows(found.summary))

@@ -39,7 +39,7 @@ class Listener:
     """Receives a run's progress. Every method does nothing: override those of interest."""
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """A phase begins: `looking` or `tracking`; `total`: its number of frames, if known."""
+        """A phase begins, such as `tracking`; `total`: its number of frames, if known."""
 
     def advance(self, frames: int) -> None:
         """`frames` frames are tracked."""

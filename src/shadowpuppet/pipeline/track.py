@@ -15,6 +15,7 @@ from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.jit import is_compiled
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.person import fit_monocular
@@ -91,20 +92,23 @@ class Prepared(NamedTuple):
 
 
 @one_blas_thread()
-def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
+def look_at(recording: str | Path, options: Options | None = None, listener: Listener | None = None) -> Look | RigLook:
     """Examine a recording as `track_recording` does before tracking. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
     kind = kind_of(rig)
-    return prepare(generators(options)[0], rig, options, kind).look if kind.look_fits else kind.survey(rig, options).look
+    if kind.look_fits:
+        return prepare(generators(options)[0], rig, options, kind, listener=listener).look
+    return kind.survey(rig, options).look
 
 
 @one_blas_thread()
-def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[TrackedSubject, Look | RigLook]:
+def fit_person(recording: str | Path, file: str | Path, options: Options | None = None,
+               listener: Listener | None = None) -> tuple[TrackedSubject, Look | RigLook]:
     """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
     rig = open_rig(recording, options)
-    prepared = prepare(generators(options)[0], rig, options, kind_of(rig))
+    prepared = prepare(generators(options)[0], rig, options, kind_of(rig), listener=listener)
     subject = prepared.check()
     write_person(file, subject.person)
     return subject, prepared.look
@@ -131,11 +135,15 @@ def kind_of(rig: Rig) -> Kind:
     return MULTIVIEW if rig.is_multiview else MONOCULAR
 
 
-def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None) -> Prepared:
+def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
+            listener: Listener | None = None) -> Prepared:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
+    listener = listener or Listener()
+    listener.begin(f"looking at {len(rig.footage)} film{'s' if rig.is_multiview else ''}")
     survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
     if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
+    listener.begin("measuring the person" if is_compiled() else "compiling, once (a minute or two), and measuring the person")
     subject = kind.fit(rng, survey, options)
     for _ in range(LOOKS_AGAIN):
         again = _looked_again(survey, subject, options, kind)
@@ -165,9 +173,8 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
             "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
     with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as writer:
-        listener.begin("looking")
         start = time.perf_counter()
-        prepared = prepare(for_look, rig, options, kind, cache)
+        prepared = prepare(for_look, rig, options, kind, cache, listener)
         writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
