@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -46,5 +47,5 @@ reduction_kernel = compiled(**KERNEL_OPTIONS, fastmath=REDUCTION_MATH)
 
 def is_compiled() -> bool:
     """Whether kernels of the package were compiled before, and kept on disk; the first time takes a minute or more."""
-    place = Path(numba.config.CACHE_DIR or Path(__file__).parent)
+    place = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parent)
     return next(place.rglob("*.nbi"), None) is not None

@@ -78,14 +78,16 @@ def _rig_scale(look: RigLook) -> list[tuple[str, str | None]]:
 
 def _rig_table(look: RigLook) -> RenderableType:
     """A row for each camera."""
-    cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.2f}" for value in camera.place),
+    cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.1f}" for value in camera.place),
                 f"{100 * camera.quality.area:.1f} %", "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}",
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
     below = [("background", "; ".join(sorted({camera.background.replace(camera.name, "<camera>") for camera in look.cameras}))),
              ("keys", ", ".join(keys) or None), *_rig_scale(look)]
     columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
-    return Group(pairs(_rig_rows(look)), "", table("", columns, cameras, right=(2, 4, 5, 6)), "", pairs(below))
+    if all(camera.exact_overlap is None for camera in look.cameras):
+        columns, cameras = columns[:5] + columns[6:], (row[:5] + row[6:] for row in cameras)
+    return Group(pairs(_rig_rows(look)), "", table("", columns, cameras, right=range(2, len(columns))), "", pairs(below))
 
 
 def _pixels(camera: CameraLook) -> str:

@@ -85,7 +85,7 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     overlap, cost = metrics["overlap"], metrics["cost_m2" if multiview else "cost_px"]
     scale, unit, digits = (1e4, "cm2", 1) if multiview else (1, "pixels", 0)
     statuses = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
-    truth_jitter = metrics.get("truth_jitter_m_s2")
+    jitter, truth_jitter = metrics["jitter_m_s2"], metrics.get("truth_jitter_m_s2")
     rows: list[tuple[str, str | None]] = [
         ("frames", f"{metrics['frames']}: {statuses}" if statuses else "none"),
         ("doubt", doubt_text(metrics)),
@@ -93,7 +93,7 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
                     if overlap["count"] else None),
         ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (p95 {scale * cost['p95']:.{digits}f})" if cost["count"]
                  else None),
-        ("jitter", f"{_number(metrics['jitter_m_s2'])} m/s2"
+        ("jitter", None if jitter is None or not isfinite(jitter) else f"{jitter:.2f} m/s2"
                    + (f", the truth's {_number(truth_jitter)}" if truth_jitter is not None else "")),
     ]  # fmt: skip
     if errors := metrics.get("errors"):
