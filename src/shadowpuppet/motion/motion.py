@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -154,6 +154,12 @@ class Motion:
     def table(self) -> JointTable:
         """The joints as a table."""
         return JointTable(self.times, self.joint_names, self.joints)
+
+    def frames(self) -> Iterator[MotionFrame]:
+        """Its frames, one after another."""
+        for time, status, *values, limbs in zip(self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd,
+                                                self.joint_sd, self.cost.tolist(), self.overlap.tolist(), self.limb_status.tolist()):
+            yield MotionFrame(time, status, *values, limbs)
 
 
 class MotionBuilder:

@@ -7,9 +7,11 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple
+from warnings import warn
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
@@ -43,6 +45,8 @@ from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.frozen import CameraWatch
+from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -170,7 +174,9 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         _write_beside(writer.folder, prepared)
+        _check_cutoff(options, prepared.look.rate)
         _track(writer, prepared, kind, options, listener, for_track, cache)
+        _smooth(writer, prepared.check(), options, listener)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     warn_of_losses(written.motion)
@@ -185,6 +191,31 @@ def _write_beside(folder: Path, prepared: Prepared) -> None:
     write_whole(folder / "look.json", json_text(prepared.look) + "\n")
     write_person(folder / "person.toml", subject.person)
     write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
+
+
+def _check_cutoff(options: Options, rate: float) -> None:
+    """Raise `SettingsError` before tracking if the frame rate does not allow the filter's cut-off."""
+    if options.smoothing[0] == "butterworth" and np.isfinite(rate):
+        check_cutoff(options.cutoff, rate / options.every)
+
+
+def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
+    """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
+    method, gaps = options.smoothing
+    writer.info["smoothing"] = {"method": "off"}
+    if method == "off" and gaps == 0:
+        return
+    listener.begin("smoothing")
+    start, columns = time.perf_counter(), subject.joint_columns
+    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps)
+    try:
+        found = smoother(writer.motion)
+    except (SettingsError, np.linalg.LinAlgError) as error:
+        warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
+        return
+    writer.revise(found.motion)
+    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum())}
+    writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
 def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:

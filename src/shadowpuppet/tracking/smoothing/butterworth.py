@@ -25,7 +25,12 @@ def filtered(times: Array, points: Array, cutoff: float) -> Array:
     if len(times) <= PADDING:
         return points
     rate = 1 / float(np.median(np.diff(times)))
-    if cutoff >= rate / 2:
-        raise SettingsError(f"cutoff: found {cutoff:g} Hz, expected less than half the rate of {rate:.4g} frames/s")
+    check_cutoff(cutoff, rate)
     once = rate / np.pi * np.arctan(np.tan(np.pi * cutoff / rate) / CORRECTION)
     return sosfiltfilt(butter(2, once, fs=rate, output="sos"), points, axis=0, padlen=PADDING)
+
+
+def check_cutoff(cutoff: float, rate: float) -> None:
+    """Raise `SettingsError` for a cut-off (Hz) that is not below half the rate (frames/s)."""
+    if cutoff >= rate / 2:
+        raise SettingsError(f"cutoff: found {cutoff:g} Hz, expected less than half the rate of {rate:.4g} frames/s")

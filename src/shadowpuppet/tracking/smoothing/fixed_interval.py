@@ -32,6 +32,8 @@ INDEPENDENT = 0.15
 """Share of the stated deviation that is independent from frame to frame; 0.13 to 0.15 on made recordings, with one camera and several."""
 OUTLIER = 2.0
 """Distance of a measured point, in stated deviations, from which its weight falls."""
+FAINT = 1e-6
+"""Share of the weight of a measured point that the straight line through a gap has, so that few frames determine a path."""
 ROUNDS = 4
 """Rounds in which speed and outliers are estimated again."""
 
@@ -42,7 +44,7 @@ class Smoothed(NamedTuple):
     points: Array
     """Of shape (T, M, 3)."""
     precision: Array
-    """Of the measured points, of shape (T, M, 3); 0 where unknown."""
+    """Of the measured points, of shape (T, M, 3); faint where unknown."""
     variances: Array
     """Of the third derivatives between four frames, of shape (T - 3, M)."""
 
@@ -55,7 +57,7 @@ def smooth(times: Array, points: Array, sd: Array, least: Array) -> Smoothed:
     """
     known = np.isfinite(points).all(2)
     measured = x = filled(times, points)
-    precision, variances = np.where(known[..., None], 1 / (INDEPENDENT * sd) ** 2, 0.0), np.ones((0, points.shape[1]))
+    precision, variances = np.where(known[..., None], 1.0, FAINT) / (INDEPENDENT * sd) ** 2, np.ones((0, points.shape[1]))
     if len(times) > ORDER:
         given, radius, third = precision, (sd**2).sum(2), differences(times)
         for _ in range(ROUNDS):

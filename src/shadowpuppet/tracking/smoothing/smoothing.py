@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,13 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.tracking.smoothing.butterworth import filtered
+from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
 from shadowpuppet.tracking.smoothing.fixed_interval import LEAST, ORDER, differences, smooth
 from shadowpuppet.tracking.smoothing.gaps import bridged, stray
+from shadowpuppet.tracking.smoothing.method import Method
 from shadowpuppet.tracking.smoothing.pose_path import PathCost, likeliest_poses
 from shadowpuppet.tracking.smoothing.projection import Markers, Points, markers, nearest_poses
 
-Method = Literal["off", "tracker", "butterworth"]
 BLOCK, OVERLAP = 1500, 4.0
 """Frames of a block, and the time (s) by which it is continued at both ends, after which a frame has no influence."""
 UNSTATED = 0.02
@@ -48,7 +48,6 @@ class MotionSmoother:
     points: Points
     """From poses (N, D) to the motion's joints (N, J, 3) in the world, metres."""
     method: Method = "tracker"
-    """`tracker`: by the stated deviations and people's accelerations; `butterworth`: a low-pass filter; `off`: gaps only."""
     cutoff: float = 6.0
     """Of the low-pass filter, Hz."""
     gaps: float = 0.5
@@ -63,6 +62,13 @@ class MotionSmoother:
             for block, kept in _blocks(motion.times, begin, end):
                 poses[kept] = self._poses(motion[block], free)[kept.start - block.start : kept.stop - block.start]
         return SmoothedMotion(self._motion(motion, poses, inside), inside)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What is done, as plain values."""
+        if self.method == "butterworth":
+            return {"method": self.method, "cutoff_hz": self.cutoff, "order": 2 * PASSES, "lag": 0, "gaps_s": self.gaps}
+        return {"method": self.method, "gaps_s": self.gaps}
 
     def _poses(self, motion: Motion, free: NDArray[np.bool_]) -> Array:
         """Poses (T, D) of a run of frames in which no gap is left."""
