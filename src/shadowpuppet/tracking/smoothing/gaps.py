@@ -11,19 +11,21 @@ from shadowpuppet.tracking.smoothing.fixed_interval import LEAST, PACE
 
 FASTEST = 8.0
 """Mean speed (m/s) of a joint over a gap above which the gap is not bridged: the person before and after cannot both be right."""
-STRAY = 0.5
-"""Factor of the bow, half the acceleration times the times to both ends, by which a bridged joint may stray; calibrated."""
+ROUNDING = 1e-6
+"""Of times (s)."""
+STRAY = 0.25
+"""Factor of the bow, half the acceleration times the times to both ends, by which a bridged joint may stray; on made recordings the intervals cover as without gaps."""
 
 
 def bridged(times: Array, joints: Array, longest: float) -> NDArray[np.bool_]:
-    """Whether a frame (T,) is in a gap between known frames that lasts at most `longest` seconds from one to the other.
+    """Whether a frame (T,) is in a gap between known frames that lasts at most `longest` seconds, from its first frame to the next known.
 
     `joints`: (T, J, 3), metres, not a number in unknown frames; times (T,), seconds.
     """
     known = np.asarray(np.isfinite(joints).all((1, 2)))
     out = np.zeros(len(times), bool)
     for begin, end in true_runs(~known):
-        if begin == 0 or end == len(times) or times[end] - times[begin - 1] > longest:
+        if begin == 0 or end == len(times) or times[end] - times[begin] > longest + ROUNDING:
             continue
         moved = np.linalg.norm(joints[end] - joints[begin - 1], axis=1).max()
         out[begin:end] = moved <= FASTEST * (times[end] - times[begin - 1])
