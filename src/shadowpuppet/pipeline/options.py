@@ -90,6 +90,9 @@ class Options:
     smooth: Literal["off", "tracker", "butterworth"] | None = None
     """Smoothing of the tracked motion over time, when the film is over: tracker (by the doubt of every frame, with people's accelerations),
     butterworth (a low-pass filter, fourth order, without lag), off. By default tracker, and off with the papers' presets."""
+    facing: Literal["camera", "away"] = "camera"
+    """Whether the person faces the camera in the first frame, or looks away from it: one camera's silhouettes do not tell. With several
+    cameras it has no effect; nor has it with `smooth = "off"`."""
     cutoff: Annotated[float, Field(gt=0, le=1000)] = 6.0
     """Cut-off frequency of the Butterworth filter, Hz."""
     gaps: Annotated[float, Field(ge=0, le=10)] | None = None

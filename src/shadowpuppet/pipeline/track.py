@@ -207,14 +207,15 @@ def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listen
         return
     listener.begin("smoothing")
     start, columns = time.perf_counter(), subject.joint_columns
-    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps)
+    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps,
+                              options.facing == "away")
     try:
         found = smoother(writer.motion)
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
         return
     writer.revise(found.motion)
-    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum())}
+    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 

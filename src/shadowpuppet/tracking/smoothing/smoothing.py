@@ -14,6 +14,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
+from shadowpuppet.tracking.smoothing.facing import turned_on
 from shadowpuppet.tracking.smoothing.fixed_interval import LEAST, ORDER, differences, smooth
 from shadowpuppet.tracking.smoothing.gaps import bridged, stray
 from shadowpuppet.tracking.smoothing.method import Method
@@ -38,6 +39,8 @@ class SmoothedMotion(NamedTuple):
     motion: Motion
     bridged: NDArray[np.bool_]
     """Frames (T,) that were unknown and are `predicted` now."""
+    mirrored: NDArray[np.bool_]
+    """Frames (T,) in which the person has turned away from one camera, whose tracker took them for facing it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +55,19 @@ class MotionSmoother:
     """Of the low-pass filter, Hz."""
     gaps: float = 0.5
     """Longest gap that is bridged, seconds; 0: none."""
+    away: bool = False
+    """Whether one camera first sees the person from behind."""
 
     def __call__(self, motion: Motion) -> SmoothedMotion:
         """A motion smoothed in runs of known frames. Raises `SettingsError` for a cut-off that the frame rate does not allow."""
+        motion, mirrored = self._faced(motion)
         inside = bridged(motion.times, motion.joints, self.gaps)
         poses, known = motion.poses.copy(), motion.known
         free = np.asarray((poses[known] != poses[known][:1]).any(0))
         for begin, end in true_runs(known | inside):
             for block, kept in _blocks(motion.times, begin, end):
                 poses[kept] = self._poses(motion[block], free)[kept.start - block.start : kept.stop - block.start]
-        return SmoothedMotion(self._motion(motion, poses, inside), inside)
+        return SmoothedMotion(self._motion(motion, poses, inside), inside, mirrored)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -69,6 +75,16 @@ class MotionSmoother:
         if self.method == "butterworth":
             return {"method": self.method, "cutoff_hz": self.cutoff, "order": 2 * PASSES, "lag": 0, "gaps_s": self.gaps}
         return {"method": self.method, "gaps_s": self.gaps}
+
+    def _faced(self, motion: Motion) -> tuple[Motion, NDArray[np.bool_]]:
+        """The motion of a person who may turn right round, and the frames (T,) that are mirrored."""
+        if self.method == "off":
+            return motion, np.zeros(len(motion), bool)
+        turned, mirrored = turned_on(motion, self.away)
+        joints = motion.joints.copy()
+        changed = mirrored & motion.known
+        joints[changed] = self.points(turned.poses[changed])
+        return replace(turned, joints=joints), mirrored
 
     def _poses(self, motion: Motion, free: NDArray[np.bool_]) -> Array:
         """Poses (T, D) of a run of frames in which no gap is left."""
