@@ -6,30 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from runs import BODIES, body_of, root_of, smooth_poses
+from runs import BODIES, body_of, smooth_poses
+from smoothers import RATE, motion_of, smoother
 
-from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing import smoothing
-from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
-
-RATE = 30.0
-
-
-def smoother(name: str, **settings) -> MotionSmoother:
-    body = body_of(name)
-    return MotionSmoother(body.skeleton, lambda poses: body.points(poses, root_of(body)), **settings)
-
-
-def motion_of(name: str, poses: np.ndarray, lost=(), sd: float = 0.03) -> Motion:
-    body, T = body_of(name), len(poses)
-    gone = np.isin(np.arange(T), lost)
-    blank = np.where(gone, np.nan, 1.0)
-    joints = body.points(poses, root_of(body))
-    return Motion(body_name=name, dof_names=body.skeleton.dof_names, joint_names=body.landmark_names, times=np.arange(T) / RATE,
-                  poses=poses * blank[:, None], pose_sd=np.full(poses.shape, 2 * sd) * blank[:, None], joints=joints * blank[:, None, None],
-                  joint_sd=np.full(joints.shape, sd) * blank[:, None, None], cost=np.full(T, 5.0), overlap=np.full(T, 0.9),
-                  status=np.where(gone, "lost", "tracked"))  # fmt: skip
-
 
 def noisy(name: str, rng, frames: int = 60, noise: float = 0.01) -> tuple[np.ndarray, np.ndarray]:
     body = body_of(name)
@@ -68,7 +48,7 @@ def test_short_gaps_are_predicted_and_long_ones_stay(rng):
     truth, poses = noisy("anatomical", rng, 90, 0.002)
     lost = [*range(20, 30), *range(50, 80)]
     raw, make = motion_of("anatomical", poses, lost), smoother("anatomical", gaps=0.5)
-    found, inside = make(raw)
+    found, inside, _ = make(raw)
     assert np.flatnonzero(inside).tolist() == lost[:10]
     assert (found.status[inside] == "predicted").all()
     assert (found.limb_status[inside] == "predicted").all()
@@ -84,7 +64,7 @@ def test_short_gaps_are_predicted_and_long_ones_stay(rng):
 def test_off_with_gaps_leaves_known_frames_as_they_are(rng):
     _, poses = noisy("rounded", rng, 40)
     raw = motion_of("rounded", poses, range(10, 14))
-    found, inside = smoother("rounded", method="off")(raw)
+    found, inside, _ = smoother("rounded", method="off")(raw)
     assert inside.sum() == 4
     np.testing.assert_array_equal(found.joints[~inside], raw.joints[~inside])
     assert np.isfinite(found.joints).all()
