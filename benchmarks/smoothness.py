@@ -39,7 +39,7 @@ BUILD = GROUND.parent / "turns"
 FILTER = 10.0
 """Cut-off (Hz) of a filter of the truth, as motion capture has noise of its own."""
 FASTEST = 0.02
-"""Share of the quickest frames of each joint in which speeds are compared."""
+"""Share of all joints' steps, the quickest, in which speeds are compared."""
 TURNS = (
     # name, kind and seed of the body, gestures, cameras, whether the person is first seen from behind
     ("one_turns", "man", 31, "turn_around 3, turn_around 3", 1, False),
@@ -121,7 +121,7 @@ def _filtered(table: JointTable) -> JointTable:
 def _speed(run: JointTable, truth: JointTable) -> float:
     ours, theirs = (np.diff(each.positions, axis=0) for each in (run, truth))
     length = np.linalg.norm(theirs, axis=2)
-    quick = (length >= np.nanquantile(length, 1 - FASTEST, axis=0)) & (length > 0)
+    quick = (length >= np.nanquantile(length, 1 - FASTEST)) & (length > 0)
     return float(np.nanmean((ours * theirs).sum(2)[quick] / length[quick]) / np.nanmean(length[quick]))
 
 
@@ -135,7 +135,8 @@ def _cover(motion: Motion, truth: JointTable) -> float:
 
 def markdown(rows: Sequence[Row]) -> str:
     """The table."""
-    head = ["recording", "cameras", "error, mm", "acceleration / truth's", "after 10 Hz", "peak speed / truth's", "within 90 %", "exchanged"]
+    head = ["recording", "cameras", "error, mm", "acceleration / truth's", "after 10 Hz", "peak speed / truth's", "within 90 %",
+            "exchanged"]
     lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
     for row in rows:
         first, second = (f"{100 * share:.1f}" for share in row.swapped[:2])

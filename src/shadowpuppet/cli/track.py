@@ -37,7 +37,8 @@ else:
     KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
-    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "smooth", "facing", "cutoff", "gaps", "training")))
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "smooth", "facing", "cutoff", "gaps",
+                                                      "training")))
     """Options of a live session."""
     LiveFlags = unpacked(flags_of(LiveSettings))
 

@@ -130,21 +130,27 @@ class RunWriter:
         """Replace the frames so far, at the end of a run; the tables as they were go to raw.csv. Raises `ShadowPuppetError` if something
         cannot be written; the tables stay as they were."""
         self._start()
-        builder, intervals = MotionBuilder(revised.body_name, revised.dof_names, revised.joint_names), IntervalWriter(revised.joint_names)
-        with self._system_errors():
-            write_raw(self.folder / f"{RAW}.part", *(self.folder / name for name in TABLES[:2]))
-            parts = [self.folder / f"{name}.part" for name in TABLES]
-            with ExitStack() as stack:
-                tables = [stack.enter_context(part.open("w", encoding="utf-8", newline="")) for part in parts]
-                _append(tables, run_headers(builder.joint_names, builder.dof_names), intervals.header())
-                for frame in revised.frames():
-                    kept = builder.append(frame)
-                    _append(tables, run_rows(kept), intervals.lines(kept))
-            for table in self._tables:
-                table.close()
-            for name in (RAW, *TABLES):
-                (self.folder / f"{name}.part").replace(self.folder / name)
-            self._motion, self._tables = builder, [(self.folder / name).open("a", encoding="utf-8", newline="") for name in TABLES]
+        builder = MotionBuilder(revised.body_name, revised.dof_names, revised.joint_names)
+        parts = [f"{name}.part" for name in (RAW, *TABLES)]
+        try:
+            with self._system_errors():
+                write_raw(self.folder / parts[0], *(self.folder / name for name in TABLES[:2]))
+                with ExitStack() as stack:
+                    tables = [stack.enter_context((self.folder / part).open("w", encoding="utf-8", newline="")) for part in parts[1:]]
+                    _append(tables, run_headers(builder.joint_names, builder.dof_names), self._intervals.header())
+                    for frame in revised.frames():
+                        kept = builder.append(frame)
+                        _append(tables, run_rows(kept), self._intervals.lines(kept))
+                for table in self._tables:
+                    table.close()
+                for part in parts:
+                    (self.folder / part).replace(self.folder / part.removesuffix(".part"))
+                self._motion = builder
+                self._tables = [*((self.folder / name).open("a", encoding="utf-8", newline="") for name in TABLES)]
+        finally:
+            for part in parts:
+                with contextlib.suppress(OSError):
+                    (self.folder / part).unlink(missing_ok=True)
 
     def _start(self) -> None:
         """Replace an earlier run and write the headers, once."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -157,9 +158,9 @@ class Motion:
 
     def frames(self) -> Iterator[MotionFrame]:
         """Its frames, one after another."""
-        for time, status, *values, limbs in zip(self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd,
-                                                self.joint_sd, self.cost.tolist(), self.overlap.tolist(), self.limb_status.tolist()):
-            yield MotionFrame(time, status, *values, limbs)
+        columns = (self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd, self.joint_sd, self.cost.tolist(),
+                   self.overlap.tolist(), self.limb_status.tolist())
+        yield from itertools.starmap(MotionFrame, zip(*columns))
 
 
 class MotionBuilder:

@@ -20,7 +20,7 @@ def joints(known) -> np.ndarray:
 def test_gaps_between_known_frames_are_bridged_if_they_are_short(known, longest):
     found = bridged(np.arange(len(known)) / RATE, joints(known), longest)
     for begin, end in true_runs(~np.array(known)):
-        inner = 0 < begin and end < len(known)
+        inner = begin > 0 and end < len(known)
         assert found[begin:end].all() == found[begin:end].any() == (inner and (end - begin) / RATE <= longest + 1e-6)
     assert not found[np.array(known)].any()
 

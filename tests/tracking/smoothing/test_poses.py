@@ -43,14 +43,15 @@ def test_the_banded_system_is_solved_as_the_dense_one(frames, size, seed):
     A = np.kron(near, np.ones((size, size))) * rng.normal(size=(frames * size, frames * size))
     A = A + A.T + 40 * np.eye(len(A))
     four = A.reshape(frames, size, frames, size)
-    blocks = [np.stack([four[t, :, t + k] for t in range(frames - k)]) if k < frames else np.zeros((0, size, size)) for k in range(REACH + 1)]
+    blocks = [np.array([four[t, :, t + k] for t in range(frames - k)]).reshape(-1, size, size) for k in range(REACH + 1)]
     right = rng.normal(size=(frames, size))
     np.testing.assert_allclose(solve_banded(blocks, right).ravel(), np.linalg.solve(A, right.ravel()), atol=1e-9)
 
 
 def a_cost(rng, at: np.ndarray, noise: float) -> PathCost:
     times = np.arange(len(at)) / 20
-    return PathCost(at + rng.normal(0, noise, at.shape), np.full(at.shape, 1e4), differences(times), np.full((len(at) - 3, at.shape[1]), 100.0))
+    variance = np.full((len(at) - 3, at.shape[1]), 100.0)
+    return PathCost(at + rng.normal(0, noise, at.shape), np.full(at.shape, 1e4), differences(times), variance)
 
 
 def test_the_gradient_and_the_curvature_of_a_path_are_its_derivatives(rng):

@@ -11,6 +11,7 @@ from smoothers import RATE, motion_of, smoother
 
 from shadowpuppet.tracking.smoothing import smoothing
 
+
 def noisy(name: str, rng, frames: int = 60, noise: float = 0.01) -> tuple[np.ndarray, np.ndarray]:
     body = body_of(name)
     truth = body.skeleton.clamp(smooth_poses(body, frames, rng, reach=0.4))
@@ -107,5 +108,5 @@ def test_degrees_of_freedom_that_never_change_stay(rng):
 
 def test_what_was_done_is_said():
     assert smoother("rounded").summary == {"method": "tracker", "gaps_s": 0.5}
-    assert smoother("rounded", method="butterworth", cutoff=8.0).summary == {"method": "butterworth", "cutoff_hz": 8.0, "order": 4, "lag": 0,
-                                                                            "gaps_s": 0.5}
+    found = smoother("rounded", method="butterworth", cutoff=8.0).summary
+    assert found == {"method": "butterworth", "cutoff_hz": 8.0, "order": 4, "lag": 0, "gaps_s": 0.5}

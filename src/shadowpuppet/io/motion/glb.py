@@ -30,7 +30,8 @@ def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str
     """Write a skinned mesh and its animation: metres, Y up, times from 0.
 
     Unknown frames have no keys: the puppet's scale is 0 there, which hides it, and `extras.unknown` of the animation lists them as pairs
-    of seconds, from and to; a warning says so. `smoothing`: how the motion was smoothed, written to `asset.extras`. Raises `ShadowPuppetError` if no frame is known or the file cannot be written.
+    of seconds, from and to; a warning says so. `smoothing`: how the motion was smoothed, written to `asset.extras`. Raises
+    `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
     path, known = Path(path), np.flatnonzero(animation.known)
     if not len(known):

@@ -165,7 +165,8 @@ def write_mot(path: str | Path, times: Array, values: Mapping[str, Array], smoot
     if not len(table) or not values:
         raise ShadowPuppetError(f"{path}: found no frame in which all of {len(values)} coordinates are known, expected one at least")
     sizes = [f"nRows={len(table)}", f"nColumns={table.shape[1]}"]
-    head = [path.stem, "version=1", *sizes, "inDegrees=yes", *([f"smoothing={smoothing}"] if smoothing else []), "endheader", "\t".join(["time", *values])]
+    note = [f"smoothing={smoothing}"] if smoothing else []
+    head = [path.stem, "version=1", *sizes, "inDegrees=yes", *note, "endheader", "\t".join(["time", *values])]
     rows = ("\t".join(f"{value + 0.0:.6f}" for value in row) for row in table.round(6).tolist())
     write_whole(path, "\n".join([*head, *rows, ""]))
 

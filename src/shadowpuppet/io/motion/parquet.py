@@ -21,7 +21,9 @@ METADATA = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z
 
 
 def write_parquet(path: str | Path, columns: Columns, smoothing: str = "") -> None:
-    """Write columns; null for NaN. `smoothing`: how the motion was smoothed, metadata of the file. Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
+    """Write columns; null for NaN. `smoothing`: how the motion was smoothed, metadata of the file.
+
+    Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
     write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()},
                 {"smoothing": smoothing} if smoothing else {})
 

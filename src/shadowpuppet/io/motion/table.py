@@ -128,17 +128,18 @@ def read_raw(path: str | Path, body_name: str) -> Motion:
     own = [name for name in dofs if not name.rpartition(" ")[0].endswith(SD)]
     others = [name for name in dofs if name not in own]
     if len(own) != len(others):
-        raise FormatError(f"{table.path}: found {len(own)} degrees of freedom and {len(others)} standard deviations of them, expected as many")
+        raise FormatError(f"{table.path}: found {len(own)} degrees of freedom and {len(others)} standard deviations, expected as many")
+    series: dict[str, Any] = _of_joints(table, joints) | {"poses": table.numbers(own), "pose_sd": table.numbers(others)}
     with errors_named(table.path):
-        return Motion(body_name=body_name, dof_names=tuple(name.rpartition(" ")[0] for name in own), joint_names=joints,
-                      poses=table.numbers(own), pose_sd=table.numbers(others), **_of_joints(table, joints))
+        return Motion(body_name=body_name, dof_names=tuple(name.rpartition(" ")[0] for name in own), joint_names=joints, **series)
 
 
 def read_run_tables(joints: Table, angles: Table, frames: int, body_name: str) -> Motion:
     """The first `frames` frames of joints.csv and angles.csv. Raises `ShadowPuppetError`, `FormatError` naming line and column."""
     names = column_joints(joints.path, joints.columns)
     dofs = tuple(name for name in angles.columns if name != "time" and not name.endswith(SD))
-    series = _of_joints(joints, names) | {"poses": angles.numbers(dofs), "pose_sd": angles.numbers([f"{name}{SD}" for name in dofs])}
+    deviations = angles.numbers([f"{name}{SD}" for name in dofs])
+    series: dict[str, Any] = _of_joints(joints, names) | {"poses": angles.numbers(dofs), "pose_sd": deviations}
     series = {name: values[:frames] for name, values in series.items()}
     return Motion(body_name=body_name, dof_names=dofs, joint_names=names, **series)
 

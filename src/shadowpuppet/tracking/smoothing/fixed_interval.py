@@ -55,7 +55,7 @@ def smooth(times: Array, points: Array, sd: Array, least: Array) -> Smoothed:
     `sd`: stated deviations (T, M, 3), in the points' unit; `least` (M,): acceleration of each point of a person who stands still. Fewer
     than four frames are only interpolated.
     """
-    known = np.isfinite(points).all(2)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(2))
     measured = x = filled(times, points)
     precision, variances = np.where(known[..., None], 1.0, FAINT) / (INDEPENDENT * sd) ** 2, np.ones((0, points.shape[1]))
     if len(times) > ORDER:

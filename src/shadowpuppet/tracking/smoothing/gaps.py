@@ -14,7 +14,8 @@ FASTEST = 8.0
 ROUNDING = 1e-6
 """Of times (s)."""
 STRAY = 0.25
-"""Factor of the bow, half the acceleration times the times to both ends, by which a bridged joint may stray; on made recordings the intervals cover as without gaps."""
+"""Factor of the bow, half the acceleration times the times to both ends, by which a bridged joint may stray; on made recordings the
+intervals cover as without gaps."""
 
 
 def bridged(times: Array, joints: Array, longest: float) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.smoothing.projection import Points, at_limits, derivatives
 
-ROUNDS, LEAST_GAIN = 8, 1e-3
+ROUNDS, LEAST_GAIN = 10, 1e-3
 """Steps at most, and the share of the cost by which a step must lower it for another to follow."""
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
 """Damping, as a share of the equations' diagonal."""
@@ -75,21 +75,18 @@ def likeliest_poses(skeleton: Skeleton, points: Points, poses: Array, cost: Path
     for _ in range(ROUNDS):
         downhill = (J @ cost.downhill(at)[..., None])[..., 0]
         J[at_limits(poses, downhill, which, low, high)] = 0
-        gain = 0.0
-        while damping < MOST_DAMPING:
-            step = np.clip(_step(J, cost, at, damping), -MAX_STEP, MAX_STEP)
-            new = poses.copy()
-            new[:, which] += step
-            new = np.clip(new, low, high)
-            new_at, new_J = derivatives(skeleton, points, new, which)
-            gain = best - cost(new_at)
-            if gain >= 0:
-                break
+        new = poses.copy()
+        new[:, which] += np.clip(_step(J, cost, at, damping), -MAX_STEP, MAX_STEP)
+        new = np.clip(new, low, high)
+        new_at, new_J = derivatives(skeleton, points, new, which)
+        gain = best - cost(new_at)
+        if gain < 0:
             damping *= 10
-        if gain <= 0:
-            break
+            if damping > MOST_DAMPING:
+                break
+            continue
         poses, at, J, best, damping = new, new_at, new_J, best - gain, damping / 5
-        if gain < LEAST_GAIN * best:
+        if gain <= LEAST_GAIN * best:
             break
     return poses
 
