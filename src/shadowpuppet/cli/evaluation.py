@@ -103,7 +103,7 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if measured["bone_errors"]:
         yield "bones", bones_text(measured["bone_errors"])
     if sides := exchanges_text(measured["exchanges"]):
-        yield "left/right", f"exchanged {sides}" if sides == "never" else f"exchanged: {sides}"
+        yield "sides", f"exchanged {sides}" if sides == "never" else f"exchanged: {sides}"
     yield "intervals", coverage_text(measured["coverage"])
     if "dofs_deg" in measured:
         dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]

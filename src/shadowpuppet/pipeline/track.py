@@ -214,6 +214,10 @@ def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listen
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
         return
+    turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
+    if len(turned):
+        warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
+             "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
     writer.revise(found.motion)
     writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
