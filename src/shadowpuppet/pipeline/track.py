@@ -202,8 +202,8 @@ def _check_cutoff(options: Options, rate: float) -> None:
 def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
     """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
     method, gaps = options.smoothing
-    writer.info["smoothing"] = {"method": "off"}
     if method == "off" and gaps == 0:
+        writer.info["smoothing"] = {"method": "off"}
         return
     listener.begin("smoothing")
     start, columns = time.perf_counter(), subject.joint_columns
@@ -213,6 +213,7 @@ def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listen
         found = smoother(writer.motion)
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
+        writer.info["smoothing"] = {"method": "off"}
         return
     turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
     if len(turned):
