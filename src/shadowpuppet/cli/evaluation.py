@@ -83,7 +83,7 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, losses_text, world_text
+    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, exchanges_text, losses_text, world_text
 
     yield "no pose", losses_text(measured["losses"])
     if "errors" not in measured:
@@ -102,6 +102,8 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
                         f"{moves['difference_m_s2']:.1f} in the mean")
     if measured["bone_errors"]:
         yield "bones", bones_text(measured["bone_errors"])
+    if sides := exchanges_text(measured["exchanges"]):
+        yield "sides", f"exchanged {sides}" if sides == "never" else f"exchanged: {sides}"
     yield "intervals", coverage_text(measured["coverage"])
     if "dofs_deg" in measured:
         dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]

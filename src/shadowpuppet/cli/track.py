@@ -40,7 +40,8 @@ else:
     KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
-    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "training")))
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "smooth", "facing", "cutoff", "gaps",
+                                                      "training")))
     """Options of a live session."""
     LiveFlags = unpacked(flags_of(LiveSettings))
 

@@ -24,6 +24,7 @@ from shadowpuppet.evaluation.error_metrics import (
     whole_alignment,
     world_difference,
 )
+from shadowpuppet.evaluation.exchanges import exchanges
 from shadowpuppet.evaluation.interval_coverage import coverage
 from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, turn_errors
 from shadowpuppet.io.calibration.calibration_files import read_calibration
@@ -139,7 +140,7 @@ def _error_metrics(run: Run, ours: JointTable, theirs: JointTable, errors: Joint
     return {"aligned_mm": aligned_errors(errors, ours, theirs), "axes_mm": axis_errors(errors),
             "humaneva": humaneva_error(ours, theirs), "bends_deg": hinge_errors(ours, theirs),
             "acceleration": acceleration_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
-            "coverage": coverage(errors.delta, sd, errors.names)}
+            "coverage": coverage(errors.delta, sd, errors.names), "exchanges": exchanges(ours, theirs)}
 
 
 def _within(run: Run, truth: JointTable, how: Comparison) -> JointTable:

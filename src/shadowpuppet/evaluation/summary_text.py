@@ -89,3 +89,13 @@ def bones_text(bones: Mapping[str, Mapping[str, float]]) -> str:
     off = np.mean([abs(bone["longer_mm"]) for bone in bones.values()])
     return (f"{off:.1f} mm from the truth's in the mean, worst {worst} by {bones[worst]['longer_mm']:+.1f}; lengths change by "
             f"{change:.2f} mm (sd) at most, the truth's by {max(bone['truth_sd_mm'] for bone in bones.values()):.2f}")
+
+
+def exchanges_text(found: Mapping[str, Mapping[str, float]] | None) -> str | None:
+    """Share of the frames in which arms or legs are nearer to the other side's; None if unknown."""
+    if not found:
+        return None
+    if not any(pair["frames"] for pair in found.values()):
+        return "never"
+    return "; ".join(f"{name} in {_percent(pair['share'])} of the frames, for {pair['longest_s']:.2f} s at most" if pair["frames"]
+                     else f"{name} never" for name, pair in found.items())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -161,6 +162,12 @@ class Motion:
     def table(self) -> JointTable:
         """The joints as a table."""
         return JointTable(self.times, self.joint_names, self.joints)
+
+    def frames(self) -> Iterator[MotionFrame]:
+        """Its frames, one after another."""
+        columns = (self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd, self.joint_sd, self.cost.tolist(),
+                   self.overlap.tolist(), self.limb_status.tolist())
+        yield from itertools.starmap(MotionFrame, zip(*columns))
 
 
 class MotionBuilder:

@@ -121,9 +121,9 @@ class MonocularSubject(TrackedSubject):
     def _doubt(self) -> MonocularDoubt:
         return MonocularDoubt(self.tracker)
 
-    def points(self, pose: Array) -> Array:
-        """Landmarks (L, 3) of a pose (D,) in the world, metres."""
-        return self.picture.points_world(pose[None])[0]
+    def landmarks(self, poses: Array) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
+        return self.picture.points_world(poses)
 
     def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
         """Model, matching result and raw picture, one below the other."""

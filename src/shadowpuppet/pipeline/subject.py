@@ -103,9 +103,13 @@ class TrackedSubject(ABC):
         """Status of a frame without a state: `lost` or `absent`."""
         return "absent"
 
+    def landmarks(self, poses: Array) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
+        return self.body.points(poses)
+
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""
-        return self.body.points(pose[None])[0]
+        return self.landmarks(pose[None])[0]
 
     @cached_property
     def joint_columns(self) -> list[int]:

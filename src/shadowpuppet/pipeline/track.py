@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple
+from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import TrackingError
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
@@ -46,6 +47,8 @@ from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.frozen import CameraWatch
+from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -179,7 +182,9 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         _write_beside(writer.folder, prepared)
+        _check_cutoff(options, prepared.look.rate)
         _track(writer, prepared, kind, options, listener, for_track, cache)
+        _smooth(writer, prepared.check(), options, listener)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
@@ -195,6 +200,37 @@ def _write_beside(folder: Path, prepared: Prepared) -> None:
     write_whole(folder / "look.json", json_text(prepared.look) + "\n")
     write_person(folder / "person.toml", subject.person)
     write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
+
+
+def _check_cutoff(options: Options, rate: float) -> None:
+    """Raise `SettingsError` before tracking if the frame rate does not allow the filter's cut-off."""
+    if options.smoothing[0] == "butterworth" and np.isfinite(rate):
+        check_cutoff(options.cutoff, rate / options.every)
+
+
+def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
+    """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
+    method, gaps = options.smoothing
+    if method == "off" and gaps == 0:
+        writer.info["smoothing"] = {"method": "off"}
+        return
+    listener.begin("smoothing")
+    start, columns = time.perf_counter(), subject.joint_columns
+    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps,
+                              options.facing == "away")
+    try:
+        found = smoother(writer.motion)
+    except (SettingsError, np.linalg.LinAlgError) as error:
+        warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
+        writer.info["smoothing"] = {"method": "off"}
+        return
+    turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
+    if len(turned):
+        warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
+             "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
+    writer.revise(found.motion)
+    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
+    writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
 def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
