@@ -60,5 +60,11 @@ def reason(error: BaseException) -> str:
     return (getattr(error, "strerror", None) or str(error) or "unknown reason").lower()
 
 
+def one_line(text: object, most: int = 2000) -> str:
+    """A message on one line, without control characters, at most about `most` characters long: names and values in it are others'."""
+    line = " ".join("".join(each if each.isprintable() else " " for each in str(text)).split())
+    return line if len(line) <= most else f"{line[: most // 2]} ... {line[-most // 2 :]}"
+
+
 class ShadowPuppetWarning(UserWarning):
     """A problem that does not stop the work."""

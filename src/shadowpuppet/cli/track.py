@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,10 +21,11 @@ from shadowpuppet.cli.flags import (
     given,
     options_from,
     output,
+    switch,
     unpacked,
 )
 from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, show, table
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.pipeline.options import PATHS, Options
@@ -45,6 +47,8 @@ BARS = "▁▂▃▄▅▆▇█"
 
 
 def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
+          resume: Annotated[bool, switch("Go on with a run that was broken off, to the same result.")] = False,
+          force: Annotated[bool, switch("Replace an earlier run in the folder.")] = False,
           config: Config = None, quiet: Quiet = False, flags: RunFlags = None) -> None:
     """Track a person: from video to joints.csv, angles.csv, motion.npz, run.toml and metrics.json.
 
@@ -52,14 +56,38 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     `shadowpuppet settings` lists more settings; each is a flag, such as --tracker.arm.particles 300.
     """
     from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.io.run import CompleteRun, read_run
     from shadowpuppet.pipeline.track import track_recording
 
     options = options_from(flags, config)
     folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
-    with terminal(quiet, folder) as listener:
-        summary = track_recording(recording, folder, options, listener)
+    if not resume:
+        _check_earlier(folder, force)
+    try:
+        with terminal(quiet, folder) as listener:
+            metrics = track_recording(recording, folder, options, listener, resume=resume).metrics
+    except CompleteRun as error:
+        print(error, file=sys.stderr)
+        metrics = read_run(folder).metrics
     if not quiet:
-        _show_run(folder, summary.metrics)
+        _show_run(folder, metrics)
+
+
+def _check_earlier(folder: Path, force: bool) -> None:
+    """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be."""
+    from shadowpuppet.io.run import earlier_run
+
+    earlier = None if force else earlier_run(folder)
+    if earlier is None:
+        return
+    found, expected = "a run that was broken off", "--resume, which goes on with it, --force, which starts over"
+    if earlier["complete"]:
+        found, expected = "a complete run", "--force, which replaces it"
+    if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
+        print(f"{folder}: found {found}; replace it? [y/N] ", end="", file=sys.stderr, flush=True)
+        if sys.stdin.readline().strip().lower() in ("y", "yes"):
+            return
+    raise ShadowPuppetError(f"{folder}: found {found}, expected {expected}, or another folder (-o)")
 
 
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
@@ -69,7 +97,6 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
     Pictures are kept only with --record. Joints are sent to other programs only with --osc, --websocket or --lsl.
     """
-    import sys
     from time import strftime
 
     from shadowpuppet.cli.terminal import terminal

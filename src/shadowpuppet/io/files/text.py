@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import re
+import stat
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +18,10 @@ TEXT_LIMIT = 1_000_000_000
 """Greatest size of a table or motion, bytes; a longer one would not fit into memory as numbers."""
 TOML_LIMIT = 10_000_000
 """Greatest size of a calibration or settings file, bytes, so that a film given by mistake is not read."""
+
+DEEPEST = 50
+"""Greatest number of parts of a dotted key of TOML; the parser's memory grows with the square of them."""
+TOO_DEEP = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""", re.ASCII)
 
 
 def read_text(path: Path) -> str:
@@ -30,15 +37,26 @@ def read_text(path: Path) -> str:
 def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any]:
     """The tables of a TOML file. Raises `error` if it is missing, too long or not TOML."""
     text = read_limited(Path(path), TOML_LIMIT, error, "a TOML file")
+    if (found := TOO_DEEP.search(text)) is not None:
+        line = text.count("\n", 0, found.start()) + 1
+        raise error(f"{path}: line {line}: found a key of more than {DEEPEST} parts, expected fewer")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as problem:
         raise error(f"{path}: not valid TOML: {problem}") from None
 
 
+def check_regular(path: Path) -> None:
+    """Raise `OSError` for what is no file, such as a pipe, which would be waited for without end, or a device."""
+    kind = path.stat().st_mode
+    if not stat.S_ISREG(kind):
+        raise OSError(errno.EINVAL, "is a directory" if stat.S_ISDIR(kind) else "is a pipe or a device, expected a file")
+
+
 def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: str, kind_if_long: str = "") -> str:
     """The text of a UTF-8 file of at most `limit` bytes. Raises `error`, which names the `kind` of file that is expected."""
     try:
+        check_regular(path)
         if path.stat().st_size > limit:
             raise error(f"{path}: found {path.stat().st_size} bytes, expected {kind_if_long or kind} of at most {limit}")
         return path.read_text("utf-8-sig")
