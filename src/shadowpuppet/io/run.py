@@ -29,7 +29,7 @@ from shadowpuppet.io import checkpoint
 from shadowpuppet.io.files.lock import LOCK, locked
 from shadowpuppet.io.files.plain import for_json, for_toml, plain
 from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
+from shadowpuppet.io.files.text import errors_named, read_limited, read_toml, write_whole
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
 from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows
@@ -40,6 +40,8 @@ MADE = ("motion.npz", "metrics.json", "overlay.mp4")
 """Files written at the end of a run."""
 FILES = (checkpoint.STATE, *MADE, *TABLES, checkpoint.FRAMES, "look.json", "person.toml", "calibration.toml")
 """Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
+METRICS_LIMIT = 50_000_000
+"""Greatest size of metrics.json, bytes."""
 OWN_KEYS = ("complete", "frames", "body", "versions")
 """Keys of run.toml that the writer sets."""
 
@@ -172,9 +174,9 @@ class RunWriter:
             return
         if self._earlier:
             _unmark(self.folder)
-        with self._system_errors():
-            for name in FILES:
-                (self.folder / name).unlink(missing_ok=True)
+            with self._system_errors():
+                for name in FILES:
+                    (self.folder / name).unlink(missing_ok=True)
         self._write_info(complete=False)
         with self._system_errors():
             self._tables = [(self.folder / name).open("wb") for name in self._names]
@@ -327,9 +329,7 @@ def _read_metrics(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        data = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({reason(error)})") from None
+        data = json.loads(read_limited(path, METRICS_LIMIT, FormatError, "a JSON file"))
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: not valid JSON: {error}") from None
     if not isinstance(data, dict):

@@ -6,6 +6,7 @@ import io
 import lzma
 import math
 import struct
+import sys
 import tokenize
 import warnings
 import zipfile
@@ -16,8 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, one_line, reason
-from shadowpuppet.io.files.text import check_regular
+from shadowpuppet.errors import ShadowPuppetError, check_regular, one_line, reason
 
 BROKEN = (EOFError, ValueError, TypeError, KeyError, AttributeError, OverflowError, MemoryError, RuntimeError, SyntaxError,
           tokenize.TokenError, struct.error, zlib.error, lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
@@ -46,7 +46,7 @@ def read_members(path: Path, names: Sequence[str] | None = None) -> dict[str, ND
             warnings.simplefilter("ignore")  # of NumPy, on headers that it can still read
             wanted = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
             wanted = {name: info for name, info in wanted.items() if names is None or name in names}
-            most, size = max(UNPACKED, RATIO * path.stat().st_size), sum(info.file_size for info in wanted.values())
+            most, size = most_unpacked(path), sum(info.file_size for info in wanted.values())
             if size > most:
                 raise BrokenArchive(f"found {size} bytes when unpacked, expected at most {most}")
             for name, info in wanted.items():
@@ -56,6 +56,11 @@ def read_members(path: Path, names: Sequence[str] | None = None) -> dict[str, ND
     except BROKEN as error:
         raise BrokenArchive(one_line(error)) from None
     return found
+
+
+def most_unpacked(path: Path) -> int:
+    """Greatest size of what is packed in a file, bytes."""
+    return max(UNPACKED, RATIO * path.stat().st_size)
 
 
 def _array(member: bytes) -> NDArray:
@@ -70,6 +75,8 @@ def _array(member: bytes) -> NDArray:
         raise ValueError("found Python objects in an array, which are never read")
     if min(shape, default=0) < 0 or len(values) != expected:
         raise ValueError(f"found {len(values)} bytes of an array {shape} of {dtype}, expected {expected}")
+    if dtype.kind == "U" and len(values) and np.frombuffer(values, dtype.str[0] + "u4").max() > sys.maxunicode:
+        raise ValueError("found a text with impossible characters")
     return np.frombuffer(values, dtype, math.prod(shape)).reshape(shape, order="F" if by_columns else "C").copy("K")
 
 

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import re
-import stat
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
+from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular, reason
 
 TEXT_LIMIT = 1_000_000_000
 """Greatest size of a table or motion, bytes; a longer one would not fit into memory as numbers."""
-TOML_LIMIT = 10_000_000
-"""Greatest size of a calibration or settings file, bytes, so that a film given by mistake is not read."""
+TOML_LIMIT = 2_000_000
+"""Greatest size of a calibration or settings file, bytes: what is longer takes many seconds to be parsed, or is a film given by mistake."""
 
-DEEPEST = 50
+DEEPEST = 20
 """Greatest number of parts of a dotted key of TOML; the parser's memory grows with the square of them."""
 TOO_DEEP = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""", re.ASCII)
 
@@ -44,13 +42,6 @@ def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any
         return tomllib.loads(text)
     except (ValueError, RecursionError) as problem:
         raise error(f"{path}: not valid TOML: {problem}") from None
-
-
-def check_regular(path: Path) -> None:
-    """Raise `OSError` for what is no file, such as a pipe, which would be waited for without end, or a device."""
-    kind = path.stat().st_mode
-    if not stat.S_ISREG(kind):
-        raise OSError(errno.EINVAL, "is a directory" if stat.S_ISDIR(kind) else "is a pipe or a device, expected a file")
 
 
 def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: str, kind_if_long: str = "") -> str:
