@@ -134,5 +134,6 @@ def lines_changed(rng: np.random.Generator, content: bytes, other: bytes) -> byt
 
 
 BINARY: tuple[Change, ...] = (flipped, overwritten, deleted, repeated, cut, spliced, of_random, overwritten)
-TEXT: tuple[Change, ...] = (replaced(NUMBER, NUMBERS), replaced(TOKEN, WORDS), lines_changed, replaced(NUMBER, NUMBERS), replaced(TOKEN, WORDS),
+TEXT: tuple[Change, ...] = (replaced(NUMBER, NUMBERS), replaced(TOKEN, WORDS),
+                             lines_changed, replaced(NUMBER, NUMBERS), replaced(TOKEN, WORDS),
                             deleted, repeated, flipped)

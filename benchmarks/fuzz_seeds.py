@@ -1,4 +1,4 @@
-"""Files of every format that the package reads, for `fuzz_readers.py`, made by its own writers and those of the tests; and their readers."""
+"""Files of every format that the package reads, for `fuzz_readers.py`, made by its own writers and the tests'; and their readers."""
 
 from __future__ import annotations
 

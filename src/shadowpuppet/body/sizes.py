@@ -24,7 +24,8 @@ def is_within(value: object, limits: tuple[float, float]) -> bool:
 
 def expected_metres(value: object, limits: tuple[float, float]) -> str:
     """The end of an error message: the range in metres, and a hint if the value would fit in centimetres."""
-    hint = f" ({value:g} cm are {value / 100:g})" if is_within(value, (100 * limits[0], 100 * limits[1])) else ""
+    known = isinstance(value, (int, float, np.integer)) and is_within(value, (100 * limits[0], 100 * limits[1]))
+    hint = f" ({value:g} cm are {value / 100:g})" if known else ""
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
