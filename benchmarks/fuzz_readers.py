@@ -3,10 +3,10 @@
     python benchmarks/fuzz_readers.py [--inputs 1000000 | --seconds 20] [--only NAME ...] [--seed 1] [--keep FOLDER]
 
 Files that the package and the tests' writers make are changed at random, in their bytes and in their structure (numbers, words, lines,
-members of archives), and read, a process for each reader. A finding is any exception but a `ShadowPuppetError`; a message of more than one line, or
-too long; a warning that is not ours; more than 10 s; more than 500 MB; the end of the process. Each is printed with its reader, number and
-cause, and its input is kept in FOLDER. An input is made from the seed, the reader's name and its number alone. Ends with code 1 if there
-is a finding. Needs Linux.
+members of archives), and read, a process for each reader. A finding is any exception but a `ShadowPuppetError`; a message of more than
+one line, or too long; a warning that is not ours; more than 10 s; more than 500 MB; the end of the process. Each is printed with its
+reader, number and cause, and its input is kept in FOLDER. An input is made from the seed, the reader's name and its number alone. Ends
+with code 1 if there is a finding. Needs Linux.
 """
 
 from __future__ import annotations

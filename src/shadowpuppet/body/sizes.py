@@ -24,8 +24,9 @@ def is_within(value: object, limits: tuple[float, float]) -> bool:
 
 def expected_metres(value: object, limits: tuple[float, float]) -> str:
     """The end of an error message: the range in metres, and a hint if the value would fit in centimetres."""
-    known = isinstance(value, (int, float, np.integer)) and is_within(value, (100 * limits[0], 100 * limits[1]))
-    hint = f" ({value:g} cm are {value / 100:g})" if known else ""
+    hint = ""
+    if isinstance(value, (int, float, np.integer)) and is_within(value, (100 * limits[0], 100 * limits[1])):
+        hint = f" ({value:g} cm are {value / 100:g})"
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
