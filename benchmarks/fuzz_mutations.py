@@ -13,7 +13,8 @@ NUMBERS = (b"0", b"-1", b"1", b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"1e
            b"9" * 400, b"1e400", b"0x10", b"1_000", b"3.", b".5", b"", b"1 2", b"1,5", b"\xd9\xa3", b"true", b"1e5", b"100000000")
 WORDS = (b"[", b"]", b"{", b"}", b'"', b"'''", b"\n", b"\r", b"\t", b"\0", b"\xff\xfe", b"\xed\xa0\x80", b"#", b"=", b".", b"a.b.c",
          b"<", b">", b"&amp;", b"<!DOCTYPE a>", b"<!ENTITY a 'b'>", b"..", b"/dev/zero", b"a" * 5000, b"\x1b[31m", b"\xe2\x80\xae",
-         b"nan", b"null", b"__proto__", b"[[", b"." * 100, b"a." * 60 + b"a", b"[" * 1500, b"{a=" * 200, b"\\u0000", b"\xef\xbb\xbf")  # fmt: skip
+         b"nan", b"null", b"__proto__", b"[[", b"." * 100, b"a." * 60 + b"a", b"[" * 1500,
+         b"{a=" * 200, b"\\u0000", b"\xef\xbb\xbf")  # fmt: skip
 INTEGERS = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0x7FFFFFFFFFFFFFFF, 0xFFFFFFFFFFFFFFFF)
 TOKEN = re.compile(rb"[^\s,=\[\]{}<>\"]+")
 NUMBER = re.compile(rb"-?\d+\.?\d*(?:e[+-]?\d+)?")

@@ -80,7 +80,7 @@ def test_a_parquet_file_of_too_many_rows_is_not_read(tmp_path, monkeypatch):
     import pyarrow.parquet as parquet
 
     column = arrow.array(np.zeros(10**6))
-    parquet.write_table(arrow.table({name: column for name in ("time", "a_x", "a_y", "a_z")}), tmp_path / "a.parquet", compression="zstd")
+    parquet.write_table(arrow.table(dict.fromkeys(("time", "a_x", "a_y", "a_z"), column)), tmp_path / "a.parquet", compression="zstd")
     monkeypatch.setattr(npz, "UNPACKED", 10**6)
     monkeypatch.setattr(parquet.ParquetFile, "read", lambda *_: pytest.fail("read"))
     with pytest.raises(FormatError, match=r"found 1000000 rows of 4 columns"):
