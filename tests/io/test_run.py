@@ -60,7 +60,7 @@ def assert_same(a: Motion, b: Motion, atol: float = 0.0) -> None:
             np.testing.assert_array_equal(left, right)
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.sampled_from(STATUSES), max_size=5))
 def test_what_is_written_is_read_exactly_and_from_the_tables_nearly(tmp_path, statuses):
     run = read_run(write(tmp_path / "run", statuses))

@@ -97,6 +97,24 @@ def test_long_recordings_tell_their_frames_in_32_bits(tmp_path):
         assert table.positions[-1, 0, 0] == pytest.approx(70.0)
 
 
+@pytest.mark.parametrize("processor", [INTEL, MIPS])
+def test_where_the_parameters_do_not_say_where_the_data_begin_the_header_does(tmp_path, processor):
+    content = bytearray(c3d(NAMES, PLACES, processor=processor))
+    at = content.index(b"DATA_START") + 14
+    assert any(content[at : at + 2])
+    content[at : at + 2] = b"\0\0"
+    np.testing.assert_allclose(read(tmp_path, bytes(content)).positions, PLACES / 1000, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["köln", "手"])
+def test_labels_are_utf_8_or_of_older_programs(tmp_path, name):
+    table = JointTable(np.zeros(1), (name,), np.ones((1, 1, 3)))
+    write_c3d(tmp_path / "a.c3d", table)
+    assert read_c3d(tmp_path / "a.c3d").names == (name,)
+    content = c3d(["koln"], np.ones((1, 1, 3))).replace(b"koln", "köln".encode("latin-1"))
+    assert read(tmp_path, content).names == ("köln",)
+
+
 def test_more_frames_and_names_than_a_byte_or_two_can_tell_are_written(tmp_path):
     names = tuple(f"p{n}" for n in range(300))
     few = JointTable(np.arange(2) / 50, names, np.arange(1800.0).reshape(2, 300, 3) / 1000 + 0.001)
