@@ -80,14 +80,14 @@ def _check_earlier(folder: Path, force: bool) -> None:
     earlier = None if force else earlier_run(folder)
     if earlier is None:
         return
-    found, expected = "a run that was broken off", "--resume, which goes on with it, --force, which starts over"
+    said = f"{folder}: found a run that was broken off, expected --resume, which goes on with it, --force, which starts over"
     if earlier["complete"]:
-        found, expected = "a complete run", "--force, which replaces it"
+        said = f"{folder}: found a complete run, expected --force, which replaces it"
     if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
-        print(f"{folder}: found {found}; replace it? [y/N] ", end="", file=sys.stderr, flush=True)
+        print(f"{said.partition(', expected')[0]}; replace it? [y/N] ", end="", file=sys.stderr, flush=True)
         if sys.stdin.readline().strip().lower() in ("y", "yes"):
             return
-    raise ShadowPuppetError(f"{folder}: found {found}, expected {expected}, or another folder (-o)")
+    raise ShadowPuppetError(f"{said}, or another folder (-o)")
 
 
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
