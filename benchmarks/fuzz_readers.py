@@ -3,7 +3,7 @@
     python benchmarks/fuzz_readers.py [--inputs 1000000 | --seconds 20] [--only NAME ...] [--seed 1] [--keep FOLDER]
 
 Files that the package and the tests' writers make are changed at random, in their bytes and in their structure (numbers, words, lines,
-members of archives), and read, a process for each reader. A finding is any exception but a `ShadowPuppetError`; a message of more than
+members of archives), and read in another process. A finding is any exception but a `ShadowPuppetError`; a message of more than
 one line, or too long; a warning that is not ours; more than 10 s; more than 500 MB; the end of the process. Each is printed with its
 reader, number and cause, and its input is kept in FOLDER. An input is made from the seed, the reader's name and its number alone. Ends
 with code 1 if there is a finding. Needs Linux.
@@ -37,8 +37,10 @@ from shadowpuppet.threads import child_environment
 
 SECONDS, MEMORY = 10, 500_000_000
 """Time and memory that one input may take."""
-AT_ONCE = 200
-"""Inputs of a reader before it is the next one's turn, while time lasts."""
+AT_ONCE, FEW = 200, 25
+"""Inputs of a reader before it is the next one's turn; in a short run."""
+AT = "number"
+"""File with the number of the input that is being read."""
 
 
 class Report(NamedTuple):
@@ -56,11 +58,10 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", metavar="NAME", help=f"of {', '.join(fuzz_seeds.READERS)}")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder for the inputs of findings")
-    parser.add_argument("--read", metavar="NAME", help=argparse.SUPPRESS)
-    parser.add_argument("--first", type=int, default=0, help=argparse.SUPPRESS)
+    parser.add_argument("--read", action="store_true", help=argparse.SUPPRESS)
     args = smallest.parse(parser, lambda folder: ["--seconds", 12, "--keep", folder])
     if args.read:
-        read_many(args.read, args.keep, args.seed, args.first)
+        read_many(args.keep, args.seed)
         return 0
     with tempfile.TemporaryDirectory(prefix="shadowpuppet-fuzz-") as folder:
         tried, findings = fuzz(args, Path(folder))
@@ -73,33 +74,30 @@ def main() -> int:
 
 def fuzz(args: argparse.Namespace, folder: Path) -> tuple[dict[str, int], int]:
     """Numbers of inputs by reader, and of findings."""
-    names, end = args.only or list(fuzz_seeds.READERS), time.monotonic() + args.seconds
+    names = args.only or list(fuzz_seeds.READERS)
     fuzz_seeds.write(folder / "seeds")
-    tried, findings = dict.fromkeys(names, 0), 0
-    children = dict[str, subprocess.Popen[str]]()
+    tried, findings, child = dict.fromkeys(names, 0), 0, start(folder, args.seed)
+    end = time.monotonic() + args.seconds
     while sum(tried.values()) < args.inputs and time.monotonic() < end:
         for name in names:
-            left = AT_ONCE
-            while left > 0 and time.monotonic() < end:
-                child = children.get(name) or start(name, folder, args.seed, tried[name])
-                children[name] = child
-                for report in ask(child, name, folder, tried[name], left):
-                    tried[name], left = report.number + 1, left - 1
-                    if report.cause:
-                        findings += 1
-                        tell(name, report, folder, args)
-                if child.poll() is not None:
-                    del children[name]
-    for child in children.values():
-        assert child.stdin is not None
-        child.stdin.close()
-        child.wait()
+            for report in ask(child, name, folder, tried[name], AT_ONCE if args.seconds > 60 else FEW):
+                tried[name] = report.number + 1
+                if report.cause:
+                    findings += 1
+                    tell(name, report, folder, args)
+            if child.poll() is not None:
+                child = start(folder, args.seed)
+            if time.monotonic() > end:
+                break
+    assert child.stdin is not None
+    child.stdin.close()
+    child.wait()
     return tried, findings
 
 
-def start(name: str, folder: Path, seed: int, first: int) -> subprocess.Popen[str]:
-    """A process that reads inputs of one reader."""
-    command = [sys.executable, "-P", __file__, "--read", name, "--keep", str(folder), "--seed", str(seed), "--first", str(first)]
+def start(folder: Path, seed: int) -> subprocess.Popen[str]:
+    """A process that reads inputs."""
+    command = [sys.executable, "-P", __file__, "--read", "--keep", str(folder), "--seed", str(seed)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
                             env=child_environment({"NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}))
 
@@ -109,11 +107,11 @@ def ask(child: subprocess.Popen[str], name: str, folder: Path, first: int, numbe
     assert child.stdin is not None
     assert child.stdout is not None
     with contextlib.suppress(BrokenPipeError):
-        child.stdin.write(f"{number}\n")
+        child.stdin.write(f"{name} {first} {number}\n")
         child.stdin.flush()
     if line := child.stdout.readline():
         return [Report(*each) for each in json.loads(line)]
-    code, at = child.wait(), int((folder / f"{name}.number").read_text())
+    code, at = child.wait(), int((folder / AT).read_text())
     cause = f"more than {SECONDS} s" if code == -signal.SIGALRM else f"the process ended with code {code}"
     return [*(Report(n, "") for n in range(first, at)), Report(at, cause)]
 
@@ -138,30 +136,37 @@ def make_input(name: str, seeds: list[Path], seed: int, number: int) -> tuple[Pa
     return path, mutated(rng, path.read_bytes(), seeds[rng.integers(len(seeds))].read_bytes())
 
 
-def read_many(name: str, folder: Path, seed: int, first: int) -> None:
-    """Read inputs as many as each line of standard input asks for, and report on them in a line each."""
-    seeds, read = fuzz_seeds.of(name, folder / "seeds"), fuzz_seeds.READERS[name]
-    place = folder / f"place-{name}"
-    shutil.copytree(folder / "seeds" / name, place, dirs_exist_ok=True)
-    for path in seeds:
-        with contextlib.suppress(ShadowPuppetError):
-            read(place / path.relative_to(folder / "seeds" / name))  # imports and kernels are loaded
-    resource.setrlimit(resource.RLIMIT_AS, (memory("VmSize") + 2 * MEMORY,) * 2)
-    number = first
-    with (folder / f"{name}.number").open("w") as at:
+def read_many(folder: Path, seed: int) -> None:
+    """For each line of standard input, a reader, the first number and how many, read inputs and report on them in a line."""
+    ready = set[str]()
+    with (folder / AT).open("w") as at:
         for line in sys.stdin:
+            name, first, number = line.split()
+            seeds, place, read = fuzz_seeds.of(name, folder / "seeds"), folder / f"place-{name}", fuzz_seeds.READERS[name]
+            if name not in ready:
+                ready.add(name)
+                prepare(folder / "seeds" / name, place, [path.name for path in seeds], read)
+            resource.setrlimit(resource.RLIMIT_AS, (memory("VmSize") + 2 * MEMORY, resource.RLIM_INFINITY))
             reports = list[Report]()
-            for _ in range(int(line)):
+            for n in range(int(first), int(first) + int(number)):
                 at.seek(0)
-                at.write(str(number))
+                at.write(f"{n:12}")
                 at.flush()
-                path, content = make_input(name, seeds, seed, number)
-                file = place / path.relative_to(folder / "seeds" / name)
-                file.write_bytes(content)
-                reports.append(Report(number, cause_of(read, file)))
-                file.write_bytes(path.read_bytes())
-                number += 1
+                path, content = make_input(name, seeds, seed, n)
+                (place / path.name).write_bytes(content)
+                reports.append(Report(n, cause_of(read, place / path.name)))
+                (place / path.name).write_bytes(path.read_bytes())
             print(json.dumps(reports), flush=True)
+
+
+def prepare(seeds: Path, place: Path, names: list[str], read: Callable[[Path], object]) -> None:
+    """Copy the files of a reader to where they are changed, and read each, so that imports and kernels are loaded."""
+    shutil.copytree(seeds, place, dirs_exist_ok=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name in names:
+            with contextlib.suppress(ShadowPuppetError):
+                read(place / name)
 
 
 def cause_of(read: Callable[[Path], object], file: Path) -> str:
