@@ -117,7 +117,7 @@ def write(folder: Path) -> None:
     for path in scripts.glob("*.py"):
         (folder / "script" / path.name).write_bytes(path.read_bytes())
     frame = MotionFrame(0.1, "tracked", rng.random(4), np.asfortranarray(rng.random((3, 3))))
-    write_checkpoint(folder / "checkpoint", Checkpoint(1, (3, 4), (frame, {"a": None, "b": True}, np.float64(2))))
+    write_checkpoint(folder / "checkpoint", Checkpoint(1, (frame, {"a": None, "b": True}, np.float64(2))))
     for ending in ("png", "jpg", "bmp"):
         write_image(folder / "image" / f"a.{ending}", rng.integers(0, 255, (12, 16, 3), np.uint8))
 

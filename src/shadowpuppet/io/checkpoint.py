@@ -1,6 +1,6 @@
 """What a run needs to go on after it was killed: `checkpoint.npz`, the state after some frame, and `checkpoint.frames`, the frames exactly.
 
-The tables of a run are flushed frame by frame, so that they reach at least as far as the checkpoint; they are cut back to it.
+Frames are flushed one by one, so that they reach at least as far as the checkpoint. The run's tables are written anew from them.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ class Checkpoint(NamedTuple):
 
     frames: int
     """Number of frames."""
-    sizes: tuple[int, ...]
-    """Size of each growing file, bytes."""
     state: Any
     """What the next frame needs of those before, as `io.files.nested` can write it."""
 
@@ -71,13 +69,9 @@ def _frame(row: Array, dofs: int, joints: int) -> MotionFrame:
                        float(head[2]), tuple(limbs))
 
 
-def cut_back(paths: Sequence[Path], sizes: Sequence[int]) -> Sequence[BinaryIO]:
-    """Files that go on after sizes (bytes). Raises `FormatError`, and cuts none, if one is shorter; `OSError` if one cannot be written."""
-    for path, size in zip(paths, sizes, strict=True):
-        if (found := path.stat().st_size) < size:
-            raise FormatError(f"{path}: found {found} bytes, expected at least the {size} of the checkpoint")
-    files = [path.open("r+b") for path in paths]
-    for file, size in zip(files, sizes):
-        file.seek(size)
-        file.truncate()
-    return files
+def open_frames(folder: Path, frames: Sequence[MotionFrame]) -> BinaryIO:
+    """The file of a run's frames, to go on after these, which are its first. Raises `OSError`."""
+    file = (folder / FRAMES).open("r+b" if frames else "wb")
+    file.seek(sum(map(len, map(frame_bytes, frames))))
+    file.truncate()
+    return file

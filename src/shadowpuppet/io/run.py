@@ -4,6 +4,7 @@
     angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
     intervals.csv  time, joint, x_low, x_high, y_low, y_high, z_low, z_high (m, world): 90 % bounds, a row for each joint of a frame
     motion.npz     the fields of `Motion`, arrays only
+    raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
@@ -17,6 +18,7 @@ import contextlib
 import json
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -32,11 +34,12 @@ from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
 from shadowpuppet.io.files.text import errors_named, read_limited, read_toml, write_whole
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
-from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows
+from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows, write_raw
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
-MADE = ("motion.npz", "metrics.json", "overlay.mp4")
+RAW = "raw.csv"
+MADE = (RAW, "motion.npz", "metrics.json", "overlay.mp4")
 """Files written at the end of a run."""
 FILES = (checkpoint.STATE, *MADE, *TABLES, checkpoint.FRAMES, "look.json", "person.toml", "calibration.toml")
 """Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
@@ -91,10 +94,9 @@ class RunWriter:
         self.info = for_toml(plain(info, "info")) | {"body": body_name, "versions": versions()}
         self._motion = MotionBuilder(body_name, dof_names, joint_names)
         self._intervals = IntervalWriter(joint_names)
-        self._names = TABLES if resume is None else (*TABLES, checkpoint.FRAMES)
         self._tables: Sequence[BinaryIO] = ()
         self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
-        self._sizes: tuple[int, ...] | None = None
+        self._before: list[MotionFrame] | None = None
 
     def __enter__(self) -> Self:
         """Make the folder, and lock it. Raises `ShadowPuppetError` if it cannot be used."""
@@ -144,51 +146,76 @@ class RunWriter:
                                         len(self._motion.limbs))
         for frame in frames:
             self._motion.append(frame)
-        self._sizes = found.sizes
+        self._before = frames
         return found.state, frames
 
     def checkpoint(self, state: Any) -> None:
         """Keep a state from which the run can go on after the frames so far. Raises `ShadowPuppetError` if it cannot be written."""
-        sizes = tuple(table.tell() for table in self._tables)
-        checkpoint.write_checkpoint(self.folder, checkpoint.Checkpoint(len(self._motion), sizes, state))
+        checkpoint.write_checkpoint(self.folder, checkpoint.Checkpoint(len(self._motion), state))
 
     def write(self, frame: MotionFrame) -> None:
         """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self.begin()
         kept = self._motion.append(frame)
-        self._append(run_rows(kept), self._intervals.lines(kept), checkpoint.frame_bytes(kept))
+        with self._system_errors():
+            _append(self._tables, run_rows(kept), self._intervals.lines(kept), checkpoint.frame_bytes(kept))
+            for table in self._tables:
+                table.flush()  # so that a killed run keeps it
+
+    @property
+    def motion(self) -> Motion:
+        """The frames so far."""
+        return self._motion.build()
+
+    def revise(self, revised: Motion) -> None:
+        """Replace the frames so far, at the end of a run; the tables as they were go to raw.csv. Raises `ShadowPuppetError` if something
+        cannot be written; the tables stay as they were."""
+        self.begin()
+        builder = MotionBuilder(revised.body_name, revised.dof_names, revised.joint_names)
+        parts = [f"{name}.part" for name in (RAW, *TABLES)]
+        try:
+            with self._system_errors():
+                write_raw(self.folder / parts[0], *(self.folder / name for name in TABLES[:2]))
+                with ExitStack() as stack:
+                    tables = [stack.enter_context((self.folder / part).open("wb")) for part in parts[1:]]
+                    _append(tables, run_headers(builder.joint_names, builder.dof_names), self._intervals.header())
+                    for frame in revised.frames():
+                        kept = builder.append(frame)
+                        _append(tables, run_rows(kept), self._intervals.lines(kept))
+                for table in self._tables:
+                    table.close()
+                for part in parts:
+                    (self.folder / part).replace(self.folder / part.removesuffix(".part"))
+                self._motion = builder
+                self._tables = [(self.folder / name).open("ab") for name in TABLES]
+        finally:
+            for part in parts:
+                with contextlib.suppress(OSError):
+                    (self.folder / part).unlink(missing_ok=True)
 
     def begin(self) -> None:
-        """Replace an earlier run and write the headers, or cut the one that is `resumed` back to its checkpoint, once.
+        """Replace an earlier run and write the headers, or write the one that is `resumed` up to its checkpoint, once.
 
         The folder never holds files of two runs: the earlier one loses its mark of being complete first, and run.toml becomes the new
         one's when nothing of the earlier one is left.
         """
         if self._tables:
             return
-        if self._sizes is not None:
-            with self._system_errors():
-                self._tables = checkpoint.cut_back([self.folder / name for name in self._names], self._sizes)
-                for name in MADE:
-                    (self.folder / name).unlink(missing_ok=True)
-            return
-        if self._earlier:
+        if self._earlier and self._before is None:
             _unmark(self.folder)
-            with self._system_errors():
-                for name in FILES:
-                    (self.folder / name).unlink(missing_ok=True)
-        self._write_info(complete=False)
         with self._system_errors():
-            self._tables = [(self.folder / name).open("wb") for name in self._names]
-        self._append(run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header(), b"")
-
-    def _append(self, rows: tuple[list[str], list[str]], intervals: str, exact: bytes) -> None:
-        """Append a row to joints.csv and angles.csv, lines to intervals.csv, and the frame to `checkpoint.FRAMES`."""
-        texts = [text.encode() for text in (*map(csv_line, rows), intervals)]
+            for name in () if not self._earlier else FILES if self._before is None else MADE:
+                (self.folder / name).unlink(missing_ok=True)
+        if self._before is None:
+            self._write_info(complete=False)
         with self._system_errors():
-            for table, content in zip(self._tables, (*texts, exact)):
-                table.write(content)
-                table.flush()  # so that a killed run keeps it
+            tables = [(self.folder / name).open("wb") for name in TABLES]
+            self._tables = tables if self._resume is None else [*tables, checkpoint.open_frames(self.folder, self._before or [])]
+            _append(self._tables, run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header())
+            for kept in self._before or []:
+                _append(self._tables, run_rows(kept), self._intervals.lines(kept))
+            for table in self._tables:
+                table.flush()
 
     def _finish(self, complete: bool) -> None:
         for table in self._tables:
@@ -219,7 +246,7 @@ class RunWriter:
         import tomli_w
 
         ours = tomllib.loads(tomli_w.dumps(self.info))
-        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames"}):
+        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing"}):
             if difference := _difference(key, earlier.get(key), ours.get(key)):
                 raise ShadowPuppetError(f"{self.folder}: the run there cannot go on as another one: {difference}")
         if earlier["complete"]:
@@ -234,6 +261,12 @@ class RunWriter:
             frames = len(self._motion)
             kept = f"; the {frames} frames so far are in joints.csv and angles.csv" if frames else ""
             raise ShadowPuppetError(f"{self.folder}: the run cannot be written ({reason(error)}){kept}") from None
+
+
+def _append(tables: Sequence[BinaryIO], rows: tuple[list[str], list[str]], intervals: str, exact: bytes = b"") -> None:
+    """Append a row to joints.csv and angles.csv, lines to intervals.csv, and the frame to `checkpoint.FRAMES` if that is among them."""
+    for table, content in zip(tables, (*(text.encode() for text in (*map(csv_line, rows), intervals)), exact)):
+        table.write(content)
 
 
 def read_run(folder: str | Path) -> Run:
