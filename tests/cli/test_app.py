@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import io
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -430,21 +432,55 @@ def test_a_folder_that_holds_something_else(shell, recording, tmp_path):
     assert "found thesis.tex in it but no run.toml of a run" in refused(shell, "track", recording, "-o", "thesis")
 
 
-def test_control_c_leaves_a_run_that_can_be_read(recording, tmp_path):
-    folder = tmp_path / "run"
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recording, tmp_path, name, code):
+    folder, number = tmp_path / "run", getattr(signal, name)
     # Who starts the tests in the background has them, and so their children, ignore Ctrl-C.
-    heeding = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    heeding = functools.partial(signal.signal, number, signal.SIG_DFL)
     child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", preexec_fn=heeding)
     rows, end = folder / "joints.csv", time.monotonic() + 60
     while child.poll() is None and time.monotonic() < end and (not rows.exists() or rows.read_text().count("\n") < 4):
         time.sleep(0.01)
-    child.send_signal(signal.SIGINT)
+    child.send_signal(number)
     _, err = child.communicate()
-    assert child.returncode == 130
+    assert child.returncode == code
     assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}", err.splitlines()[-1])
     left = read_run(folder)
     assert not left.complete
     assert 2 <= len(left.motion) < made.FRAMES
+    assert (folder / "checkpoint.npz").exists()
+
+
+def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monkeypatch, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: pytest.fail("it was begun"))
+    said = "run: found a complete run, expected --force, which replaces it, or another folder"
+    assert said in refused(shell, "track", recording, "-o", "run")
+    info = tmp_path / "run" / "run.toml"
+    info.write_text(info.read_text().replace("complete = true", "complete = false"))
+    assert "run: found a run that was broken off, expected --resume" in refused(shell, "track", recording, "-o", "run")
+
+    monkeypatch.setattr("shadowpuppet.pipeline.track.track_recording", lambda *_, resume, **__: 1 / 0)
+    for answer in ("y\n", "n\n", ""):
+        typed = io.StringIO(answer)
+        typed.isatty = lambda: True
+        monkeypatch.setattr(sys, "stdin", typed)
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+        if answer == "y\n":
+            with pytest.raises(ZeroDivisionError):
+                shell("track", recording, "-o", "run")
+        else:
+            assert "run that was broken off; replace it? [y/N] error: " in shell("track", recording, "-o", "run").err
+    with pytest.raises(ZeroDivisionError):
+        shell("track", recording, "-o", "run", "--force")
+
+
+def test_a_run_that_is_complete_needs_not_go_on(shell, recording, run, monkeypatch, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: pytest.fail("it was begun"))
+    code, out, err = shell("track", recording, "-o", "run", "--resume", "--overlay", *QUICK)
+    assert (code, err) == (0, "run: the run is complete: nothing is left to be done\n")
+    assert "frames/s" in out
 
 
 def test_control_c_before_the_first_frame(shell, recording, monkeypatch, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import sys
@@ -222,6 +223,11 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
     assert "a.csv: cannot be read (no such file" in refused(shell, "convert", "a.csv", "b.csv")
     shutil.copy(joints, tmp_path / "a.csv")
     assert "found the file that is to be read" in refused(shell, "convert", "a.csv", "a.csv")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
+    os.link(tmp_path / "a.csv", tmp_path / "same.csv")
+    for other in (tmp_path / "a.csv", tmp_path / "." / "a.csv", "link.csv", "same.csv"):  # the same file by another name
+        assert "found the file that is to be read" in refused(shell, "convert", "a.csv", other)
+        assert "found the file that is to be read" in refused(shell, "convert", other, "a.csv")
     assert (tmp_path / "a.csv").read_bytes() == joints.read_bytes()
     assert "rate: found 0.0, expected frames a second" in refused(shell, "convert", "a.csv", "b.csv", "--rate", "0")
     (tmp_path / "m.csv").write_text("time,LASI_x,LASI_y,LASI_z\n0,1,2,3\n")

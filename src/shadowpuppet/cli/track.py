@@ -22,10 +22,11 @@ from shadowpuppet.cli.flags import (
     given,
     options_from,
     output,
+    switch,
     unpacked,
 )
 from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, show, table, verdict_table
-from shadowpuppet.errors import PERSON_LOST, SettingsError
+from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.pipeline.options import PATHS, Options
@@ -49,6 +50,8 @@ BARS = "▁▂▃▄▅▆▇█"
 
 
 def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
+          resume: Annotated[bool, switch("Go on with a run that was broken off, to the same result.")] = False,
+          force: Annotated[bool, switch("Replace an earlier run in the folder.")] = False,
           config: Config = None, quiet: Quiet = False, verbose: Verbose = False, flags: RunFlags = None) -> int:
     """Track a person: from video to joints.csv, angles.csv, motion.npz, run.toml and metrics.json.
 
@@ -56,19 +59,44 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     `shadowpuppet settings` lists more settings; each is a flag, such as --tracker.arm.particles 300.
     """
     from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.io.run import CompleteRun, read_run
     from shadowpuppet.pipeline.track import track_recording
     from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST, lost_share
 
     options = options_from(flags, config)
     folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
-    with terminal(quiet, folder, verbose=verbose) as listener:
-        summary = track_recording(recording, folder, options, listener)
+    if not resume:
+        _check_earlier(folder, force)
+    try:
+        with terminal(quiet, folder, verbose=verbose) as listener:
+            summary = track_recording(recording, folder, options, listener, resume=resume)
+        motion, metrics = summary.motion, summary.metrics
+    except CompleteRun as error:
+        print(error, file=sys.stderr)
+        motion, metrics = read_run(folder).motion, read_run(folder).metrics
     if not quiet:
-        _show_run(folder, summary.metrics)
-    if lost_share(summary.motion) <= MOSTLY_LOST:
+        _show_run(folder, metrics)
+    if lost_share(motion) <= MOSTLY_LOST:
         return 0
-    print(f"the person is lost: {'; '.join(summary.metrics['verdict']['reasons'])}", file=sys.stderr)
+    print(f"the person is lost: {'; '.join(metrics['verdict']['reasons'])}", file=sys.stderr)
     return PERSON_LOST
+
+
+def _check_earlier(folder: Path, force: bool) -> None:
+    """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be."""
+    from shadowpuppet.io.run import earlier_run
+
+    earlier = None if force else earlier_run(folder)
+    if earlier is None:
+        return
+    said = f"{folder}: found a run that was broken off, expected --resume, which goes on with it, --force, which starts over"
+    if earlier["complete"]:
+        said = f"{folder}: found a complete run, expected --force, which replaces it"
+    if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
+        print(f"{said.partition(', expected')[0]}; replace it? [y/N] ", end="", file=sys.stderr, flush=True)
+        if sys.stdin.readline().strip().lower() in ("y", "yes"):
+            return
+    raise ShadowPuppetError(f"{said}, or another folder (-o)")
 
 
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -185,7 +186,7 @@ class _Notes:
 
     def _existing(self, key: str, value: object) -> Path:
         path = self.folder / value if isinstance(value, str) else None
-        if path is None or not path.exists():
+        if path is None or not os.path.exists(path):  # unlike that of `Path`, false for an impossible name
             raise RecordingError(f"{self.path}: {key}: found {value!r}, expected the path of an existing file, from this folder")
         return path
 

@@ -193,6 +193,7 @@ class _Live:
 
     def _write_beside(self) -> None:
         """Write person.toml and calibration.toml; called again whenever the person was measured again."""
+        self.run_.begin()
         write_person(self.run_.folder / "person.toml", self._person.person)
         write_calibration(self.run_.folder / "calibration.toml", self.session.cameras)
 

@@ -37,7 +37,8 @@ from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
-from shadowpuppet.tracking.unexplained import left_out, look_beside, looks_in
+from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
@@ -71,6 +72,7 @@ class MonocularSubject(TrackedSubject):
     fit: SizeFit
     """Sizes and place, and how they were found."""
     tracker: MonocularTracker
+    state_types = (State, Particles, Unexplained, Before)
 
     @classmethod
     def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str, rate: float) -> MonocularSubject:

@@ -33,6 +33,7 @@ from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
 from shadowpuppet.video import Image
 
@@ -53,6 +54,7 @@ class MultiviewSubject(TrackedSubject):
 
     tracker: MultiviewTracker
     hull: VisualHull
+    state_types = (MultiviewState, Particles, Unexplained, Before)
 
     def observe(self, masks: Sequence[Mask | None]) -> HullObservation:
         """Surface points of the visual hull of the masks, and the masks."""

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -71,6 +71,9 @@ class TrackedSubject(ABC):
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
+
+    state_types: ClassVar[tuple[type, ...]]
+    """The named tuples in the tracker's state and in what the doubt about the next frame needs."""
 
     @abstractmethod
     def observe(self, masks: Sequence[Mask | None]) -> Any:

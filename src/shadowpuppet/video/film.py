@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, reason
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, reason
 from shadowpuppet.threads import thread_limit
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
@@ -119,6 +119,7 @@ def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     import av.error
 
     try:
+        check_regular(path)
         # "file:" and the white list: a name with a colon is no protocol, and a play list cannot open other files or addresses.
         container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (OSError, av.error.FFmpegError) as error:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, choices, reason
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, choices, reason
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
@@ -24,6 +24,7 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
     import cv2
 
     try:
+        check_regular(Path(path))
         data = np.frombuffer(Path(path).read_bytes(), np.uint8)  # cv2.imread cannot open every name on every system
         image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) if data.size else None
     except OSError as error:

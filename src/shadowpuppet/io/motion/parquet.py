@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular
+from shadowpuppet.io.files.npz import most_unpacked
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.motion.table import Columns, column_joints, joint_columns
@@ -45,6 +46,7 @@ def read_parquet(path: str | Path) -> JointTable:
     path = Path(path)
     arrow, parquet = _arrow(path)
     try:
+        check_regular(path)
         with path.open("rb") as file:
             source = parquet.ParquetFile(file)
             columns = tuple(source.schema_arrow.names)
@@ -52,6 +54,9 @@ def read_parquet(path: str | Path) -> JointTable:
                 raise FormatError(f"{path}: no column 'time'; columns there: {shorten(columns)}")
             names = column_joints(path, columns)
             wanted = ["time", *joint_columns(names)]
+            if source.metadata.num_rows * len(wanted) * 8 > most_unpacked(path):
+                raise FormatError(f"{path}: found {source.metadata.num_rows} rows of {len(wanted)} columns, expected at most "
+                                  f"{most_unpacked(path)} bytes of them in a file of this size")
             table = source.read(wanted)
             values = np.stack([table.column(name).cast(arrow.float64()).to_numpy() for name in wanted], 1)
     except FormatError:

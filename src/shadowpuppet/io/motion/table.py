@@ -40,7 +40,8 @@ def column_joints(path: Path, columns: Sequence[str]) -> tuple[str, ...]:
     """The joints to which columns belong, in order. Raises `FormatError` if there is none, or one lacks a column."""
     stems = list(dict.fromkeys(column[:-2] for column in columns if column.endswith(AXES)))
     names = tuple(stem for stem in stems if not stem.endswith(SD))
-    missing = [column for column in joint_columns(names) if column not in columns]
+    known = set(columns)
+    missing = [column for column in joint_columns(names) if column not in known]
     if missing:
         raise FormatError(f"{path}: no column {missing[0]!r}, expected _x, _y and _z of every joint")
     if not names:
