@@ -113,6 +113,22 @@ def test_units_of_bvh(shell, whole, tmp_path):
     assert 80 < hips[:, 0, 1].mean() < 110
 
 
+def test_units_and_gaps_of_trc(shell, run, tmp_path):
+    motion = read_run(run).motion
+    known = np.delete(np.arange(len(motion)), LOST)
+    for unit, missing in (("mm", "nan"), ("m", "drop"), ("cm", "fill")):
+        assert shell("export", run, "--to", "trc", "--unit", unit, "--missing", missing, "-o", tmp_path)[0] == 0
+        text = (tmp_path / "walk.trc").read_text()
+        assert f"\t{unit}\t" in text
+        assert ("NaN" in text) == (missing == "nan")
+        found = read_joints(tmp_path / "walk.trc")
+        assert len(found.times) == len(known if missing == "drop" else motion)
+        np.testing.assert_allclose(found.positions[slice(None) if missing == "drop" else known] @ Y_UP, motion.joints[known], atol=1e-6)
+    assert "Hip" in found.names or "pelvis" not in motion.joint_names
+    assert shell("convert", tmp_path / "walk.trc", tmp_path / "other.trc", "--unit", "m")[0] == 0
+    assert "\tm\t" in (tmp_path / "other.trc").read_text()
+
+
 def test_limbs_that_are_not_vouched_for_keep_their_places_and_have_the_greatest_residual(shell, tmp_path):
     doubtful = {2: {"left_arm": "uncertain"}, 3: {"right_leg": "predicted", "trunk": "uncertain"}}
     folder = runs.make_run(tmp_path / "walk", "anatomical", frames=6, lost=(5,), spread=True, doubtful=doubtful)

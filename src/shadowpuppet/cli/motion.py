@@ -58,13 +58,16 @@ def fit_prior(motions: Annotated[list[Path], Parameter(help=f"Files of motion: {
 def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made.")], /, *,
            to: Annotated[str, Parameter(help=f"Formats, separated by commas: {choices(EXPORTS)}; or all.")] = "bvh,c3d,trc,mot,csv,glb,npz",
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
-           unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
+           unit: Literal["m", "cm", "mm"] | None = None, missing: Literal["nan", "drop", "fill"] = "nan",
+           quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
 
     Parameters
     ----------
     unit
-        Unit of BVH files, which do not state it; Blender expects m.
+        Unit of lengths in .bvh and .trc files. BVH files do not state it; Blender expects m. [default: m in BVH, mm in TRC]
+    missing
+        Unknown positions in .trc files: the text NaN, no frame that has one, or positions filled in between known frames.
     """
     from importlib.util import find_spec
 
@@ -77,7 +80,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
             names.remove("parquet")
             listener.warn("parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
         listener.begin("exporting")
-        written = export_run(run, names, folder, unit)
+        written = export_run(run, names, folder, unit, missing)
     if not quiet:
         show(pairs([("made", "\n".join(map(str, written)))]))
 
@@ -85,7 +88,8 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
 def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(READABLE)}; .amc with its .asf beside it.")],
             target: Annotated[Path, Parameter(help=f"File to be written: {choices(f'.{name}' for name in EXPORTS)}.")], /, *,
             all: Switch = False, rate: float | None = None, source_unit: Literal["m", "cm", "mm", "in"] | None = None,
-            unit: Literal["m", "cm", "mm"] = "m", quiet: Quiet = False) -> None:  # fmt: skip
+            unit: Literal["m", "cm", "mm"] | None = None, missing: Literal["nan", "drop", "fill"] = "nan",
+            quiet: Quiet = False) -> None:  # fmt: skip
     """Convert a file of motion into another format: joints in metres, Z up, or as the other format requires.
 
     A skeleton (.bvh, .amc) stays one in .bvh and .glb; a body is fitted to joints alone if the target needs one.
@@ -99,7 +103,9 @@ def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(RE
     source_unit
         Unit of a .bvh file to be read. [default: found from the length of the legs]
     unit
-        Unit of a .bvh file to be written.
+        Unit of a .bvh or .trc file to be written. [default: m in BVH, mm in TRC]
+    missing
+        Unknown positions in a .trc file to be written: the text NaN, no frame that has one, or positions filled in between known frames.
     """
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import BVH_UNITS, convert_motion
@@ -108,7 +114,8 @@ def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(RE
         raise SettingsError(f"flags: rate: found {rate}, expected frames a second, more than 0")
     with terminal(quiet) as listener:
         listener.begin("converting")
-        content = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and BVH_UNITS[source_unit], target_unit=unit)
+        content = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and BVH_UNITS[source_unit], target_unit=unit,
+                                 missing=missing)
     if not quiet:
         show(pairs([("made", str(target)), ("of", content)]))
 

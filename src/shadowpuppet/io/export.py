@@ -26,7 +26,7 @@ from shadowpuppet.io.motion.parquet import write_parquet
 from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETON_ENDINGS
 from shadowpuppet.io.motion.skeletons import read_animation
 from shadowpuppet.io.motion.table import dof_unit, motion_columns, table_columns, write_columns, write_joints
-from shadowpuppet.io.motion.trc import METRES, write_trc
+from shadowpuppet.io.motion.trc import METRES, MISSING, write_trc
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.animation import Animation
@@ -42,7 +42,26 @@ BVH_UNITS = {**METRES, "in": 0.0254}
 """Units of length that a BVH file may have, in metres."""
 
 
-def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str = "m") -> list[Path]:
+class Layout(NamedTuple):
+    """Choices of the user that some formats have."""
+
+    unit: str | None = None
+    """Unit of length of BVH and TRC files; None for the format's own."""
+    missing: str = "nan"
+    """What TRC files have for unknown positions, of `MISSING`."""
+
+    @classmethod
+    def checked(cls, unit: str | None, missing: str) -> Layout:
+        """A layout. Raises `SettingsError` if a choice is unknown."""
+        if unit is not None and unit not in METRES:
+            raise SettingsError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
+        if missing not in MISSING:
+            raise SettingsError(f"missing: found {missing!r}, expected one of {choices(MISSING)}")
+        return cls(unit, missing)
+
+
+def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str | None = None,
+               missing: str = "nan") -> list[Path]:
     """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths.
 
     A killed run is exported up to its last frame. Warns of data that a format cannot hold. Raises a `ShadowPuppetError` for an
@@ -53,14 +72,14 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
         folder: the run.
         formats: names of `EXPORTS`.
         out: folder of the files (default: export/ in the run's).
-        unit: of BVH files: m, cm or mm.
+        unit: of BVH and TRC files: m, cm or mm (default: m in BVH, mm in TRC).
+        missing: what TRC files have for unknown positions: nan, drop or fill, as in `write_trc`.
     """
     unknown = [name for name in formats if name not in EXPORTS]
     if unknown or not formats:
         raise SettingsError(f"formats: found {unknown[0] if unknown else 'none'!r}, expected some of {choices(EXPORTS)}")
-    if unit not in METRES:
-        raise SettingsError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
-    export = _RunExport(read_run(folder), unit)
+    layout = Layout.checked(unit, missing)
+    export = _RunExport(read_run(folder), layout)
     if not np.isfinite(export.run.motion.joints).all(2).any():
         raise ShadowPuppetError(f"{folder}: found no frame with a known joint, expected one at least")
     target = _made(Path(folder) / "export" if out is None else Path(out))
@@ -72,7 +91,7 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
 
 
 def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = False, rate: float | None = None, unit: float | None = None,
-                   target_unit: str = "m") -> str:
+                   target_unit: str | None = None, missing: str = "nan") -> str:
     """Convert a motion file (ending in `READABLE`) to another format (ending in `EXPORTS`); returns a summary of what was written.
 
     Skeletons of .bvh and .amc files are kept in .bvh and .glb files. Otherwise, if the target holds a skeleton, the poses of a whole body
@@ -85,8 +104,10 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
         own_names: keep all points under the file's names; else keep only our joints.
         rate: frames/s of an .amc file.
         unit: metres of a .bvh source's unit, if known.
-        target_unit: of a .bvh target: m, cm or mm.
+        target_unit: of a .bvh or .trc target: m, cm or mm (default: m in BVH, mm in TRC).
+        missing: what a .trc target has for unknown positions: nan, drop or fill, as in `write_trc`.
     """
+    layout = Layout.checked(target_unit, missing)
     source, target = Path(source), Path(target)
     kind = target.suffix.lower()
     if kind[1:] not in EXPORTS or not kind:
@@ -100,22 +121,22 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
     written = FORMATS[kind[1:]]
     if written.any_skeleton and source.suffix.lower() in SKELETON_ENDINGS:
         animation = read_animation(source, rate, unit)
-        written.write_skeleton(target, animation, bone_mesh(animation), target_unit)
+        written.write_skeleton(target, animation, bone_mesh(animation), layout)
         return f"a skeleton of {len(animation.names)} joints, {len(animation.times)} frames"
     table = read_motion(source, rate, own_names, unit)
     if written.joints is not None:
-        written.joints(target, table)
+        written.joints(target, table, layout)
         return f"{len(table.names)} joints, {len(table.times)} frames"
-    return _fitted(source, target, table, written, target_unit)
+    return _fitted(source, target, table, written, layout)
 
 
-def _fitted(source: Path, target: Path, table: JointTable, written: Format, unit: str) -> str:
+def _fitted(source: Path, target: Path, table: JointTable, written: Format, layout: Layout) -> str:
     """Fit a body's poses to joints and write them; returns a summary."""
     try:
         fit = fit_poses(table, source=str(source))
     except ShadowPuppetError as error:
         raise ShadowPuppetError(f"{target}: needs a skeleton, and none can be fitted: {error}") from None
-    written.write_skeleton(target, BodyTree(fit.body).animation(fit.times, fit.poses, np.eye(4)), body_mesh(fit.body), unit)
+    written.write_skeleton(target, BodyTree(fit.body).animation(fit.times, fit.poses, np.eye(4)), body_mesh(fit.body), layout)
     off = f"{1000 * fit.residual:.1f} mm beside them (rms)"
     return f"a body's poses fitted to {len(table.names)} joints, {len(table.times)} frames, {off}"
 
@@ -125,7 +146,7 @@ class _RunExport:
     """A run, and the data that formats need, each computed on first use."""
 
     run: Run
-    unit: str
+    layout: Layout
 
     @cached_property
     def body(self) -> Body:
@@ -187,9 +208,9 @@ class Format(NamedTuple):
     """The writers of a format: of a run, of joints alone, or of a skeleton; None if there is none."""
 
     run: Callable[[_RunExport, Path], None] | None = None
-    joints: Callable[[Path, JointTable], None] | None = None
-    skeleton: Callable[[Path, Animation, Mesh, str], None] | None = None
-    """Writes an animated skeleton with its mesh; the last argument is the unit of length."""
+    joints: Callable[[Path, JointTable, Layout], None] | None = None
+    skeleton: Callable[[Path, Animation, Mesh, Layout], None] | None = None
+    """Writes an animated skeleton with its mesh."""
     any_skeleton: bool = False
     """Whether `skeleton` accepts any joint names, not only those of our bodies."""
 
@@ -198,30 +219,31 @@ class Format(NamedTuple):
         if self.run is not None:
             self.run(export, path)
         else:
-            self.write_skeleton(path, export.animation, body_mesh(export.body), export.unit)
+            self.write_skeleton(path, export.animation, body_mesh(export.body), export.layout)
 
-    def write_skeleton(self, path: Path, animation: Animation, mesh: Mesh, unit: str) -> None:
+    def write_skeleton(self, path: Path, animation: Animation, mesh: Mesh, layout: Layout) -> None:
         """Write an animated skeleton."""
         assert self.skeleton is not None
-        self.skeleton(path, animation, mesh, unit)
+        self.skeleton(path, animation, mesh, layout)
 
 
-def _write_markers(path: Path, table: JointTable) -> None:
-    write_trc(path, marker_names(table))
+def _write_markers(path: Path, table: JointTable, layout: Layout) -> None:
+    write_trc(path, marker_names(table), layout.unit or "mm", layout.missing)
 
 
 FORMATS = {
     "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing),
-                  write_c3d),
-    "trc": Format(lambda export, path: _write_markers(path, export.run.motion.table), _write_markers),
-    "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)), write_joints),
-    "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), write_npz),
-    "bvh": Format(skeleton=lambda path, animation, mesh, unit: write_bvh(path, animation, unit), any_skeleton=True),
+                  lambda path, table, layout: write_c3d(path, table)),
+    "trc": Format(lambda export, path: _write_markers(path, export.run.motion.table, export.layout), _write_markers),
+    "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)),
+                  lambda path, table, layout: write_joints(path, table)),
+    "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), lambda path, table, layout: write_npz(path, table)),
+    "bvh": Format(skeleton=lambda path, animation, mesh, layout: write_bvh(path, animation, layout.unit or "m"), any_skeleton=True),
     "glb": Format(lambda export, path: write_glb(path, export.animation, body_mesh(export.body), export.smoothing),
-                  skeleton=lambda path, animation, mesh, unit: write_glb(path, animation, mesh), any_skeleton=True),
+                  skeleton=lambda path, animation, mesh, layout: write_glb(path, animation, mesh), any_skeleton=True),
     "mot": Format(lambda export, path: write_mot(path, export.animation.times, coordinates(export.animation), export.smoothing),
-                  skeleton=lambda path, animation, mesh, unit: write_mot(path, animation.times, coordinates(animation))),
+                  skeleton=lambda path, animation, mesh, layout: write_mot(path, animation.times, coordinates(animation))),
     "parquet": Format(lambda export, path: write_parquet(path, motion_columns(export.run.motion), export.smoothing),
-                      lambda path, table: write_parquet(path, table_columns(table))),
+                      lambda path, table, layout: write_parquet(path, table_columns(table))),
 }
 """The writers of each of `EXPORTS`."""

@@ -32,6 +32,9 @@ def read(tmp_path, text: str) -> JointTable:
     TEXT.replace("\n", "\r\n"),
     TEXT.replace("PathFileType\t4\t", "PathFileType  4  "),
     TEXT.replace("DataRate\tCameraRate\t", "DataRate\t\tCameraRate\t").replace("\tUnits", "\t\tUnits"),
+    TEXT.replace("4\t(X/Y/Z)\ttruth.trc", "4\t(X/Y/Z) C:\\My files\\truth.trc").replace("60\t60\t2\t2", "  60.0\t  60.0\t   2\t   2"),
+    TEXT.replace("DataRate\tCameraRate\tNumFrames", "DataRate CameraRate NumFrames").replace("60\t60\t2", "60 60 2"),
+    TEXT.replace("neck\t\t\tleft_hand", "neck\t\t\t\tleft_hand").replace("\t20\t30", "\t20\t\t30"),
     TEXT.replace("Z2\n\n", "Z2\n"),
     TEXT.replace("\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n", ""),
     TEXT.replace("left_hand\t\t\n", "left_hand\n").replace("1e3\n", "1e3\t\n"),
@@ -61,7 +64,35 @@ def test_what_is_written_has_the_layout(tmp_path):
     assert lines[3] == expected[3]
     assert lines[4:6] == expected[4:6]
     assert lines[6] == "1\t0.000000\t10.000\t20.000\t30.000\t-1500.000\t0.000\t1000.000"
-    assert lines[7].split("\t")[5:] == ["", "", "", ""]  # one more, without which OpenSim misses the last
+    assert lines[7].split("\t")[5:] == ["NaN", "NaN", "NaN"]
+
+
+def test_no_cell_is_empty_and_other_readers_keep_their_columns(tmp_path):
+    lost = JointTable(np.array([0.0, 0.5, 1.0]), TABLE.names, np.concatenate([PLACES, np.full((1, 2, 3), np.nan)]))
+    write_trc(tmp_path / "a.trc", lost)
+    rows = (tmp_path / "a.trc").read_text().splitlines()[6:]
+    assert [len(row.split()) for row in rows] == [8, 8, 8]
+    found = np.loadtxt(tmp_path / "a.trc", skiprows=6)
+    np.testing.assert_allclose(found[:, 2:], 1000 * lost.positions.reshape(3, 6), atol=1e-3)
+    np.testing.assert_allclose(read_trc(tmp_path / "a.trc").positions, lost.positions, atol=1e-6)
+
+
+def test_gaps_are_dropped_or_filled_where_that_is_asked(tmp_path):
+    places = np.arange(5.0)[:, None, None] * np.ones((5, 3, 3))
+    places[[0, 2], 0] = places[4, 1] = places[:, 2] = np.nan
+    table = JointTable(np.arange(5) / 10, ("a", "b", "never"), places)
+    write_trc(tmp_path / "a.trc", table, "m", "drop")
+    found = read_trc(tmp_path / "a.trc")
+    assert (found.names, found.times.tolist()) == (("a", "b"), [0.1, 0.3])
+    np.testing.assert_allclose(found.positions, places[[1, 3], :2])
+    write_trc(tmp_path / "a.trc", table, "m", "fill")
+    found = read_trc(tmp_path / "a.trc")
+    np.testing.assert_allclose(found.positions[..., 0].T, [[1, 1, 2, 3, 4], [0, 1, 2, 3, 3]])
+    for missing in ("drop", "fill"):
+        with pytest.raises(ShadowPuppetError, match=r"b\.trc: found no frame in which all"):
+            write_trc(tmp_path / "b.trc", JointTable(table.times, ("never",), places[:, 2:]), missing=missing)
+    with pytest.raises(ShadowPuppetError, match="missing: found 'none', expected one of drop, fill, nan"):
+        write_trc(tmp_path / "b.trc", table, missing="none")
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [

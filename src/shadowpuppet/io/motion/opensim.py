@@ -24,12 +24,13 @@ from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.motion import JointTable
 
 MARKERS = {
-    "pelvis": "CHip", "neck": "Neck", "head": "HeadBase",
+    "pelvis": "Hip", "neck": "Neck", "head": "HeadBase", "crown": "Head", "nose": "Nose",
     **{f"{side}_{joint}": f"{side[0].upper()}{name}" for side in ("left", "right") for joint, name in (
         ("shoulder", "Shoulder"), ("elbow", "Elbow"), ("wrist", "Wrist"), ("hand", "Middle1"), ("hip", "Hip"), ("knee", "Knee"),
-        ("ankle", "Ankle"))},
+        ("ankle", "Ankle"), ("heel", "Heel"), ("toe", "BigToe"))},
 }  # fmt: skip
-"""Marker names of our joints. `Head` is the crown there, so the base of the skull has another name."""
+"""Marker names of our joints: those of HALPE_26, Pose2Sim's default. `Head` is the crown there, so the base of the skull has another name;
+hands have the name of Pose2Sim's COCO_133_WRIST."""
 TRANSLATIONS = ("_tx", "_ty", "_tz")
 """Endings of coordinates in metres; all others are angles."""
 MAX_HEADER = 100
