@@ -22,6 +22,7 @@ from shadowpuppet.io.files.table import read_table
 from shadowpuppet.io.motion import EXPORTS
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.c3d import read_c3d, read_header
+from shadowpuppet.io.motion.c3d_writer import write_c3d
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import read_motion_npz
 from shadowpuppet.io.motion.opensim import read_mot
@@ -29,6 +30,7 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Y_UP
 from shadowpuppet.motion.limbs import limb_of
+from shadowpuppet.motion.motion import JointTable
 
 LOST = (0, 6, 7)
 
@@ -229,6 +231,20 @@ def test_all_keeps_every_point_under_its_own_name(shell, tmp_path):
     found = read_c3d(tmp_path / "all.c3d")
     assert found.names == tuple(read_bvh(tmp_path / "a.bvh").joints().names)
     np.testing.assert_allclose(found.select(["LeftForeArm"]).positions, read_c3d(tmp_path / "ours.c3d").select(["left_elbow"]).positions)
+
+
+def test_markers_of_unknown_names_come_back_as_they_went(shell, tmp_path, rng):
+    markers = JointTable(4 + np.arange(5) / 50, ("M001", "Fühler"), rng.uniform(-2, 2, (5, 2, 3)))
+    write_c3d(tmp_path / "a.c3d", markers, angles={"Fx1": ("N", np.ones(5)), "Fy1": ("N", np.ones(5))})
+    code, _, err = shell("convert", "a.c3d", "b.trc", "--all")
+    assert (code, "a.c3d: its 2 analog channels (Fx1, Fy1) are left out" in err) == (0, True)
+    code, _, err = shell("convert", "b.trc", "c.c3d", "--all")
+    assert (code, "b.trc: found no legs and head of known names that show which axis is up: Y is taken" in err) == (0, True)
+    found = read_c3d(tmp_path / "c.c3d")
+    assert found.names == markers.names
+    np.testing.assert_allclose(found.times, markers.times)
+    np.testing.assert_allclose(found.positions, markers.positions, atol=2e-6)
+    assert shell("convert", "c.c3d", "d.csv", "--all")[2] == ""
 
 
 def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):

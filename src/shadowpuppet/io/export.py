@@ -15,8 +15,10 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices, reason
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.io.motion.bvh_writer import write_bvh
+from shadowpuppet.io.motion.c3d import read_header
 from shadowpuppet.io.motion.c3d_writer import MAX_RESIDUAL, MM, write_c3d
 from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.io.motion.motion_files import read_motion
@@ -124,10 +126,19 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
         written.write_skeleton(target, animation, bone_mesh(animation), layout)
         return f"a skeleton of {len(animation.names)} joints, {len(animation.times)} frames"
     table = read_motion(source, rate, own_names, unit)
+    _warn_of_channels(source)
     if written.joints is not None:
         written.joints(target, table, layout)
         return f"{len(table.names)} joints, {len(table.times)} frames"
     return _fitted(source, target, table, written, layout)
+
+
+def _warn_of_channels(source: Path) -> None:
+    """Warn of the analog channels of a .c3d file, which are not converted."""
+    channels = read_header(source).channels if source.suffix.lower() == ".c3d" else []
+    if channels:
+        warn(f"{source}: its {len(channels)} analog channels ({shorten(channels, 60)}) are left out: only points are converted",
+             ShadowPuppetWarning, stacklevel=3)  # fmt: skip
 
 
 def _fitted(source: Path, target: Path, table: JointTable, written: Format, layout: Layout) -> str:

@@ -81,6 +81,34 @@ def test_ezc3d_finds_the_same(tmp_path, rng):
     np.testing.assert_allclose(found["data"]["analogs"][0, 0], bends, rtol=1e-6)
 
 
+def test_without_angles_nothing_is_said_of_analog_channels(tmp_path, rng):
+    ezc3d = pytest.importorskip("ezc3d")
+    made = table(rng)
+    write_c3d(tmp_path / "a.c3d", made)
+    assert "ANALOG:RATE" not in read_header(tmp_path / "a.c3d").parameters
+    reader, frames = theirs(tmp_path / "a.c3d")
+    assert reader.analog_used == 0
+    np.testing.assert_allclose(np.stack([frame[1][:, :3] for frame in frames]) / 1000, made.positions, atol=1e-6)
+    found = ezc3d.c3d(str(tmp_path / "a.c3d"))
+    np.testing.assert_allclose(found["data"]["points"][:3].transpose(2, 1, 0) / 1000, made.positions, atol=1e-6)
+
+
+@pytest.mark.parametrize("start", [0.0, 4.5, 9000.0])  # the last has a frame number of more than 16 bits
+def test_the_start_time_is_the_number_of_the_first_frame(tmp_path, rng, start):
+    ezc3d = pytest.importorskip("ezc3d")
+    made = table(rng)
+    made = JointTable(start + made.times, made.names, made.positions)
+    write_c3d(tmp_path / "a.c3d", made)
+    np.testing.assert_allclose(read_c3d(tmp_path / "a.c3d").times, made.times, rtol=1e-6, atol=1e-6)
+    if start < 2000:  # theirs multiplies the upper 16 bits by 65535
+        reader, frames = theirs(tmp_path / "a.c3d")
+        assert (len(frames), reader.first_frame) == (20, 1 + round(30 * start))
+    found = ezc3d.c3d(str(tmp_path / "a.c3d"))
+    assert found["data"]["points"].shape == (4, 3, 20)
+    with pytest.raises(ShadowPuppetError, match=r"b\.c3d: found 20 frames from 1e\+09 s on"):
+        write_c3d(tmp_path / "b.c3d", JointTable(1e9 + table(rng).times, made.names, made.positions))
+
+
 def test_long_motions_have_more_frames_than_16_bits_tell(tmp_path, rng):
     made = table(rng, 70_000, ("neck",), 100.0)
     write_c3d(tmp_path / "long.c3d", made)
@@ -108,7 +136,8 @@ def test_missing_frames_are_unknown_and_odd_times_found_anew(tmp_path, rng):
     with pytest.warns(ShadowPuppetWarning, match=r"b\.c3d: the frames do not come at a constant rate"):
         write_c3d(tmp_path / "b.c3d", JointTable(odd, ("neck",), line))
     found = read_c3d(tmp_path / "b.c3d")
-    np.testing.assert_allclose(found.positions[:-1, 0, 0], odd[0] + found.times[:-1], atol=1e-5)
+    np.testing.assert_allclose(found.positions[:-1, 0, 0], odd[0] + found.times[:-1] - found.times[0], atol=1e-5)
+    assert abs(found.times[0] - odd[0]) < 0.5 * np.diff(found.times)[0]
 
 
 def test_what_cannot_be_written_is_said(tmp_path, rng):

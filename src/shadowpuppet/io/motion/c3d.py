@@ -47,6 +47,8 @@ class C3d:
     """Number of analog values per frame."""
     frames: int
     """Number of frames that are both stated and present."""
+    first: int
+    """Number of the first frame; frame 1 is at 0 s."""
     start: int
     """First byte of the data."""
     scale: float
@@ -54,6 +56,11 @@ class C3d:
     rate: float
     """Frames/s."""
     processor: int
+
+    @property
+    def channels(self) -> list[str]:
+        """Names of the analog channels; empty if the file has none."""
+        return self.words("ANALOG:LABELS")[: int(next(iter(self.numbers("ANALOG:USED")), 0))] or ["unnamed"] if self.analog else []
 
     def numbers(self, name: str) -> Array:
         """A parameter's numbers (n,); empty if it is missing or text."""
@@ -74,7 +81,7 @@ class C3d:
 
 
 def read_c3d(path: str | Path) -> JointTable:
-    """Named points of a C3D file in metres, in the file's axes, from 0 s; NaN if not measured.
+    """Named points of a C3D file in metres, in the file's axes; NaN if not measured. Frame 1 is at 0 s, and cut trials begin later.
 
     A point is not measured if its residual is negative, or its position is not finite or exactly the origin, as some programs write it.
     Raises `FormatError` if the file is malformed; warns if it breaks off or has no unit.
@@ -90,7 +97,7 @@ def read_c3d(path: str | Path) -> JointTable:
     positions *= _metres(header)
     positions[~measured | ~(np.abs(positions) < MAX_COORDINATE).all(2)] = np.nan
     with errors_named(path):
-        return JointTable(np.arange(len(positions)) / header.rate, tuple(names[n] for n in chosen), positions)
+        return JointTable((header.first - 1 + np.arange(len(positions))) / header.rate, tuple(names[n] for n in chosen), positions)
 
 
 def read_header(path: Path) -> C3d:
@@ -120,7 +127,7 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
     order = ">" if processor == MIPS else "<"
     points, analog, first, last = struct.unpack(f"{order}4H", head[2:10])
     block = struct.unpack(f"{order}H", head[16:18])[0]
-    known = C3d(path, parameters, points, analog, 0, 0, 0.0, 0.0, processor)
+    known = C3d(path, parameters, points, analog, 0, 1, 0, 0.0, 0.0, processor)
 
     def told(name: str, otherwise: float) -> float:
         values = known.numbers(name)
@@ -138,18 +145,23 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
         warn(f"{path}: found {there} frames, but it tells of {stated}; those are used", ShadowPuppetWarning, stacklevel=5)
     if not min(stated, there):
         raise FormatError(f"{path}: found no frame of {points} points from byte {start} on, expected a motion")
-    return C3d(path, parameters, points, analog, min(stated, there), start, scale, rate, processor)
+    begins = _fields(known, "START") or first
+    return C3d(path, parameters, points, analog, min(stated, there), max(begins, 1), start, scale, rate, processor)
 
 
 def _stated_frames(known: C3d, first: int, last: int) -> int:
     """Number of frames, by the most reliable entry: the header's 16 bits are too few for long files."""
-    ends = [known.numbers(f"TRIAL:ACTUAL_{end}_FIELD").astype(np.int64) & 0xFFFF for end in ("START", "END")]
-    if all(len(end) >= 2 for end in ends):
-        start, end = (int(each[0]) + 65536 * int(each[1]) for each in ends)
-        if end >= start > 0:
-            return end - start + 1
+    start, end = (_fields(known, end) for end in ("START", "END"))
+    if end >= start > 0:
+        return end - start + 1
     long = known.numbers("POINT:LONG_FRAMES")
     return int(long[0]) if len(long) and 0 < long[0] < 2**31 else max(last - first + 1, 0)
+
+
+def _fields(known: C3d, end: str) -> int:
+    """The number of the first (START) or last (END) frame by the parameters of the trial; 0 if they do not say."""
+    words = known.numbers(f"TRIAL:ACTUAL_{end}_FIELD").astype(np.int64) & 0xFFFF
+    return int(words[0]) + 65536 * int(words[1]) if len(words) >= 2 else 0
 
 
 def _points(header: C3d, chosen: list[int]) -> tuple[Array, NDArray[np.bool_]]:

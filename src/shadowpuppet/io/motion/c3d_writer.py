@@ -22,6 +22,8 @@ MM = 1000.0
 """Millimetres, the file's unit, per metre."""
 MAX_BLOCKS, MAX_NAMES, MAX_LETTERS = 255, 255, 120
 """The format's limits: blocks of parameters, names in a list, letters of a name."""
+MAX_FRAME = 2**31
+"""Greatest number of a frame."""
 MAX_RESIDUAL = 255
 """Greatest residual, millimetres: a byte in the format's integer files."""
 UNKNOWN_RESIDUAL = -1.0
@@ -36,8 +38,9 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
               smoothing: str = "") -> None:
     """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, one value per frame.
 
-    The file has a constant rate: missing frames become unknown; frames at a varying rate are resampled, with a warning. Raises
-    `ShadowPuppetError` if there is no frame, a name is too long, or the file cannot be written.
+    The file has a constant rate: missing frames become unknown; frames at a varying rate are resampled, with a warning. The first time is
+    kept as the number of the first frame, to the nearest one from 0 s. Raises `ShadowPuppetError` if there is no frame, a name is too long,
+    or the file cannot be written.
 
     Args:
         path: the file.
@@ -54,18 +57,20 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
     count, points = len(table.times), len(table.names)
     columns = [table.positions.reshape(count, 3 * points), deviations, *(values[:, None] for _, values in angles.values())]
     rate, columns = _at_constant_rate(path, table.times, np.concatenate(columns, 1))
-    count = len(columns)
+    count, first = len(columns), 1 + max(round(float(table.times[0]) * rate), 0)
+    if first + count > MAX_FRAME:
+        raise ShadowPuppetError(f"{path}: found {count} frames from {table.times[0]:g} s on, expected at most {MAX_FRAME} from 0 s on")
     places, deviations, analog = np.split(columns, [3 * points, 4 * points], 1)
     data = np.concatenate([_points(places.reshape(count, points, 3), deviations).reshape(count, -1), analog], 1).astype("<f4")
     blocks, section = 0, b""
     while True:  # the parameters state where the data begins, which depends on their length
-        section = _section(_groups(table.names, angles, rate, count, 2 + blocks, smoothing), blocks)
+        section = _section(_groups(table.names, angles, rate, (first, count), 2 + blocks, smoothing), blocks)
         if len(section) <= blocks * BYTES:
             break
         blocks = -(-len(section) // BYTES)
     if blocks > MAX_BLOCKS:
         raise ShadowPuppetError(f"{path}: found {points} points, whose names need more than this format holds ({MAX_BLOCKS} blocks)")
-    head = _header(points, len(angles), count, 2 + blocks, rate)
+    head = _header(points, len(angles), (first, count), 2 + blocks, rate)
     write_whole(path, head + section.ljust(blocks * BYTES, b"\0") + data.tobytes() + b"\0" * (-data.nbytes % BYTES))
 
 
@@ -89,25 +94,29 @@ def _points(places: Array, deviations: Array) -> Array:
     return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNKNOWN_RESIDUAL)[..., None]], 2)
 
 
-def _header(points: int, analog: int, count: int, start: int, rate: float) -> bytes:
-    last = min(count, 0xFFFF)
-    head = struct.pack("<2B5HfHHf", 2, KEY, points, analog, 1, last, 0, -1.0, start, 1 if analog else 0, rate)
+def _header(points: int, analog: int, frames: tuple[int, int], start: int, rate: float) -> bytes:
+    """The first block, for the number of the first frame and the count of `frames`; its 16 bits are too few for large numbers."""
+    first, count = frames
+    ends = (first, first + count - 1) if first + count - 1 <= 0xFFFF else (1, min(count, 0xFFFF))
+    head = struct.pack("<2B5HfHHf", 2, KEY, points, analog, *ends, 0, -1.0, start, 1 if analog else 0, rate)
     return head.ljust(BYTES, b"\0")
 
 
-def _groups(names: Sequence[str], angles: Angles, rate: float, count: int, start: int,
+def _groups(names: Sequence[str], angles: Angles, rate: float, frames: tuple[int, int], start: int,
             smoothing: str) -> dict[str, list[Parameter]]:
-    end = (count & 0xFFFF, count >> 16)
+    first, count = frames
+    ends = [struct.pack("<2H", number & 0xFFFF, number >> 16) for number in (first, first + count - 1)]
     point = [_whole("USED", len(names)), _whole("FRAMES", min(count, 0xFFFF)), _whole("DATA_START", start), _real("SCALE", -1.0),
              _real("RATE", rate), _real("LONG_FRAMES", count), *_words("LABELS", names), *_words("DESCRIPTIONS", [" "] * len(names)),
              _word("UNITS", "mm"), _word("X_SCREEN", "+X"), _word("Y_SCREEN", "+Z")]  # fmt: skip
     used = len(angles)
-    analog = [_whole("USED", used), _real("RATE", rate), _real("GEN_SCALE", 1.0), _word("FORMAT", "SIGNED"), _whole("BITS", 16)]
-    if used:
+    analog = [_whole("USED", used)]
+    if used:  # else no rate: readers refuse or divide by one without channels
+        analog += [_real("RATE", rate), _real("GEN_SCALE", 1.0), _word("FORMAT", "SIGNED"), _whole("BITS", 16)]
         units = [unit for unit, _ in angles.values()]
         analog += [*_words("LABELS", tuple(angles)), *_words("DESCRIPTIONS", [" "] * used), *_words("UNITS", units),
                    ("SCALE", FLOAT, (used,), np.ones(used, "<f4").tobytes()), ("OFFSET", INT, (used,), np.zeros(used, "<i2").tobytes())]
-    trial = [("ACTUAL_START_FIELD", INT, (2,), struct.pack("<2H", 1, 0)), ("ACTUAL_END_FIELD", INT, (2,), struct.pack("<2H", *end)),
+    trial = [("ACTUAL_START_FIELD", INT, (2,), ends[0]), ("ACTUAL_END_FIELD", INT, (2,), ends[1]),
              _real("CAMERA_RATE", rate)]
     done = {"PROCESSING": [_word("SMOOTHING", smoothing)]} if smoothing else {}
     return {"POINT": point, "ANALOG": analog, "TRIAL": trial, "MANUFACTURER": [_word("SOFTWARE", "shadowpuppet")], **done}

@@ -57,7 +57,8 @@ def read_motion(path: str | Path, rate: float | None = None, own_names: bool = F
         table = read_mocap(path).joints(rate or AMC_RATE)
         return table if own_names else _ours(path, table)
     table = read_bvh(path).joints() if ending == ".bvh" else READERS[ending](path)
-    scale, up = 1.0 if ending != ".bvh" else unit_of(path, table) if unit is None else unit, rotation_to_z_up(path, table)
+    scale = 1.0 if ending != ".bvh" else unit_of(path, table) if unit is None else unit
+    up = _markers_up(path, table) if ending == ".trc" and own_names else rotation_to_z_up(path, table)
     table = table if own_names else _ours(path, table)
     return replace(table, positions=table.positions * scale @ up.T)
 
@@ -152,10 +153,18 @@ def rotation_to_z_up(path: Path, table: JointTable) -> Array:
     return np.array(TO_Z_UP[axis], float)
 
 
+def _markers_up(path: Path, table: JointTable) -> Array:
+    """As `rotation_to_z_up`, for all markers of a .trc file: if no legs and head have known names, Y is up, as OpenSim requires."""
+    if np.isfinite(_upward(_known(table))).any():
+        return rotation_to_z_up(path, table)
+    warn(f"{path}: found no legs and head of known names that show which axis is up: Y is taken, as in OpenSim, and turned to Z",
+         ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+    return np.array(TO_Z_UP["+y"], float)
+
+
 def up_axis(table: JointTable) -> str:
     """The axis along which a person stands, for example `+y`; `+z` if none is clear."""
-    low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip", "pelvis"), ("neck", "head", "shoulder")))
-    up = high - low
+    up = _upward(table)
     lengths = np.linalg.norm(up, axis=1, keepdims=True)
     known = np.isfinite(lengths[:, 0]) & (lengths[:, 0] > 0)
     if not known.any():
@@ -163,6 +172,12 @@ def up_axis(table: JointTable) -> str:
     mean = (up[known] / lengths[known]).mean(0)
     n = int(np.abs(mean).argmax())
     return f"{'+' if mean[n] > 0 else '-'}{'xyz'[n]}" if abs(mean[n]) >= MIN_COSINE else "+z"
+
+
+def _upward(table: JointTable) -> Array:
+    """The way (T, 3) from the legs to the head; NaN if unknown."""
+    low, high = (_middle(table, joints) for joints in (("ankle", "knee", "hip", "pelvis"), ("neck", "head", "shoulder")))
+    return high - low
 
 
 def _middle(table: JointTable, joints: tuple[str, ...]) -> Array:
