@@ -124,6 +124,16 @@ def test_positions_of_other_joints_hold_the_offset_or_come_on_top(tmp_path, knee
     np.testing.assert_allclose(read(tmp_path, text).joints().positions[0, 1], place)
 
 
+@pytest.mark.parametrize("added", [True, False])
+def test_one_file_has_one_kind_of_positions(tmp_path, added):
+    """The wrist's offset is small and its movement large: alone it would be taken for the other kind."""
+    nodes = [("Hips", None, (0, 0, 0)), ("Knee", "Hips", (0, -40, 0)), ("Wrist", "Knee", (0, -1, 0))]
+    channels = {name: ["Xposition", "Yposition", "Zposition"] for name, _, _ in nodes}
+    row = [0, 0, 0, 0.5, 0.5, 0, 0, -0.9, 0.3] if added else [0, 0, 0, 0.5, -39.5, 0, 0, 0.2, 0.3]
+    found = read(tmp_path, bvh(nodes, channels, [row, row])).joints().select(["Knee", "Wrist"]).positions[0]
+    np.testing.assert_allclose(found, [[0.5, -39.5, 0], [0.5, -41.4, 0.3]] if added else [[0.5, -39.5, 0], [0.5, -39.3, 0.3]])
+
+
 def test_joints_of_one_name_are_told_apart(tmp_path):
     assert read(tmp_path, TEXT.replace("Knee", "Hips")).joints().names == ("Hips", "Hips#2", "Hips_end")
 

@@ -85,7 +85,7 @@ def test_a_skeleton_that_is_no_persons_keeps_its_bones_and_stands_in_the_file(tm
     np.testing.assert_allclose(dict(zip(animation.names, animation.rest))["trunk"], [0, 0.2, 0], atol=1e-12)  # Y up at rest
 
 
-def test_places_that_move_within_the_skeleton_stay(tmp_path):
+def test_places_that_move_within_the_skeleton_are_followed_by_turning_bones(tmp_path):
     nodes = [("Hips", None, (0, 0, 0)), ("LeftUpLeg", "Hips", (0, -5, 0)), ("LeftLeg", "LeftUpLeg", (0, -42, 0)),
              ("LeftFoot", "LeftLeg", (0, -41, 0)), ("Head", "Hips", (0, 60, 0))]  # fmt: skip
     channels = {name: ["Xposition", "Yposition", "Zposition", "Zrotation", "Xrotation", "Yrotation"] for name, *_ in nodes}
@@ -96,10 +96,11 @@ def test_places_that_move_within_the_skeleton_stay(tmp_path):
     with pytest.warns(ShadowPuppetWarning):
         animation = read_animation(tmp_path / "a.bvh")
     assert len(animation.moving) == 4
-    write_bvh(tmp_path / "b.bvh", animation)
+    with pytest.warns(ShadowPuppetWarning, match=r"b\.bvh: joints lie up to 3\.2 mm off, as bones keep their lengths"):
+        write_bvh(tmp_path / "b.bvh", animation)
     with pytest.warns(ShadowPuppetWarning):
         again = read_animation(tmp_path / "b.bvh")
-    np.testing.assert_allclose(again.table.positions, animation.table.positions, atol=2e-5)
+    np.testing.assert_allclose(again.table.select(animation.names).positions, animation.table.positions, atol=0.01)
 
 
 @pytest.mark.filterwarnings("ignore")

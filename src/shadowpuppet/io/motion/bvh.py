@@ -55,25 +55,24 @@ class Bvh:
     def joints(self) -> JointTable:
         """All joints and end sites in the file's unit and axes, times from 0. Raises `FormatError` for an impossible name."""
         places = np.empty((len(self.values), len(self.nodes), 3))
-        added = [self._is_added(n) for n in range(len(self.nodes))]
         block = max(BLOCK // len(self.nodes), 1)
         for start in range(0, len(self.values), block):
-            places[start : start + block] = self._placed(*self._local(self.values[start : start + block], added))
+            places[start : start + block] = self._placed(*self._local(self.values[start : start + block]))
         with errors_named(self.path):
             return JointTable(np.arange(len(places), dtype=float) * self.step, unique_names([node.name for node in self.nodes]), places)
 
     def local_transforms(self) -> tuple[Array, Array]:
         """Rotations (T, J, 3, 3) and positions (T, J, 3) of the nodes relative to their parents, in the file's unit and axes."""
-        return self._local(self.values, [self._is_added(n) for n in range(len(self.nodes))])
+        return self._local(self.values)
 
-    def _local(self, values: Array, added: list[bool]) -> tuple[Array, Array]:
-        """As `local_transforms`, for channel values (T, C); `added`: `_is_added` of each node."""
+    def _local(self, values: Array) -> tuple[Array, Array]:
+        """As `local_transforms`, for channel values (T, C)."""
         turns, shifts = np.empty((len(values), len(self.nodes), 3, 3)), np.empty((len(values), len(self.nodes), 3))
         for n, (node, columns) in enumerate(zip(self.nodes, self._columns)):
             own, shifts[:, n] = np.eye(3), node.offset
             for channel, column in zip(node.channels, columns):
                 if channel < 3:
-                    shifts[:, n, channel] = values[:, column] + (node.offset[channel] if added[n] else 0.0)
+                    shifts[:, n, channel] = values[:, column] + (node.offset[channel] if n == 0 or self._added else 0.0)
                 else:
                     own = own @ rotation_about(np.eye(3)[channel - 3], np.radians(values[:, column]))
             turns[:, n] = own
@@ -93,17 +92,20 @@ class Bvh:
         ends = np.cumsum([len(node.channels) for node in self.nodes]).tolist()
         return [list(range(end - len(node.channels), end)) for node, end in zip(self.nodes, ends)]
 
-    def _is_added(self, n: int) -> bool:
-        """Whether a node's position channels are added to its offset, rather than replace it.
+    @cached_property
+    def _added(self) -> bool:
+        """Whether position channels are added to the offsets, rather than replace them, in all joints but the root.
 
         They are for the root, by the format's first description. For other joints programs differ: most write the whole position, which is
-        recognised by values near the offset.
+        recognised by values that are near the offsets in all joints together. One joint does not show it: its offset may be small, or its
+        movement large.
         """
-        node, columns = self.nodes[n], self._columns[n]
-        shifts = [(node.offset[channel], self.values[:, column]) for channel, column in zip(node.channels, columns) if channel < 3]
-        if node.parent < 0 or not shifts:
-            return True
-        whole, zero = (sum(abs(float(np.median(values)) - share * offset) for offset, values in shifts) for share in (1.0, 0.0))
+        whole, zero = 0.0, 0.0
+        for node, columns in zip(self.nodes[1:], self._columns[1:]):
+            for channel, column in zip(node.channels, columns):
+                if channel < 3:
+                    median = float(np.median(self.values[:, column]))
+                    whole, zero = whole + abs(median - node.offset[channel]), zero + abs(median)
         return zero < whole
 
 

@@ -15,6 +15,7 @@ from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.constant_bones import STILL, constant_bones
 from shadowpuppet.motion.interpolation import uniform_sampling
 
 POSITIONS = "Xposition Yposition Zposition"
@@ -26,9 +27,10 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     """Write an animated skeleton: constant offsets, Euler angles in degrees, Y up.
 
     The format has neither gaps nor times: unknown frames are interpolated, and frames at a varying rate are resampled, each with a
-    warning. A joint rotates about Z, X, Y if these stay away from their singularity, else in another order; it has position channels only
-    if its position changes. `unit`: m (as Blender expects), cm or mm. Raises `ShadowPuppetError` if no frame is known or the file cannot
-    be written.
+    warning. All joints rotate in one order: about Z, X, Y if these stay away from their singularity, else the order that stays farthest
+    from it. Only the root has position channels: other joints that move hang on joints of their own, see `constant_bones`. Many readers
+    take the first joint's channels for all, and ignore or refuse positions below the root. `unit`: m (as Blender expects), cm or mm. Raises
+    `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
     path = Path(path)
     if unit not in METRES:
@@ -37,10 +39,15 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     if bad:
         raise ShadowPuppetError(f"{path}: joint name: found {shorten(bad[:1])!r}, expected one without blanks and braces")
     rate, animation = at_constant_rate(path, animation)
-    order = _depth_first(animation)
-    eulers = {n: _euler(animation, n) for n in order}
-    columns = [column for n in order for column in _columns(animation, n, eulers[n][1], METRES[unit])]
-    head = ["HIERARCHY", *_hierarchy(animation, eulers, 1 / METRES[unit]), "MOTION", f"Frames: {len(animation.times)}",
+    animation, off = constant_bones(animation)
+    if off > STILL:
+        warn(f"{path}: joints lie up to {1000 * off:.1f} mm off, as bones keep their lengths in this format", ShadowPuppetWarning,
+             stacklevel=2)
+    turns = animation.rotations.copy()
+    turns[:, 0] = Y_UP @ turns[:, 0]
+    order, axes = _depth_first(animation), clear_order(turns.reshape(-1, 3, 3))
+    columns = [column for n in order for column in _columns(animation, n, continuous_angles(turns[:, n], axes), METRES[unit])]
+    head = ["HIERARCHY", *_hierarchy(animation, axes, 1 / METRES[unit]), "MOTION", f"Frames: {len(animation.times)}",
             f"Frame Time: {1 / rate:.10g}"]  # fmt: skip
     rows = (" ".join(f"{value + 0.0:.6f}" for value in row) for row in np.stack(columns, 1).round(6).tolist())
     write_whole(path, "\n".join([*head, *rows, ""]))
@@ -80,31 +87,20 @@ def _depth_first(animation: Animation) -> list[int]:
     return list(below(0))
 
 
-def _euler(animation: Animation, n: int) -> tuple[str, Array]:
-    """The order of a joint's rotations, and its angles (T, 3), rad."""
-    rotations = animation.rotations[:, n]
-    if animation.parents[n] < 0:
-        rotations = Y_UP @ rotations
-    order = clear_order(rotations)
-    return order, continuous_angles(rotations, order)
-
-
 def _columns(animation: Animation, n: int, angles: Array, metres: float) -> list[Array]:
     """The values of a joint's channels, each (T,)."""
-    shifts = animation.shifts[:, n] @ Y_UP.T if n == 0 else animation.shifts[:, n]
-    places = list((shifts / metres).T) if n == 0 or n in animation.moving else []
+    places = [] if n else list((animation.shifts[:, 0] @ Y_UP.T / metres).T)
     return [*places, *np.degrees(angles).T]
 
 
-def _hierarchy(animation: Animation, eulers: dict[int, tuple[str, Array]], scale: float) -> list[str]:
-    lines = list[str]()
+def _hierarchy(animation: Animation, axes: str, scale: float) -> list[str]:
+    lines, turns = list[str](), " ".join(f"{axis}rotation" for axis in axes)
 
     def add(n: int, depth: int) -> None:
-        pad, moves = "\t" * depth, n == 0 or n in animation.moving
-        turns = " ".join(f"{axis}rotation" for axis in eulers[n][0])
+        pad = "\t" * depth
         lines.extend([f"{pad}{'JOINT' if depth else 'ROOT'} {animation.names[n]}", f"{pad}{{",
                       f"{pad}\tOFFSET {_three(scale * (animation.offsets[n] if n else np.zeros(3)))}",
-                      f"{pad}\tCHANNELS {'6 ' + POSITIONS if moves else '3'} {turns}"])  # fmt: skip
+                      f"{pad}\tCHANNELS {'3' if n else '6 ' + POSITIONS} {turns}"])  # fmt: skip
         children = [child for child, parent in enumerate(animation.parents) if parent == n]
         for child in children:
             add(child, depth + 1)

@@ -6,6 +6,7 @@ from pathlib import Path
 from warnings import warn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
 from shadowpuppet.io.files.table import cells, check_times, number, shorten
@@ -80,7 +81,7 @@ def _without_gaps(path: Path, table: JointTable, missing: str) -> JointTable:
     """The table as `write_trc` writes it for `missing`. Raises `ShadowPuppetError` if no frame or joint is left."""
     if missing not in MISSING:
         raise ShadowPuppetError(f"missing: found {missing!r}, expected one of {choices(MISSING)}")
-    known = np.isfinite(table.positions).all(2)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(table.positions).all(2))
     if missing == "nan" or known.all():
         return table
     seen = np.flatnonzero(known.any(0))
