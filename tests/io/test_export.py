@@ -233,6 +233,23 @@ def test_all_keeps_every_point_under_its_own_name(shell, tmp_path):
     np.testing.assert_allclose(found.select(["LeftForeArm"]).positions, read_c3d(tmp_path / "ours.c3d").select(["left_elbow"]).positions)
 
 
+def test_a_skeleton_of_unknown_names_is_converted_by_a_file_of_names(shell, tmp_path):
+    text = biovision.person(6)
+    given = {"left_hip": "LeftUpLeg", "left_knee": "LeftLeg", "left_ankle": "LeftFoot", "neck": "Neck"}
+    for n, name in enumerate(given.values()):
+        text = text.replace(f" {name}\n", f" b{n}\n")
+    for name in ("Head", "Arm", "Hand", "Leg", "Foot"):
+        text = text.replace(name, "Thing")
+    (tmp_path / "a.bvh").write_text(text)
+    assert "found neither legs nor arms of known names" in refused(shell, "convert", "a.bvh", "b.csv")
+    assert shell("convert", "a.bvh", "b.bvh", "--source-unit", "cm")[0] == 0
+    (tmp_path / "n.toml").write_text("".join(f'{ours} = "b{n}"\n' for n, ours in enumerate(given)))
+    for target in ("b.csv", "b.glb"):
+        code, _, err = shell("convert", "a.bvh", target, "--names", "n.toml")
+        assert (code, "make it centimetres" in err) == (0, True)
+    assert {*given} <= {*read_joints(tmp_path / "b.csv").names}
+
+
 def test_markers_of_unknown_names_come_back_as_they_went(shell, tmp_path, rng):
     markers = JointTable(4 + np.arange(5) / 50, ("M001", "Fühler"), rng.uniform(-2, 2, (5, 2, 3)))
     write_c3d(tmp_path / "a.c3d", markers, angles={"Fx1": ("N", np.ones(5)), "Fy1": ("N", np.ones(5))})

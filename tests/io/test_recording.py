@@ -222,6 +222,22 @@ def test_pictures_of_another_size_than_the_calibration_s_are_said(one, kind, siz
     said(one, f"{kind}/cam.mp4: found pictures of {size[0]} x {size[1]} pixels", "camera 'cam' is for 32 x 24", remedy)
 
 
+@pytest.mark.parametrize(("pictures", "calibrated", "padded"), [((32, 368), (32, 360), "film"), ((32, 360), (32, 368), "calibration")])
+def test_rows_that_fill_the_last_blocks_of_h264_are_no_other_scale(tmp_path, pictures, calibrated, padded):
+    folder = tmp_path / "bow"
+    folder.mkdir()
+    camera = Camera.from_fov(calibrated, 1.0, "cam")
+    write_calibration(folder / "calibration.toml", [camera])
+    film(folder / "video" / "cam.mp4", pictures)
+    with pytest.warns(ShadowPuppetWarning, match=rf"cam\.mp4: found .* 32 x {pictures[1]} .*; the {padded} has the padding of H\.264"):
+        found = read_recording(folder).views[0].camera
+    assert found.size == pictures
+    np.testing.assert_allclose(found.matrix, camera.matrix)  # not scaled: points stay
+    film(folder / "masks" / "cam.mp4", calibrated)
+    with pytest.warns(ShadowPuppetWarning, match="padding"), pytest.raises(RecordingError, match=r"masks/cam\.mp4: found pictures of"):
+        read_recording(folder)
+
+
 def test_references_may_be_films_and_folders(one):
     film(one / "references" / "front_t_pose.mp4")
     still(one / "references" / "side_arms_hanging" / "1.png")

@@ -87,8 +87,9 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
 
 def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(READABLE)}; .amc with its .asf beside it.")],
             target: Annotated[Path, Parameter(help=f"File to be written: {choices(f'.{name}' for name in EXPORTS)}.")], /, *,
-            all: Switch = False, rate: float | None = None, source_unit: Literal["m", "cm", "mm", "in"] | None = None,
-            unit: Literal["m", "cm", "mm"] | None = None, missing: Literal["nan", "drop", "fill"] = "nan",
+            all: Switch = False, names: Path | None = None, rate: float | None = None,
+            source_unit: Literal["m", "cm", "mm", "in"] | None = None, unit: Literal["m", "cm", "mm"] | None = None,
+            missing: Literal["nan", "drop", "fill"] = "nan",
             quiet: Quiet = False) -> None:  # fmt: skip
     """Convert a file of motion into another format: joints in metres, Z up, or as the other format requires.
 
@@ -98,6 +99,8 @@ def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(RE
     ----------
     all
         Keep every point under its own name, not only the joints that have one of our names.
+    names
+        TOML file with the source's names of our joints, if they are not known: lines such as left_shoulder = "Bone_17".
     rate
         Frame rate of an .amc file, frames/s, which it does not state. [default: 120]
     source_unit
@@ -115,7 +118,7 @@ def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(RE
     with terminal(quiet) as listener:
         listener.begin("converting")
         content = convert_motion(source, target, own_names=all, rate=rate, unit=source_unit and BVH_UNITS[source_unit], target_unit=unit,
-                                 missing=missing)
+                                 missing=missing, names=names)
     if not quiet:
         show(pairs([("made", str(target)), ("of", content)]))
 

@@ -21,6 +21,7 @@ from shadowpuppet.io.motion.bvh_writer import write_bvh
 from shadowpuppet.io.motion.c3d import read_header
 from shadowpuppet.io.motion.c3d_writer import MAX_RESIDUAL, MM, write_c3d
 from shadowpuppet.io.motion.glb import write_glb
+from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import write_motion_npz, write_npz
 from shadowpuppet.io.motion.opensim import coordinates, marker_names, write_mot
@@ -93,7 +94,7 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
 
 
 def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = False, rate: float | None = None, unit: float | None = None,
-                   target_unit: str | None = None, missing: str = "nan") -> str:
+                   target_unit: str | None = None, missing: str = "nan", names: str | Path | None = None) -> str:
     """Convert a motion file (ending in `READABLE`) to another format (ending in `EXPORTS`); returns a summary of what was written.
 
     Skeletons of .bvh and .amc files are kept in .bvh and .glb files. Otherwise, if the target holds a skeleton, the poses of a whole body
@@ -108,6 +109,7 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
         unit: metres of a .bvh source's unit, if known.
         target_unit: of a .bvh or .trc target: m, cm or mm (default: m in BVH, mm in TRC).
         missing: what a .trc target has for unknown positions: nan, drop or fill, as in `write_trc`.
+        names: TOML file with the source's names of our joints, as in `read_names`.
     """
     layout = Layout.checked(target_unit, missing)
     source, target = Path(source), Path(target)
@@ -119,13 +121,14 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
         raise FormatError(f"{source}: found the ending {source.suffix!r}, expected one of {choices(READABLE)}{hint}")
     if source.exists() and target.exists() and source.samefile(target):
         raise ShadowPuppetError(f"{target}: found the file that is to be read, expected another to be written")
+    given = None if names is None else read_names(names)
     _made(target.parent)
     written = FORMATS[kind[1:]]
     if written.any_skeleton and source.suffix.lower() in SKELETON_ENDINGS:
-        animation = read_animation(source, rate, unit)
+        animation = read_animation(source, rate, unit, given)
         written.write_skeleton(target, animation, bone_mesh(animation), layout)
         return f"a skeleton of {len(animation.names)} joints, {len(animation.times)} frames"
-    table = read_motion(source, rate, own_names, unit)
+    table = read_motion(source, rate, own_names, unit, given)
     _warn_of_channels(source)
     if written.joints is not None:
         written.joints(target, table, layout)

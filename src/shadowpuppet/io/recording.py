@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -26,6 +26,8 @@ KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "tr
 """Keys of recording.toml."""
 RATES = (0.1, 10_000.0)
 """Limits of `rate`, frames/s."""
+BLOCK, MAX_PADDING = 16, 0.05
+"""Pixels to a side of H.264's blocks, and the largest share of a picture's side by which they may exceed it to be taken for padding."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
 """Limits of `start` and `duration`, seconds."""
 
@@ -110,7 +112,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     if not named:
         raise RecordingError(f"{calibration}: found no camera {folder.stem!r}, after the film's name; cameras there: "
                              f"{choices(c.name for c in cameras)}")
-    view = View(named[0], source)
+    view = _without_padding(View(named[0], source))
     _check_sizes([view])
     return Recording(folder, folder.stem, (view,))
 
@@ -130,7 +132,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
     if missing:
         warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}", ShadowPuppetWarning, stacklevel=3)
     starts = _starts(notes, cameras)
-    views = tuple(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0))
+    views = tuple(_without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
                   for c in cameras if c.name in films)
     _check_sizes(views)
     truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
@@ -250,6 +252,29 @@ def _check_names(folder: Path, sources: Iterable[str], cameras: Iterable[Camera]
     if unknown:
         raise RecordingError(f"{folder}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: "
                              f"{choices(known)}")
+
+
+def _without_padding(view: View) -> View:
+    """The view, its camera of the film's size if the two differ by the padding of H.264 alone, with a warning.
+
+    H.264 codes blocks of 16 pixels, and some programs show the rows and columns that fill the last ones: 1088 rows of 1080. They are added
+    at the bottom and the right, so that the other pixels and the camera's matrix stay. Live cameras are not opened.
+    """
+    if camera_number(view.video) is not None:
+        return view
+    found, expected = open_frames(view.video).size, view.camera.size
+    if found == expected or not all(_is_padded(a, b) or _is_padded(b, a) for a, b in zip(found, expected)):
+        return view
+    which = ("film", "calibration") if sum(found) > sum(expected) else ("calibration", "film")
+    warn(f"{view.video}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera {view.camera.name!r} is for "
+         f"{expected[0]} x {expected[1]}; the {which[0]} has the padding of H.264 at the bottom or right, the {which[1]} has not: points "
+         "stay where they are", ShadowPuppetWarning, stacklevel=4)
+    return replace(view, camera=replace(view.camera, size=found))
+
+
+def _is_padded(size: int, bare: int) -> bool:
+    """Whether `size` is `bare`, or `bare` filled up to whole blocks of H.264."""
+    return size == bare or (size == -(-bare // BLOCK) * BLOCK and size - bare < MAX_PADDING * bare)
 
 
 def _check_sizes(views: Iterable[View]) -> None:

@@ -92,6 +92,15 @@ def test_freemocap_s_board_tells_the_unit(tmp_path, made, square, unit):
     assert any("FreeMoCap" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("board", ["[metadata.board]\nsquare_length_mm = 54.0\n", "[board]\nsquare_length_mm = 54\n",
+                                   '[metadata]\n"board.square_length_mm" = 54.0\n'])
+def test_newer_files_of_freemocap_have_millimetres(tmp_path, made, board):
+    (tmp_path / "c.toml").write_text(calibrations.toml(made, 1000.0, board))
+    found = examine_calibration(tmp_path / "c.toml")
+    assert (found.unit, found.unit_known, found.notes) == ("mm", True, ("FreeMoCap's, with squares of 54 mm",))
+    np.testing.assert_allclose(found.cameras[1].centre, made[1].centre, atol=1e-9)
+
+
 def test_cameras_that_are_not_to_be_used_are_left_out_and_named(files):
     assert any("set aside in Caliscope, left out: 9" in note for note in examine_calibration(files["camera_array.toml"]).notes)
     assert any("not placed, left out: 8" in note for note in examine_calibration(files["camera_array.toml"]).notes)

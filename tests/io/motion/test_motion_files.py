@@ -14,7 +14,7 @@ from vicon import c3d
 
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.motion.bvh import read_bvh
-from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, renamed
+from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, read_names, renamed, with_names
 from shadowpuppet.io.motion.motion_files import TO_Z_UP, leg_length, read_motion, up_axis
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.metrics import LIMB_JOINTS
@@ -76,8 +76,29 @@ def test_no_person_has_such_legs(tmp_path):
     for joint in ("UpLeg", "Foot", "ForeArm"):
         text = text.replace(joint, "Thing")
     (tmp_path / "giant.bvh").write_text(text, "utf-8")
-    with pytest.raises(FormatError, match=r"found legs nan long"):
+    with pytest.raises(FormatError, match=r"found neither legs nor arms of known names among 'Hips, Spine, .*--source-unit.*--names"):
         read_motion(tmp_path / "giant.bvh")
+
+
+def test_names_that_no_program_has_are_given_by_a_file(tmp_path, standing):
+    write_joints(tmp_path / "a.csv", JointTable(standing.times, tuple(f"bone {n}" for n in range(len(standing.names))), standing.positions))
+    (tmp_path / "names.toml").write_text("".join(f'{name} = "bone {n}"\n' for n, name in enumerate(standing.names)))
+    given = read_names(tmp_path / "names.toml")
+    same(read_motion(tmp_path / "a.csv", names=given), standing)
+    with pytest.raises(FormatError, match=r"a\.csv: names: found 'tail', which is no joint of the file; there are: bone 0, bone 1, "):
+        read_motion(tmp_path / "a.csv", names={"head": "tail"})
+    swapped = read_motion(tmp_path / "a.csv", names=given | {"left_knee": given["right_knee"], "right_knee": given["left_knee"]})
+    np.testing.assert_array_equal(swapped.select(["left_knee"]).positions, read_motion(tmp_path / "a.csv", names=given)
+                                  .select(["right_knee"]).positions)
+    for text, said in (("tail = 'a'", "found the joint 'tail', expected some of pelvis, neck,"), ("head = 3", "head: found 3, expected"),
+                       ("head = 'a'\nneck = 'a'", "'a', which another joint has, too"), ("", "found no names, expected lines such as")):
+        (tmp_path / "names.toml").write_text(text)
+        with pytest.raises(FormatError, match=said):
+            read_names(tmp_path / "names.toml")
+
+
+def test_a_name_of_ours_for_another_joint_gives_way():
+    assert with_names(("head", "skull", "neck"), {"head": "skull", "neck": "neck"}) == ("head#2", "head", "neck")
 
 
 @pytest.mark.parametrize("ending", ["csv", "trc"])
@@ -146,6 +167,9 @@ CONVENTIONS = {
                   "LeftUpLeg LeftLeg LeftFoot LeftToeBase",
     "Xsens": "Pelvis Neck Head T8 LeftShoulder LeftUpperArm LeftForeArm LeftHand - LeftUpperLeg LeftLowerLeg LeftFoot LeftToe",
     "Poser": "hip neck head lCollar lShldr lForeArm lHand - lThigh lShin lFoot",
+    "DAZ": "hip neckLower head lCollar lShldrBend lForearmBend lHand lMid1 lThighBend lShin lFoot",
+    "iClone": "CC_Base_Pelvis CC_Base_NeckTwist01 CC_Base_Head CC_Base_L_Clavicle CC_Base_L_Upperarm CC_Base_L_Forearm CC_Base_L_Hand "
+              "CC_Base_L_Mid1 CC_Base_L_Thigh CC_Base_L_Calf CC_Base_L_Foot",
     "Motion Builder": "Hips Neck Head LeftCollar LeftShoulder LeftElbow LeftWrist - LeftHip LeftKnee LeftAnkle",
     "Biped": "Bip01_Pelvis Bip01_Neck Bip01_Head Bip01_L_Clavicle Bip01_L_UpperArm Bip01_L_Forearm Bip01_L_Hand - "
              "Bip01_L_Thigh Bip01_L_Calf Bip01_L_Foot",

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -26,7 +26,8 @@ FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 BARE_KEY = r"[A-Za-z0-9_-]+"
 """Section titles without quotes."""
 SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
-"""Plausible sizes of a board's squares in each unit; FreeMoCap stores the number that its user entered, without a unit."""
+"""Plausible sizes of a board's squares in each unit; FreeMoCap's first versions store the number that their user entered,
+without a unit."""
 
 
 def read_tables(path: Path) -> Drafts:
@@ -38,7 +39,7 @@ def read_tables(path: Path) -> Drafts:
     sections = {title: table for title, table in data.items() if isinstance(table, dict) and any(key in table for key in FIELDS)}
     if not sections:
         raise CalibrationError(f"{path}: no camera in it, expected a section for each, such as [cam1], with {', '.join(FIELDS)}")
-    unit, notes = _freemocap(data.get("metadata"))
+    unit, notes = _freemocap(data)
     return Drafts(tuple(_draft(path, title, table, table.get("name", title)) for title, table in sections.items()), unit, notes)
 
 
@@ -59,15 +60,27 @@ def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Drafts:
     return Drafts(tuple(drafts), None, tuple(notes))
 
 
-def _freemocap(metadata: object) -> tuple[str | None, tuple[str, ...]]:
-    """The unit, None if unknown, and remarks, from the size of the squares on FreeMoCap's board."""
+def _freemocap(data: dict[str, Any]) -> tuple[str | None, tuple[str, ...]]:
+    """The unit, None if unknown, and remarks, from the size of the squares on FreeMoCap's board: `board.square_length_mm`, whose unit is
+    that of the cameras, or `metadata.charuco_square_size` of its first versions, a number without a unit."""
+    metadata = data.get("metadata")
+    within = [table for table in (metadata, data) if isinstance(table, dict)]
+    lengths = [table["board"].get("square_length_mm") for table in within if isinstance(table.get("board"), dict)]
+    lengths += [table.get("board.square_length_mm") for table in within]
+    length = next((length for length in lengths if _is_number(length)), None)
+    if length is not None:
+        return "mm", (f"FreeMoCap's, with squares of {length:g} mm",)
     square = metadata.get("charuco_square_size") if isinstance(metadata, dict) else None
-    if not isinstance(square, (int, float)) or isinstance(square, bool):
+    if not _is_number(square):
         return None, ()
     for unit, (least, most) in SQUARES.items():
         if least <= square <= most:
             return unit, (f"FreeMoCap's, with squares of {square:g} {unit}",)
     return None, (f"FreeMoCap's, with squares of {square:g}: in which unit, it does not say",)
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft:

@@ -3,34 +3,38 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from shadowpuppet.body.bones import BONES
 from shadowpuppet.errors import FormatError
 from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.motion import JointTable
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
 """Our names."""
 CENTRAL = {
     "pelvis": ("pelvis", "hips", "midhip", "chip", "spinebase", "hip", "pelo", "torsodistal"),
-    "neck": ("neck", "trxo", "thorax", "torsoproximal"),
+    "neck": ("neck", "necktwist01", "necklower", "neck01", "trxo", "thorax", "torsoproximal"),
     "head": ("head", "hedo", "headbase", "headproximal"),
 }
 """Other names of joints without a side, in order of preference; lower case, letters and digits only.
 
 `pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them, and `torsodistal`, ... the same in
-its own programs; `hips`, `upleg`, `forearm` are Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's. COCO, HALPE_26 and BODY_25
+its own programs; `hips`, `upleg`, `forearm` are Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's, `shldrbend`,
+... its later figures' (DAZ); `necktwist01`, `calf`, `mid1` iClone's, after `CC_Base_`. COCO, HALPE_26 and BODY_25
 call joints as we do, with `midhip` (OpenPose), `chip` (Pose2Sim) or `hip` (HALPE_26) for the pelvis.
 """
 SIDED = {
-    "shoulder": ("sjc", "arm", "upperarm", "uparm", "shldr", "shoulder", "clo", "upperarmproximal"),  # beside `arm`, a collar bone's
-    "elbow": ("ejc", "elbow", "forearm", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
+    # beside `arm`, `shoulder` is a collar bone's
+    "shoulder": ("sjc", "arm", "upperarm", "uparm", "shldr", "shldrbend", "shoulder", "clo", "upperarmproximal"),
+    "elbow": ("ejc", "elbow", "forearm", "forearmbend", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
     "wrist": ("wjc", "wrist", "hand", "rao", "lowerarmdistal"),
-    "hand": ("handmiddle1", "hand", "fingerbase", "middle1", "hno"),
-    "hip": ("hjc", "upleg", "upperleg", "thigh", "hip", "fep", "upperlegproximal"),
+    "hand": ("handmiddle1", "hand", "fingerbase", "middle1", "mid1", "hno"),
+    "hip": ("hjc", "upleg", "upperleg", "thigh", "thighbend", "hip", "fep", "upperlegproximal"),
     "knee": ("kjc", "knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo", "lowerlegproximal"),
     "ankle": ("ajc", "ankle", "foot", "tio", "lowerlegdistal"),
 }
@@ -48,11 +52,38 @@ SUFFIX = re.compile(r"_study$")
 """Suffix of OpenCap's markers."""
 HUMANEVA = re.compile(r"^(upper|lower)([LR])(Arm|Leg)(Proximal|Distal)$")
 """HumanEva's names have the side in the middle."""
-PREFIXES = re.compile(r"^(?:.*[:|]|mixamorig\d*_|bip0*1[ _]|character1_)", re.IGNORECASE)
+PREFIXES = re.compile(r"^(?:.*[:|]|mixamorig\d*_|bip0*1[ _]|character1_|cc_base_|rl_)", re.IGNORECASE)
 """Prefixes of joint names: of the person, or the program."""
 WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 """Matches the words of a name like LeftUpLeg, left_up_leg, L UpLeg."""
 LETTERS = {"l": "left", "r": "right", "left": "left", "right": "right"}
+
+
+def read_names(path: str | Path) -> dict[str, str]:
+    """A file's names of our joints, by ours, from a TOML file with lines like `left_shoulder = "Bone_17"`. Raises `FormatError`."""
+    path = Path(path)
+    found = read_toml(path, FormatError)
+    for ours, theirs in found.items():
+        if ours not in JOINTS:
+            raise FormatError(f"{path}: found the joint {shorten([ours], 60)!r}, expected some of {', '.join(JOINTS)}")
+        if not isinstance(theirs, str) or not theirs:
+            raise FormatError(f"{path}: {ours}: found {shorten([repr(theirs)], 60)}, expected the name of a joint, in quotes")
+        if list(found.values()).count(theirs) > 1:
+            raise FormatError(f"{path}: {ours}: found {shorten([theirs], 60)!r}, which another joint has, too")
+    if not found:
+        raise FormatError(f"{path}: found no names, expected lines such as left_shoulder = \"Bone_17\"")
+    return found
+
+
+def with_names(names: Sequence[str], given: Mapping[str, str]) -> tuple[str, ...]:
+    """A file's names, with ours where `given` (by ours) has them; another joint of that name gets a number. Raises `FormatError` if a name
+    that is given is not there."""
+    missing = [theirs for theirs in given.values() if theirs not in names]
+    if missing:
+        raise FormatError(f"names: found {shorten(missing[:1], 60)!r}, which is no joint of the file; there are: {shorten(names, 400)}")
+    ours = {theirs: name for name, theirs in given.items()}
+    taken = {name for name in given if given[name] != name}
+    return tuple(ours.get(name, f"{name}#2" if name in taken else name) for name in names)
 
 
 def renamed(table: JointTable) -> JointTable:

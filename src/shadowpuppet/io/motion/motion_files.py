@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from warnings import warn
@@ -16,7 +16,7 @@ from shadowpuppet.io.motion import READABLE
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.c3d import read_c3d
-from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, pairs_of, renamed
+from shadowpuppet.io.motion.joint_names import JOINTS, columns_of, pairs_of, renamed, with_names
 from shadowpuppet.io.motion.npz import read_npz
 from shadowpuppet.io.motion.parquet import read_parquet
 from shadowpuppet.io.motion.table import read_joints
@@ -38,7 +38,8 @@ TO_Z_UP = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0),
 
 
 @np.errstate(all="ignore")  # impossible numbers become unknown, or are refused where they are checked
-def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None) -> JointTable:
+def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None,
+                names: Mapping[str, str] | None = None) -> JointTable:
     """Read joints from a motion file (ending in `READABLE`; .amc needs its .asf in the same folder), in metres, Z up.
 
     If the file does not state the unit (BVH) or the up axis, they are estimated from the person's legs and posture, with a warning.
@@ -49,14 +50,15 @@ def read_motion(path: str | Path, rate: float | None = None, own_names: bool = F
         rate: frames/s of an .amc file (default 120).
         own_names: keep all joints under the file's names; else keep only our joints, by our names.
         unit: metres of a BVH file's unit, if known.
+        names: the file's names of our joints, by ours (`read_names`), if they are not known.
     """
     path = Path(path)
     ending = path.suffix.lower()
     _check_ending(path)
     if ending == ".amc":
-        table = read_mocap(path).joints(rate or AMC_RATE)
+        table = named(path, read_mocap(path).joints(rate or AMC_RATE), names)
         return table if own_names else _ours(path, table)
-    table = read_bvh(path).joints() if ending == ".bvh" else READERS[ending](path)
+    table = named(path, read_bvh(path).joints() if ending == ".bvh" else READERS[ending](path), names)
     scale = 1.0 if ending != ".bvh" else unit_of(path, table) if unit is None else unit
     up = _markers_up(path, table) if ending == ".trc" and own_names else rotation_to_z_up(path, table)
     table = table if own_names else _ours(path, table)
@@ -118,16 +120,29 @@ def _known(table: JointTable) -> JointTable:
         return JointTable(table.times, (), np.empty((len(table.times), 0, 3)))
 
 
+def named(path: Path, table: JointTable, names: Mapping[str, str] | None) -> JointTable:
+    """The table with our names for the joints in `names`, by ours. Raises `FormatError`."""
+    if not names:
+        return table
+    try:
+        return replace(table, names=with_names(table.names, names))
+    except ShadowPuppetError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
 def unit_of(path: Path, table: JointTable) -> float:
     """A table's unit in metres, estimated from the length of legs or arms, with a warning. Raises `FormatError` if no unit fits."""
     length = leg_length(_known(table))
+    if not np.isfinite(length):
+        raise FormatError(f"{path}: found neither legs nor arms of known names among {shorten(table.names, 400)!r}, by whose length the "
+                          "unit is known; give the unit (--source-unit), or the names (--names FILE)")
     for unit, (low, high, metres) in LEG_LENGTHS.items():
         if low <= length < high:
             if metres != 1:
                 warn(f"{path}: BVH files do not tell their unit; legs {length:.4g} long make it {unit}", ShadowPuppetWarning, stacklevel=3)
             return metres
     raise FormatError(f"{path}: found legs {length:.4g} long in an unknown unit, expected a person's in metres, centimetres, millimetres "
-                      "or inches")
+                      "or inches; --source-unit gives another")
 
 
 def leg_length(table: JointTable) -> float:

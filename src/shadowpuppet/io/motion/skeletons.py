@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from shadowpuppet.io.files.text import errors_named
 from shadowpuppet.io.motion.amc import Z_UP, Capture, read_mocap
 from shadowpuppet.io.motion.bvh import END, Bvh, read_bvh, unique_names
 from shadowpuppet.io.motion.joint_names import columns_of
-from shadowpuppet.io.motion.motion_files import AMC_RATE, rotation_to_z_up, unit_of
+from shadowpuppet.io.motion.motion_files import AMC_RATE, named, rotation_to_z_up, unit_of
 from shadowpuppet.motion.animation import Y_UP, Animation
 
 ENDINGS = (".amc", ".bvh")
@@ -24,10 +25,11 @@ CMU = {"root": "Hips", "lowerback": "LowerBack", "upperback": "Spine", "thorax":
 """Names, as in BVH files, of the joints at which bones of the CMU database begin; wrists and fingers as in `amc.ENDS`."""
 
 
-def read_animation(path: str | Path, rate: float | None = None, unit: float | None = None) -> Animation:
+def read_animation(path: str | Path, rate: float | None = None, unit: float | None = None,
+                   names: Mapping[str, str] | None = None) -> Animation:
     """The animated skeleton of a .bvh file, or of an .amc file with its .asf in the same folder, in metres, Z up.
 
-    `rate`, `unit` and warnings are as in `read_motion`. Raises `FormatError`.
+    `rate`, `unit`, `names` and warnings are as in `read_motion`; joints keep the file's names. Raises `FormatError`.
     """
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:
@@ -35,11 +37,11 @@ def read_animation(path: str | Path, rate: float | None = None, unit: float | No
     with errors_named(path):
         if path.suffix.lower() == ".amc":
             return _of_capture(read_mocap(path), rate or AMC_RATE)
-        return _of_bvh(read_bvh(path), unit)
+        return _of_bvh(read_bvh(path), unit, names)
 
 
-def _of_bvh(bvh: Bvh, unit: float | None) -> Animation:
-    table = bvh.joints()
+def _of_bvh(bvh: Bvh, unit: float | None, given: Mapping[str, str] | None) -> Animation:
+    table = named(bvh.path, bvh.joints(), given)
     scale, up = unit_of(bvh.path, table) if unit is None else unit, rotation_to_z_up(bvh.path, table)
     if not columns_of(table.names) and not _is_z_up(bvh):
         up = Z_UP
