@@ -12,7 +12,8 @@ from rich.text import Text
 
 from shadowpuppet.cli.flags import AsJson, Config, LookFlags, options_from
 from shadowpuppet.cli.tables import pairs, show, show_json, table
-from shadowpuppet.errors import RecordingError, SettingsError
+from shadowpuppet.errors import RecordingError, SettingsError, choices
+from shadowpuppet.io.motion import READABLE
 
 if TYPE_CHECKING:
     from shadowpuppet.calibration.overview import CalibrationLook, CameraPlacement
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 ARROWS = "→↗↑↖←↙↓↘"
 """Arrows by viewing direction, in eighths of a turn counter-clockwise from +x."""
+UNREADABLE = (".abc", ".asf", ".blend", ".dae", ".fbx", ".glb", ".gltf", ".json", ".md", ".mot", ".osim", ".sto", ".tsv", ".usd", ".usda",
+              ".usdc", ".usdz", ".vsk", ".xls", ".xlsx")
+"""Endings of files about motion and cameras that are not read."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 """Names of cameras in the top view; + for any further."""
 
@@ -78,6 +82,23 @@ def refuse_for_recordings(path: Path, to: Path | None, unit: str | None, up: str
         if value is not None:
             raise SettingsError(f"flags: {name}: found {str(value)!r} for {path}, which is no calibration file; a recording has unit and "
                                 "up in its recording.toml")
+
+
+def refuse_other_files(path: Path) -> None:
+    """Raise `ShadowPuppetError`, saying what it is, for a file that is no film but a calibration, settings or motion that is not read."""
+    from shadowpuppet.io.calibration.calibration_files import ENDINGS, NO_CALIBRATIONS, examine_calibration
+
+    ending = path.suffix.lower()
+    if not path.is_file():
+        return
+    if path.name in NO_CALIBRATIONS:
+        raise RecordingError(f"{path}: is a file of a recording or run, expected its folder, {path.parent}")
+    if ending in UNREADABLE:
+        raise RecordingError(f"{path}: found the ending {path.suffix!r}, expected a film, a calibration or a motion file; motion is read "
+                             f"from {choices(READABLE)}, calibrations from {choices(ENDINGS)}")
+    if ending in ENDINGS:
+        examine_calibration(path)
+        raise RecordingError(f"{path}: found no camera with a matrix in it, expected a calibration, film or motion file")
 
 
 def calibration_table(look: CalibrationLook) -> RenderableType:

@@ -10,18 +10,22 @@ from cyclopts import Parameter
 
 from shadowpuppet.body.models import WholeBodyName
 from shadowpuppet.cli.flags import LEARNING, Quiet, Switch, flags_of, given, output, unpacked
-from shadowpuppet.cli.tables import pairs, show, table
+from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import settings_of, validate
 
 if TYPE_CHECKING:
+    from shadowpuppet.io.motion.overview import MotionLook
     from shadowpuppet.motion.prior.training import TrainedPrior
 
     PriorFlags = Any
 else:
     PriorFlags = unpacked(flags_of(PriorSettings, without=("regions",), groups={s.name: LEARNING for s in settings_of(PriorSettings)}))
+
+MOST_NAMES = 40
+"""Greatest number of names that are listed."""
 
 
 def fit_prior(motions: Annotated[list[Path], Parameter(help=f"Files of motion: {choices(READABLE)}; .amc with its .asf beside it.")], /, *,
@@ -121,6 +125,33 @@ def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(RE
                                  missing=missing, names=names)
     if not quiet:
         show(pairs([("made", str(target)), ("of", content)]))
+
+
+def explain_motion(path: Path, as_json: bool) -> None:
+    """Explain a motion file, for `info`."""
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.io.motion.overview import look_at_motion
+
+    with terminal(quiet=as_json):
+        look = look_at_motion(path)
+    if as_json:
+        return show_json(look)
+    show(pairs(_motion_rows(look)))
+
+
+def _motion_rows(look: MotionLook) -> Iterator[tuple[str, str | None]]:
+    rate = f", {look.rate:.4g} frames/s" if look.rate else ""
+    ours = ", ".join(name if name == theirs else f"{name} ({theirs})" for name, theirs in look.known.items())
+    others = ", ".join(look.others[:MOST_NAMES]) + (", ..." if len(look.others) > MOST_NAMES else "")
+    yield "motion", look.path
+    yield "format", look.format
+    yield "frames", f"{look.frames}{rate}, from {look.start:.2f} to {look.end:.2f} s"
+    yield "joints", f"{len(look.known)} of known names{': ' if ours else ''}{ours}"
+    yield "others", f"{len(look.others)}: {others}" if others else None
+    yield "unknown", f"{100 * look.unknown:.1f} % of the positions" if look.unknown else None
+    yield "legs", f"{look.leg:.2f} m from hip to ankle" if look.leg else None
+    yield "analog", f"{len(look.channels)}, not read: {', '.join(look.channels[:MOST_NAMES])}" if look.channels else None
+    yield "read", "\n".join(look.notes) or None
 
 
 def _prior_tables(trained: TrainedPrior, file: Path) -> Iterator[Any]:

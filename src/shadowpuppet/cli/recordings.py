@@ -28,6 +28,7 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
+from shadowpuppet.cli.motion import explain_motion
 from shadowpuppet.cli.tables import pairs, show, show_json
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason
 from shadowpuppet.settings import validate
@@ -54,7 +55,8 @@ else:
     SpecFlags = unpacked(flags_of(SpecChanges, groups=SPEC_GROUPS))
 
 
-def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film, folder of pictures; or a calibration of any kind.")], /, *,
+def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film, folder of pictures; or a calibration or motion "
+                                                      "file of any kind.")], /, *,
          to: Annotated[Path | None, flag("Write the calibration there: NAME.toml for Pose2Sim, Anipose and this program, or a folder for "
                                          "EasyMocap's intri.yml and extri.yml.", CAMERAS)] = None,
          unit: Annotated[str | None, flag("Unit of the calibration's lengths, if the file does not say: m, cm or mm.", CAMERAS)] = None,
@@ -62,10 +64,15 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
                                         "pictures' up).", CAMERAS, allow_leading_hyphen=True)] = None,
          config: Config = None, verbose: Verbose = False, as_json: AsJson = False, flags: LookFlags = None) -> None:  # fmt: skip
     """Look at a recording, as `track` does before it starts: cameras, scale, background, silhouettes, the person. Or explain a calibration:
-    where its cameras stand, what they look at and see together, from above; and write it in another format."""
+    where its cameras stand, what they look at and see together, from above; and write it in another format. Or explain a file of motion."""
+    from shadowpuppet.io.motion.overview import is_motion
+
     if calibration.is_explained(recording):
         return calibration.explain(recording, to, unit, up, as_json)
     calibration.refuse_for_recordings(recording, to, unit, up)
+    if is_motion(recording):
+        return explain_motion(recording, as_json)
+    calibration.refuse_other_files(recording)
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.track import look_at
 
