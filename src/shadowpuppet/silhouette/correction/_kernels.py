@@ -1,5 +1,5 @@
 """Kernels: points compared with a reduced picture, one by one and for many shifts; pictures moved back; gains of light, and their
-removal."""
+removal; lost detail restored."""
 
 from __future__ import annotations
 
@@ -220,3 +220,26 @@ def modes(pixels, levels, informative, log, bounds, width, least, window, shifts
             first, last = max(0, round(middle) - window), min(bins, round(middle) + window + 1)
             middle = (moment[last] - moment[first]) / (total[last] - total[first])
         out[c] = middle - bins // 2
+
+
+@compiled(nogil=True)
+def restore_detail(image, smooth, scene, detail, slope, near, out):
+    """Move pixels (H, W, C) of a picture, uint8, back by the share of `detail` that they have lost: from 0 to 1, that by which the smoothed
+    picture lies from the `scene` toward scene + detail; slope: detail over its squared length, or 0. Pixels farther than `near` from that
+    line, root mean square of the channels, stay as they are."""
+    height, width, channels = image.shape
+    limit = near * near * channels
+    for y in range(height):
+        for x in range(width):
+            lost, rest = np.float32(0), np.float32(0)
+            for c in range(channels):
+                lost += (np.float32(smooth[y, x, c]) - scene[y, x, c]) * slope[y, x, c]
+            lost = min(max(lost, np.float32(0)), np.float32(1))
+            for c in range(channels):
+                far = np.float32(smooth[y, x, c]) - scene[y, x, c] - lost * detail[y, x, c]
+                rest += far * far
+            for c in range(channels):
+                value = np.float32(image[y, x, c])
+                if rest <= limit:
+                    value = min(max(value - lost * detail[y, x, c] + np.float32(0.5), np.float32(0)), np.float32(255))
+                out[y, x, c] = np.uint8(value)
