@@ -51,19 +51,32 @@ def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: F
     import cv2
 
     either = np.asarray(cv2.inRange(label, MAYBE_SHADOW, MAYBE_SHADOW), np.uint8)
+    label = _with_limbs(label & ~either, either, planes, mean, inverse_sigma, noise, smeared)
+    if smeared:  # trousers that have lost their hue are one part with their shadow on the floor, unless by their light
+        dark = np.asarray(planes[..., 0] <= MAX_LIMB_LIGHT * mean[..., 0])
+        label = _with_limbs(label, np.where(dark & (label == 0), either, 0).astype(np.uint8), planes, mean, inverse_sigma, noise, smeared)
+    return label
+
+
+def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float,
+                smeared: bool) -> Labels:
+    """Labels (H, W) with 1, perhaps a person, where the pixels (H, W) that may be either, 255, are a limb's; the rest as in
+    `resolve_shadows`."""
+    import cv2
+
     firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
     x, y, width, height = cv2.boundingRect(firm)
-    label = label & ~either
-    if width * height:
-        window = slice(y, y + height), slice(x, x + width)
-        number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-        sums = _part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma)
-        limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
-        if limbs.any():
-            found = np.zeros_like(label)
-            found[window] = limbs[np.asarray(parts, np.intp)]
-            label |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
-    return label
+    if not width * height:
+        return label
+    window = slice(y, y + height), slice(x, x + width)
+    number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
+    sums = _part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma)
+    limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
+    if not limbs.any():
+        return label
+    found = np.zeros_like(label)
+    found[window] = limbs[np.asarray(parts, np.intp)]
+    return label | np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
 
 
 def _limbs(sums: np.ndarray, noise: float) -> Labels:
