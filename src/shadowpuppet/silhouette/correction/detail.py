@@ -24,6 +24,8 @@ MIN_TEXTURED = 0.005
 """Least share of such pixels."""
 NEAR = 3.0
 """Distance from the line up to which detail is restored, over the film's noise."""
+QUIET = 1.0
+"""Difference from the empty scene up to which a pixel is left as it is, grey levels."""
 LEAST = 1.0
 """Detail of a pixel below which none is restored, grey levels."""
 
@@ -36,8 +38,8 @@ class LostDetail:
     """Smoothed picture of the empty scene, of shape (H, W, C)."""
     detail: Floats
     """What it loses when its detail is lost, of shape (H, W, C)."""
-    slope: Floats
-    """What a difference of a frame from it is multiplied by, and summed over channels, for the share that is lost, of shape (H, W, C)."""
+    inverse: Floats
+    """Inverse of its squared length, of shape (H, W); 0 where there is little."""
     near: float
     """Distance from the line up to which a pixel shows the scene without detail, root mean square of the channels, grey levels."""
 
@@ -46,15 +48,16 @@ class LostDetail:
         """Of the mean picture (H, W, 3) or (H, W) of an empty scene."""
         sharp = smoothed(scene.astype(np.float32))
         detail = _deep(smoothed(sharp, COARSE) - sharp)
-        size = (detail**2).sum(2, keepdims=True)
-        return cls(_deep(sharp), detail, np.where(size >= LEAST**2, detail / np.maximum(size, LEAST**2), 0).astype(np.float32), near)
+        size = (detail**2).sum(2)
+        return cls(_deep(sharp), detail, np.where(size >= LEAST**2, 1 / np.maximum(size, LEAST**2), 0).astype(np.float32), near)
 
     def __call__(self, image: Image) -> Image:
         """The picture (H, W, 3) or (H, W) with the detail that it has lost."""
         from shadowpuppet.silhouette.correction._kernels import restore_detail
 
         out = np.empty_like(image)
-        restore_detail(_deep(image), _deep(smoothed(image)), self.scene, self.detail, self.slope, np.float32(self.near), _deep(out))
+        restore_detail(_deep(image), _deep(smoothed(image)), self.scene, self.detail, self.inverse, np.float32(QUIET), np.float32(self.near),
+                       _deep(out))
         return out
 
 
