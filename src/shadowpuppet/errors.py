@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-BROKEN, MISTAKE, SOME_FAILED, INTERRUPTED = 1, 2, 3, 130
+NOTED, HARMFUL, RUINOUS = 1, 2, 3
+"""Weights of a `Caution`."""
+BROKEN, MISTAKE, SOME_FAILED, PERSON_LOST, INTERRUPTED = 1, 2, 3, 4, 130
 """Exit codes other than 0: the core does not work on this machine (`doctor`) or a bug of the program; unusable input; some of several runs
-failed (`batch`); Ctrl-C."""
+failed (`batch`); a run that lost the person in most frames (`track`); Ctrl-C."""
 
 
 class ShadowPuppetError(Exception):
@@ -42,6 +44,28 @@ class FormatError(ShadowPuppetError):
 
 class SettingsError(ShadowPuppetError, ValueError):
     """A setting with an unknown name or an impossible value."""
+
+
+class Caution(str):
+    """What may harm a run, and its remedy, in a sentence; `short` says both in at most ten words."""
+
+    short: str
+    weight: int
+    """`NOTED`: lengths or details may be off; `HARMFUL`: joints are; `RUINOUS`: most of the run is."""
+
+    def __new__(cls, sentence: str, short: str, weight: int) -> Caution:
+        """A sentence with its short form and weight."""
+        made = super().__new__(cls, sentence)
+        made.short, made.weight = short, weight
+        return made
+
+    def __getnewargs__(self) -> tuple[str, str, int]:
+        """What `__new__` takes, for copies."""
+        return str(self), self.short, self.weight
+
+    def about(self, what: str) -> Caution:
+        """The same doubt about one camera or file, which both forms name first."""
+        return Caution(f"{what}: {self}", f"{what}: {self.short}", self.weight)
 
 
 def choices(names: Iterable[str]) -> str:

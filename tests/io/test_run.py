@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.intervals import IntervalWriter, read_intervals
-from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.motion.table import read_joints, read_raw
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.motion.motion import STATUSES, Motion, MotionFrame
 
@@ -389,3 +389,50 @@ def test_a_path_that_is_no_text_does_not_end_a_run(tmp_path):
     with writer(tmp_path / "run", recording=Path("film\udcff.mp4")) as run:
         run.write(a_frame(0))
     assert read_run(tmp_path / "run").info["recording"] == "film?.mp4"
+
+
+def test_revised_frames_replace_those_written_and_raw_csv_keeps_them(tmp_path):
+    with writer(tmp_path / "run") as run:
+        for i in range(5):
+            run.write(a_frame(i, "lost" if i == 2 else "tracked"))
+        raw = run.motion
+        run.revise(dataclasses.replace(raw, joints=raw.joints + 1, cost=raw.cost + 1))
+        run.info["smoothing"] = {"method": "tracker"}
+    found = read_run(tmp_path / "run")
+    assert_same(read_raw(tmp_path / "run" / "raw.csv", "cardbox"), raw, 1e-6)
+    np.testing.assert_array_equal(found.motion.joints, raw.joints + 1)
+    assert found.info["smoothing"] == {"method": "tracker"}
+    (tmp_path / "run" / "motion.npz").unlink()
+    assert_same(read_run(tmp_path / "run").motion, found.motion, 1e-6)
+    bounds = read_intervals(tmp_path / "run" / "intervals.csv")
+    places = found.motion.joints[[1, 3]]  # those with standard deviations
+    assert ((bounds.low <= places + 1e-6) & (places <= bounds.high + 1e-6)).all()
+    assert not list((tmp_path / "run").glob("*.part"))
+    write(tmp_path / "run")
+    assert not (tmp_path / "run" / "raw.csv").exists()
+
+
+def test_a_revision_that_cannot_be_written_leaves_the_tables(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    def revised():
+        with writer(tmp_path / "run") as run:
+            for i in range(3):
+                run.write(a_frame(i))
+            monkeypatch.setattr("shadowpuppet.io.run.run_rows", full)
+            run.revise(run.motion)
+
+    with pytest.raises(ShadowPuppetError, match=r"the 3 frames so far are in joints\.csv"):
+        revised()
+    assert not (tmp_path / "run" / "raw.csv").exists()
+    assert not list((tmp_path / "run").glob("*.part"))
+    assert len(read_run(tmp_path / "run").motion) == 3
+    assert not read_run(tmp_path / "run").complete
+
+
+def test_a_malformed_raw_table_is_named(tmp_path):
+    file = tmp_path / "raw.csv"
+    file.write_text("time,neck_x,neck_y,neck_z,neck_sd_x,neck_sd_y,neck_sd_z,status,cost,overlap,torso_y [m]\n")
+    with pytest.raises(FormatError, match=r"raw\.csv: found 1 degrees of freedom and 0 standard deviations, expected as many"):
+        read_raw(file, "cardbox")

@@ -79,6 +79,8 @@ class Recording:
     """Frames/s that replace the films' times; None to keep the films' times."""
     duration: float | None = None
     """Duration used, seconds from time 0; None for all."""
+    begin: float = 0.0
+    """First moment used, seconds after time 0; the frames before are passed over, and times stay those after time 0."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:

@@ -4,6 +4,7 @@
     angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
     intervals.csv  time, joint, x_low, x_high, y_low, y_high, z_low, z_high (m, world): 90 % bounds, a row for each joint of a frame
     motion.npz     the fields of `Motion`, arrays only
+    raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
@@ -17,6 +18,7 @@ import contextlib
 import json
 import platform
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -30,11 +32,12 @@ from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
 from shadowpuppet.io.files.text import errors_named, read_toml, write_whole
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
-from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows
+from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows, write_raw
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
-FILES = (*TABLES, "motion.npz", "metrics.json", "overlay.mp4")
+RAW = "raw.csv"
+FILES = (*TABLES, RAW, "motion.npz", "metrics.json", "overlay.mp4")
 """Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
 OWN_KEYS = ("complete", "frames", "body", "versions")
 """Keys of run.toml that the writer sets."""
@@ -118,6 +121,37 @@ class RunWriter:
         kept = self._motion.append(frame)
         self._append(run_rows(kept), self._intervals.lines(kept))
 
+    @property
+    def motion(self) -> Motion:
+        """The frames so far."""
+        return self._motion.build()
+
+    def revise(self, revised: Motion) -> None:
+        """Replace the frames so far, at the end of a run; the tables as they were go to raw.csv. Raises `ShadowPuppetError` if something
+        cannot be written; the tables stay as they were."""
+        self._start()
+        builder = MotionBuilder(revised.body_name, revised.dof_names, revised.joint_names)
+        parts = [f"{name}.part" for name in (RAW, *TABLES)]
+        try:
+            with self._system_errors():
+                write_raw(self.folder / parts[0], *(self.folder / name for name in TABLES[:2]))
+                with ExitStack() as stack:
+                    tables = [stack.enter_context((self.folder / part).open("w", encoding="utf-8", newline="")) for part in parts[1:]]
+                    _append(tables, run_headers(builder.joint_names, builder.dof_names), self._intervals.header())
+                    for frame in revised.frames():
+                        kept = builder.append(frame)
+                        _append(tables, run_rows(kept), self._intervals.lines(kept))
+                for table in self._tables:
+                    table.close()
+                for part in parts:
+                    (self.folder / part).replace(self.folder / part.removesuffix(".part"))
+                self._motion = builder
+                self._tables = [*((self.folder / name).open("a", encoding="utf-8", newline="") for name in TABLES)]
+        finally:
+            for part in parts:
+                with contextlib.suppress(OSError):
+                    (self.folder / part).unlink(missing_ok=True)
+
     def _start(self) -> None:
         """Replace an earlier run and write the headers, once."""
         if self._tables:
@@ -133,8 +167,8 @@ class RunWriter:
     def _append(self, rows: tuple[list[str], list[str]], intervals: str) -> None:
         """Append a row to joints.csv and angles.csv, and lines to intervals.csv."""
         with self._system_errors():
-            for table, text in zip(self._tables, (*map(csv_line, rows), intervals), strict=True):
-                table.write(text)
+            _append(self._tables, rows, intervals)
+            for table in self._tables:
                 table.flush()  # so that a killed run keeps it
 
     def _finish(self, complete: bool) -> None:
@@ -164,6 +198,12 @@ class RunWriter:
             frames = len(self._motion)
             kept = f"; the {frames} frames so far are in joints.csv and angles.csv" if frames else ""
             raise ShadowPuppetError(f"{self.folder}: the run cannot be written ({reason(error)}){kept}") from None
+
+
+def _append(tables: Sequence[TextIO], rows: tuple[list[str], list[str]], intervals: str) -> None:
+    """Append a row to joints.csv and angles.csv, and lines to intervals.csv."""
+    for table, text in zip(tables, (*map(csv_line, rows), intervals), strict=True):
+        table.write(text)
 
 
 def read_run(folder: str | Path) -> Run:

@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, Caution, RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
@@ -121,9 +121,9 @@ class MonocularSubject(TrackedSubject):
     def _doubt(self) -> MonocularDoubt:
         return MonocularDoubt(self.tracker)
 
-    def points(self, pose: Array) -> Array:
-        """Landmarks (L, 3) of a pose (D,) in the world, metres."""
-        return self.picture.points_world(pose[None])[0]
+    def landmarks(self, poses: Array) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
+        return self.picture.points_world(poses)
 
     def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
         """Model, matching result and raw picture, one below the other."""
@@ -161,14 +161,15 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start)), beside=(beside,))
 
 
-def _doubts(fit: SizeFit, source: str, start: float) -> list[str]:
+def _doubts(fit: SizeFit, source: str, start: float) -> list[Caution]:
     """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette."""
-    doubts = [f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
-              "is the silhouette whole? take it again, or remove it" for name, overlap in fit.overlaps.items()
-              if source == "references" and overlap < DOUBTFUL[name]]
+    doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
+                      "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
+              for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
     if start < POOR:
-        doubts.append(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
-                      "silhouette a person's, and does the person face the camera?")
+        doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
+                              "silhouette a person's, and does the person face the camera?",
+                              "body fits the first silhouette badly: check height and distance", HARMFUL))
     return doubts
 
 

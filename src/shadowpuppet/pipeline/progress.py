@@ -39,7 +39,7 @@ class Listener:
     """Receives a run's progress. Every method does nothing: override those of interest."""
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """A phase begins: `looking` or `tracking`; `total`: its number of frames, if known."""
+        """A phase begins, such as `tracking`; `total`: its number of frames, if known."""
 
     def advance(self, frames: int) -> None:
         """`frames` frames are tracked."""
@@ -184,6 +184,8 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
     camera, cameras = None if rig.is_multiview else rig.cameras[0], len(rig.cameras)
     try:
         truth = read_truth(rig.recording.truth, motion.joint_names) if rig.recording.truth is not None else None
+        if truth is not None:
+            truth = truth.between(rig.recording.begin, np.inf if rig.recording.duration is None else rig.recording.duration)
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
         warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)

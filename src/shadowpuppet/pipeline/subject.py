@@ -15,6 +15,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.errors import Caution
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.motion.motion import BLANK, MotionFrame
@@ -66,7 +67,7 @@ class TrackedSubject(ABC):
     """Sizes that other runs can use, written to person.toml."""
     summary: dict[str, Any]
     """How the person was fitted, as plain values: the entry `person` of look.json."""
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Caution, ...] = ()
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
@@ -102,9 +103,13 @@ class TrackedSubject(ABC):
         """Status of a frame without a state: `lost` or `absent`."""
         return "absent"
 
+    def landmarks(self, poses: Array) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
+        return self.body.points(poses)
+
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""
-        return self.body.points(pose[None])[0]
+        return self.landmarks(pose[None])[0]
 
     @cached_property
     def joint_columns(self) -> list[int]:

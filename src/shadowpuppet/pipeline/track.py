@@ -7,13 +7,16 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple
+from warnings import warn
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.jit import is_compiled
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.person import fit_monocular
@@ -40,9 +43,12 @@ from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
+from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.frozen import CameraWatch
+from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -83,26 +89,29 @@ class Prepared(NamedTuple):
 
     def check(self) -> TrackedSubject:
         """The fitted person. Raises `TrackingError` if tracking is hopeless."""
-        self.survey.check()
-        assert self.subject is not None
+        if self.subject is None:
+            raise TrackingError(f"{self.look.recording}: {self.look.refusal}; --anyway tries it")
         return self.subject
 
 
 @one_blas_thread()
-def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
+def look_at(recording: str | Path, options: Options | None = None, listener: Listener | None = None) -> Look | RigLook:
     """Examine a recording as `track_recording` does before tracking. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
     kind = kind_of(rig)
-    return prepare(generators(options)[0], rig, options, kind).look if kind.look_fits else kind.survey(rig, options).look
+    if kind.look_fits:
+        return prepare(generators(options)[0], rig, options, kind, listener=listener).look
+    return kind.survey(rig, options).look
 
 
 @one_blas_thread()
-def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[TrackedSubject, Look | RigLook]:
+def fit_person(recording: str | Path, file: str | Path, options: Options | None = None,
+               listener: Listener | None = None) -> tuple[TrackedSubject, Look | RigLook]:
     """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
     rig = open_rig(recording, options)
-    prepared = prepare(generators(options)[0], rig, options, kind_of(rig))
+    prepared = prepare(generators(options)[0], rig, options, kind_of(rig), listener=listener)
     subject = prepared.check()
     write_person(file, subject.person)
     return subject, prepared.look
@@ -129,11 +138,15 @@ def kind_of(rig: Rig) -> Kind:
     return MULTIVIEW if rig.is_multiview else MONOCULAR
 
 
-def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None) -> Prepared:
+def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
+            listener: Listener | None = None) -> Prepared:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
+    listener = listener or Listener()
+    listener.begin(f"looking at {len(rig.footage)} film{'s' if rig.is_multiview else ''}")
     survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
-    if survey.look.refusal is not None:
+    if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
+    listener.begin("measuring the person" if is_compiled() else "compiling, once (a minute or two), and measuring the person")
     subject = kind.fit(rng, survey, options)
     for _ in range(LOOKS_AGAIN):
         again = _looked_again(survey, subject, options, kind)
@@ -161,18 +174,20 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
-            "truth": recording.truth and recording.truth.resolve()}
+            "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
     with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as writer:
-        listener.begin("looking")
         start = time.perf_counter()
-        prepared = prepare(for_look, rig, options, kind, cache)
+        prepared = prepare(for_look, rig, options, kind, cache, listener)
         writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         _write_beside(writer.folder, prepared)
+        _check_cutoff(options, prepared.look.rate)
         _track(writer, prepared, kind, options, listener, for_track, cache)
+        _smooth(writer, prepared.check(), options, listener)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
+    metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
     warn_of_losses(written.motion)
     warn_of_left_out(metrics.get("left_out", []))
     warn_of_set_aside(metrics.get("set_aside", []))
@@ -185,6 +200,37 @@ def _write_beside(folder: Path, prepared: Prepared) -> None:
     write_whole(folder / "look.json", json_text(prepared.look) + "\n")
     write_person(folder / "person.toml", subject.person)
     write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
+
+
+def _check_cutoff(options: Options, rate: float) -> None:
+    """Raise `SettingsError` before tracking if the frame rate does not allow the filter's cut-off."""
+    if options.smoothing[0] == "butterworth" and np.isfinite(rate):
+        check_cutoff(options.cutoff, rate / options.every)
+
+
+def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
+    """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
+    method, gaps = options.smoothing
+    if method == "off" and gaps == 0:
+        writer.info["smoothing"] = {"method": "off"}
+        return
+    listener.begin("smoothing")
+    start, columns = time.perf_counter(), subject.joint_columns
+    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps,
+                              options.facing == "away")
+    try:
+        found = smoother(writer.motion)
+    except (SettingsError, np.linalg.LinAlgError) as error:
+        warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
+        writer.info["smoothing"] = {"method": "off"}
+        return
+    turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
+    if len(turned):
+        warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
+             "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
+    writer.revise(found.motion)
+    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
+    writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
 def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:

@@ -63,7 +63,7 @@ def check_image(path: Path, image: Image) -> None:
 def open_picture(path: Path, grey: bool) -> FrameSource:
     """A picture as a source of one frame."""
     size = size_of(read_image(path, grey))
-    return FrameSource(str(path), size, math.nan, 1, math.nan, lambda: iter([Frame(0.0, read_image(path, grey))]))
+    return FrameSource(str(path), size, math.nan, 1, math.nan, lambda _: iter([Frame(0.0, read_image(path, grey))]))
 
 
 def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
@@ -72,11 +72,13 @@ def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
     size, n = size_of(read_image(paths[0], grey)), len(paths)
     mean_rate = float((n - 1) / times[-1]) if n > 1 else math.nan
 
-    def read() -> Iterator[Frame]:
+    def read(begin: float) -> Iterator[Frame]:
         if assumed:
             warnings.warn(f"{folder}: no timestamps.txt in it and no rate given: {ASSUMED_RATE:g} frames/s are assumed",
                           ShadowPuppetWarning, stacklevel=2)
         for i, (time, path) in enumerate(zip(times.tolist(), paths)):
+            if time < begin:
+                continue
             image = read_image(path, grey)
             check_size(path, i, time, image, size)
             yield Frame(time, image)

@@ -20,17 +20,20 @@ METADATA = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z
 """Metadata of every file."""
 
 
-def write_parquet(path: str | Path, columns: Columns) -> None:
-    """Write columns; null for NaN. Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
-    write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
+def write_parquet(path: str | Path, columns: Columns, smoothing: str = "") -> None:
+    """Write columns; null for NaN. `smoothing`: how the motion was smoothed, metadata of the file.
+
+    Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
+    write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()},
+                {"smoothing": smoothing} if smoothing else {})
 
 
-def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns, each with values of one type or None. Raises the errors of `write_parquet`."""
+def write_lists(path: str | Path, columns: Mapping[str, Any], facts: Mapping[str, str] | None = None) -> None:
+    """Write columns, each with values of one type or None, and `facts` as metadata. Raises the errors of `write_parquet`."""
     arrow, parquet = _arrow(path)
     arrays = {name: arrow.array(column, from_pandas=True) for name, column in columns.items()}
     out = io.BytesIO()
-    parquet.write_table(arrow.table(arrays).replace_schema_metadata(METADATA), out)
+    parquet.write_table(arrow.table(arrays).replace_schema_metadata(METADATA | dict(facts or {})), out)
     write_whole(Path(path), out.getvalue())
 
 
