@@ -76,7 +76,9 @@ def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inve
         return label
     found = np.zeros_like(label)
     found[window] = limbs[np.asarray(parts, np.intp)]
-    return label | np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
+    out = label.copy()
+    out |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
+    return out
 
 
 def _limbs(sums: np.ndarray, noise: float) -> Labels:

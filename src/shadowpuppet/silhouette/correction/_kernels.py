@@ -225,8 +225,8 @@ def modes(pixels, levels, informative, log, bounds, width, least, window, shifts
 @kernel
 def restore_detail(image, smooth, scene, detail, inverse, quiet, near, out):
     """Move pixels (H, W, C) of a picture, uint8, back by the share of `detail` that they have lost: from 0 to 1, that by which the smoothed
-    picture lies from the `scene` toward scene + detail; inverse: of the squared length of `detail`, (H, W), or 0. Pixels nearer than `quiet`
-    to the scene, or farther than `near` from that line, root mean square of the channels, stay as they are."""
+    picture lies from the `scene` toward scene + detail; inverse: of the squared length of `detail`, (H, W), or 0. Pixels nearer than
+    `quiet` to the scene, or farther than `near` from that line, root mean square of the channels, stay as they are."""
     height, width, channels = image.shape
     quiet, near = channels * quiet * quiet, channels * near * near
     for y in range(height):

@@ -56,8 +56,8 @@ class LostDetail:
         from shadowpuppet.silhouette.correction._kernels import restore_detail
 
         out = np.empty_like(image)
-        restore_detail(_deep(image), _deep(smoothed(image)), self.scene, self.detail, self.inverse, np.float32(QUIET), np.float32(self.near),
-                       _deep(out))
+        restore_detail(_deep(image), _deep(smoothed(image)), self.scene, self.detail, self.inverse, np.float32(QUIET),
+                       np.float32(self.near), _deep(out))
         return out
 
 
