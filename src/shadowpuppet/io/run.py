@@ -2,7 +2,7 @@
 
     joints.csv     time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1), <limb>_status
     angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
-    intervals.csv  time, joint, x_low, x_high, y_low, y_high, z_low, z_high (m, world): 90 % bounds, a row for each joint of a frame
+    intervals.csv  time, joint, mode, weight, x, y, z, x_low, x_high, y_low, ... (m, world): 90 % bounds, and other places (`io.intervals`)
     motion.npz     the fields of `Motion`, arrays only
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...

@@ -172,8 +172,9 @@ class LiveSession(ABC):
     def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
         assert self.subject is not None
         masks = self._masks(shot, images)
-        observation = self.subject.observe(masks)
+        observation = self.subject.observe(self._trusted(shot.captured, masks))
         self._state = self.subject.next_state(self.rng, self._state, observation)
+        self._followed(self.subject, self._state)
         seconds = shot.captured - self._began if shot.shown is None else shot.shown
         frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
         now = self.clock()
@@ -183,6 +184,13 @@ class LiveSession(ABC):
         elif np.isnan(self._lost_since):
             self._lost_since = shot.captured
         return Outcome(self._view(images, masks, frame, now - shot.captured), frame, images)
+
+    def _trusted(self, seconds: float, masks: tuple[Mask, ...]) -> Sequence[Mask | None]:
+        """The masks (H, W) taken at a time (s), None for cameras that are set aside."""
+        return masks
+
+    def _followed(self, subject: TrackedSubject, state: Any) -> None:
+        """Note the tracker's state of the masks that `_trusted` was last called with."""
 
     def _begin_tracking(self, subject: TrackedSubject) -> None:
         self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -23,8 +23,9 @@ from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment
+from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.subject import average_body
+from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey import OPENED, OPENING
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.video import Image
@@ -52,6 +53,7 @@ class RigSession(LiveSession):
         body = average_body(self.options.multiview.body)
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
         self._segment: list[Segment] = []
+        self._watch = RigWatch(len(self.full))
         given = self.scene if self.scene and all(self.scene) else None
         self.begin_learning()
         self.begin_waiting()
@@ -114,6 +116,7 @@ class RigSession(LiveSession):
         self.scene = scenes
         self._segment = [Silhouettes("live", learn_background(scene, self.options.silhouette)).following() for scene in scenes]
         self.phase, self._state, self._before = ("tracking" if self.subject else "waiting"), None, None
+        self._watch = RigWatch(len(self.full))
 
     def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
         masks = self._masks(shot, images)
@@ -151,6 +154,16 @@ class RigSession(LiveSession):
             self._begin_tracking(found)
         return Outcome(self._view(images))
 
+    def _begin_tracking(self, subject: TrackedSubject) -> None:
+        super()._begin_tracking(subject)
+        self._watch = RigWatch(len(self.full))
+
+    def _trusted(self, seconds: float, masks: tuple[Mask, ...]) -> Sequence[Mask | None]:
+        return self._watch(seconds, masks)
+
+    def _followed(self, subject: TrackedSubject, state: Any) -> None:
+        self._watch.tracked(subject, state)
+
     def _scaled(self, shot: SnapshotSet) -> tuple[Image, ...]:
         return tuple(map(scaled, shot.images, self._worked))
 
@@ -158,6 +171,7 @@ class RigSession(LiveSession):
         return tuple(segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images))
 
     def _forget_time(self) -> None:
+        self._watch = RigWatch(len(self.full))
         for collector in self._collectors:
             collector.wait()
         self._first.clear()
@@ -175,5 +189,6 @@ class RigSession(LiveSession):
             slowest = max(self._collectors, key=lambda collector: collector.left)
             return slowest.message, slowest.left
         if self.phase == "tracking":
-            return "the body does not fit any more: measure anew" if self._gone else "", None
+            aside = ", ".join(f"{self.watchdogs[n].name} ({why})" for n, why in sorted(self._watch.present.items()))
+            return "the body does not fit any more: measure anew" if self._gone else f"set aside: {aside}" if aside else "", None
         return self._hint if self.phase == "waiting" else "measuring: one moment", None

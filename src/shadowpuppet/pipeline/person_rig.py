@@ -16,11 +16,11 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.camera.rasterize import Bits, Picture
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.motion.motion import JointTable, MotionFrame
+from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.pipeline.learn_prior import familiar
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
@@ -80,6 +80,12 @@ class MultiviewSubject(TrackedSubject):
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""
         return () if state is None else tuple(map(left_out, state.unexplained))
+
+    def drawn(self, state: MultiviewState | None) -> tuple[Bits, ...]:
+        """The body of a state in each camera's picture of half the size; empty if it is lost or absent."""
+        if state is None or state.status in BLANK:
+            return ()
+        return tuple(picture.draw(state.pose) for picture in self.tracker.views.pictures)
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""

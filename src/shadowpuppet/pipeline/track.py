@@ -35,6 +35,7 @@ from shadowpuppet.pipeline.progress import (
     warn_of_losses,
     warn_of_set_aside,
 )
+from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -42,7 +43,6 @@ from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_na
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.frozen import CameraWatch
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -197,7 +197,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
            cache: SilhouetteCache | None) -> None:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
     subject, survey, timer, state, before, count = prepared.check(), prepared.survey, StageTimer(), None, None, 0
-    watch = CameraWatch(len(survey.rig.footage))
+    watch = RigWatch(len(survey.rig.footage))
     left_out = LeftOut([footage.view.camera for footage in survey.rig.footage])
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
@@ -216,6 +216,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
+                    watch.tracked(subject, state)
                 left_out.add(seen.time, subject.left_out(state))
                 with timer.time("doubt"):
                     found, before = motion_frame(subject, seen.time, state, observation, before)
@@ -227,4 +228,4 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 listener.advance(count)
     finally:
         writer.metrics |= timings(timer, kind.stages, count, time.perf_counter() - began)
-        writer.metrics |= left_out.metrics() | set_aside(watch, survey.rig.names)
+        writer.metrics |= left_out.metrics() | set_aside(watch.intervals, survey.rig.names)
