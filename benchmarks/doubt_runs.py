@@ -103,7 +103,7 @@ class Tracked:
     errors: Array
     """Truth less estimate (T, L, 3), metres; not a number where there is none."""
     modes: Array
-    """Of every place of an arm in every frame, the estimate and its modes: the stated weight, and 1 if the truth is nearest to it (N, 2)."""
+    """Of every place of an arm in every frame, the estimate and its modes (N, 2): the stated weight, and 1 if the truth is nearest."""
 
 
 def mode_rows(modes: Sequence[Mode], points: Array, truth: Array, names: Sequence[str]) -> list[tuple[float, float]]:
@@ -204,7 +204,8 @@ def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for run in TRACK[kind](path):
             np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
-                                modes=run.modes, names=list(run.components), components=np.stack(list(run.components.values()), 3).astype(np.float32))
+                                modes=run.modes, names=list(run.components),
+                                components=np.stack(list(run.components.values()), 3).astype(np.float32))
         (folder / "done").touch()
     return sorted(folder.glob("*.npz"))
 
@@ -220,5 +221,5 @@ def read_runs(files: Iterable[Path]) -> list[Tracked]:
     for file in files:
         data = np.load(file, allow_pickle=False)
         components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
-        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"], data["modes"] if "modes" in data else np.empty((0, 2))))
+        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"], data["modes"]))
     return found

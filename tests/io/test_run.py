@@ -366,7 +366,8 @@ def test_intervals_of_joints_of_any_name(tmp_path, name):
 
 def test_other_places_follow_their_joint_with_their_weights(tmp_path):
     writer, none = IntervalWriter(["neck", "left_elbow", "left_hand"]), [np.nan] * 3
-    modes = [Mode("left_arm", 0.25, np.array([none, none, [7.0, 8, 9]])), Mode("left_arm", 0.15, np.array([none, [4.0, 5, 6], [1.0, 2, 3]]))]
+    modes = [Mode("left_arm", 0.25, np.array([none, none, [7.0, 8, 9]])),
+             Mode("left_arm", 0.15, np.array([none, [4.0, 5, 6], [1.0, 2, 3]]))]
     frame = MotionFrame(0.5, "tracked", joints=np.ones((3, 3)), joint_sd=np.full((3, 3), 0.1), modes=modes)
     (tmp_path / "a.csv").write_text(writer.header() + writer.lines(frame) + writer.lines(frame._replace(time=1.0, modes=())), "utf-8")
     found = read_intervals(tmp_path / "a.csv")

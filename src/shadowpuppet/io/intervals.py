@@ -1,8 +1,8 @@
 """Writes and reads the 90 % intervals of a run's joints and the other places where they may be, intervals.csv.
 
-A row for each joint of a frame whose accuracy is stated, with mode 0: the estimate, and bounds between which the joint is with 90 %, whatever
-its mode. After it a row for each other place that the pictures allow (an arm before or behind the body may look the same): mode 1, 2, ...,
-without bounds. Rows of one limb with the same time and mode belong to one posture. Weights of a joint's rows add up to 1.
+A row for each joint of a frame whose accuracy is stated, with mode 0: the estimate, and bounds between which the joint is with 90 %,
+whatever its mode. After it a row for each other place that the pictures allow (an arm before or behind the body may look the same): mode 1,
+2, ..., without bounds. Rows of one limb with the same time and mode belong to one posture. Weights of a joint's rows add up to 1.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.video import Image
@@ -66,6 +67,8 @@ class LiveSession(ABC):
     def __post_init__(self) -> None:
         """Set the state before the first picture."""
         self._began, self._lost_since, self._new, self._state, self._before = np.nan, np.nan, False, None, None
+        self._watch: RigWatch | None = None
+        """Which of several cameras are set aside."""
         self._measured: Callable[[], Any] = lambda: None
 
     # Input
@@ -172,9 +175,10 @@ class LiveSession(ABC):
     def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
         assert self.subject is not None
         masks = self._masks(shot, images)
-        observation = self.subject.observe(self._trusted(shot.captured, masks))
+        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks))
         self._state = self.subject.next_state(self.rng, self._state, observation)
-        self._followed(self.subject, self._state)
+        if self._watch is not None:
+            self._watch.tracked(self.subject, self._state)
         seconds = shot.captured - self._began if shot.shown is None else shot.shown
         frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
         now = self.clock()
@@ -184,13 +188,6 @@ class LiveSession(ABC):
         elif np.isnan(self._lost_since):
             self._lost_since = shot.captured
         return Outcome(self._view(images, masks, frame, now - shot.captured), frame, images)
-
-    def _trusted(self, seconds: float, masks: tuple[Mask, ...]) -> Sequence[Mask | None]:
-        """The masks (H, W) taken at a time (s), None for cameras that are set aside."""
-        return masks
-
-    def _followed(self, subject: TrackedSubject, state: Any) -> None:
-        """Note the tracker's state of the masks that `_trusted` was last called with."""
 
     def _begin_tracking(self, subject: TrackedSubject) -> None:
         self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True

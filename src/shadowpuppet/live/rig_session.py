@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -53,7 +53,6 @@ class RigSession(LiveSession):
         body = average_body(self.options.multiview.body)
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
         self._segment: list[Segment] = []
-        self._watch = RigWatch(len(self.full))
         given = self.scene if self.scene and all(self.scene) else None
         self.begin_learning()
         self.begin_waiting()
@@ -116,7 +115,6 @@ class RigSession(LiveSession):
         self.scene = scenes
         self._segment = [Silhouettes("live", learn_background(scene, self.options.silhouette)).following() for scene in scenes]
         self.phase, self._state, self._before = ("tracking" if self.subject else "waiting"), None, None
-        self._watch = RigWatch(len(self.full))
 
     def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
         masks = self._masks(shot, images)
@@ -158,12 +156,6 @@ class RigSession(LiveSession):
         super()._begin_tracking(subject)
         self._watch = RigWatch(len(self.full))
 
-    def _trusted(self, seconds: float, masks: tuple[Mask, ...]) -> Sequence[Mask | None]:
-        return self._watch(seconds, masks)
-
-    def _followed(self, subject: TrackedSubject, state: Any) -> None:
-        self._watch.tracked(subject, state)
-
     def _scaled(self, shot: SnapshotSet) -> tuple[Image, ...]:
         return tuple(map(scaled, shot.images, self._worked))
 
@@ -171,7 +163,7 @@ class RigSession(LiveSession):
         return tuple(segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images))
 
     def _forget_time(self) -> None:
-        self._watch = RigWatch(len(self.full))
+        self._watch = None if self._watch is None else RigWatch(len(self.full))
         for collector in self._collectors:
             collector.wait()
         self._first.clear()
@@ -184,11 +176,16 @@ class RigSession(LiveSession):
         found = frame or MotionFrame(0.0, self.phase)
         return {"image": overlay_grid(FrameSet(found.time, images, masks or (None,) * len(images)), found, pictures)}
 
+    def _aside(self) -> str:
+        """Which cameras are set aside, and why; empty if none is."""
+        present = {} if self._watch is None else self._watch.present
+        names = ", ".join(f"{self.watchdogs[n].name} ({why})" for n, why in sorted(present.items()))
+        return f"set aside: {names}" if names else ""
+
     def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
         if self.phase == "learning":
             slowest = max(self._collectors, key=lambda collector: collector.left)
             return slowest.message, slowest.left
         if self.phase == "tracking":
-            aside = ", ".join(f"{self.watchdogs[n].name} ({why})" for n, why in sorted(self._watch.present.items()))
-            return "the body does not fit any more: measure anew" if self._gone else f"set aside: {aside}" if aside else "", None
+            return "the body does not fit any more: measure anew" if self._gone else self._aside(), None
         return self._hint if self.phase == "waiting" else "measuring: one moment", None

@@ -12,8 +12,8 @@ from shadowpuppet.tracking.multiview.out_of_step import StepWatch
 
 
 class RigWatch:
-    """Sets cameras aside that are frozen, blind or out of step, and takes them back. `watch(seconds, masks)` has None in place of their masks;
-    `tracked` follows for each frame set, in the same order."""
+    """Sets cameras aside that are frozen, blind or out of step, and takes them back: `watch(seconds, masks)` has None in place of their
+    masks. `tracked` follows for each frame set, in the same order."""
 
     def __init__(self, number: int) -> None:
         """For a number of cameras."""

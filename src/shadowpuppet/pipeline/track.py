@@ -35,8 +35,8 @@ from shadowpuppet.pipeline.progress import (
     warn_of_losses,
     warn_of_set_aside,
 )
-from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
+from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame

@@ -28,8 +28,8 @@ DERIVATIVE = 1e-3
 ALLOWED = 60.0
 """A mirror image counts half in the joints' variances if it costs this much more (pixels at 320 x 240), times ln 3."""
 TEMPERATURE, ODDS = 400.0, 2.0
-"""Of modes: cost (pixels at 320 x 240) for which one is less probable by the factor e, as neighbouring pixels err together; and how much more
-probable the estimate is than one that costs the same. Both by the logarithmic score of the weights on made recordings."""
+"""Of modes: cost (pixels at 320 x 240) for which one is less probable by the factor e, as neighbouring pixels err together; and how much
+more probable the estimate is than one that costs the same. Both by the logarithmic score of the weights on made recordings."""
 APART = 0.1
 """Distance (m) of elbow or wrist from which on two poses of an arm are different modes."""
 MOVED = 0.03
@@ -69,7 +69,7 @@ class Mirrors:
         return Images(self.picture.points(poses).reshape(-1, len(FLIPS), *points.shape), more)
 
     def modes(self, points: Array, images: Images) -> tuple[Mode, ...]:
-        """The places of the arms, in the world, that differ from the estimate, `points` (L, 3), and from one another; the likelier first."""
+        """Places of the arms, in the world, that differ from the estimate, `points` (L, 3), and from one another; the likelier first."""
         found, T = list[Mode](), self.picture.camera.T_camera_world
         for (_, chain), more, own in zip(self.arms, images.more, images.points):
             for n, weight in _weights(points[chain[1:]], own[:, chain[1:]], more).items():
@@ -120,8 +120,8 @@ def _mirrored(chains: Array) -> Array:
 
 
 def _weights(ends: Array, images: Array, more: Array) -> dict[int, float]:
-    """Weights, by index, of those images (3, 2, 3) of elbow and wrist that differ from the estimate's, `ends` (2, 3), and from cheaper ones,
-    the cheapest first. `more` (3,): what they cost more, pixels at 320 x 240."""
+    """Weights, by index, of those images (3, 2, 3) of elbow and wrist that differ from the estimate's, `ends` (2, 3), and from cheaper
+    ones, the cheapest first. `more` (3,): what they cost more, pixels at 320 x 240."""
     places, kept = [ends], list[int]()
     for n in np.argsort(more, kind="stable").tolist():
         if all(np.linalg.norm(images[n] - place, axis=1).max() >= APART for place in places):

@@ -77,9 +77,9 @@ class MonocularDoubt:
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
         turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
-        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; how far it left its course; the
-        misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the error of the
-        person's distance.
+        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; how far it
+        left its course; the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the
+        error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)

@@ -26,7 +26,7 @@ class Trail(NamedTuple):
     """Of each time (L, 3), metres."""
 
     def with_frame(self, seconds: float, points: Array) -> Trail:
-        """The trail with a new frame's joints (L, 3), without what `surprise` does not need: frames of the time `KEPT`, and at least two."""
+        """The trail with a new frame's joints (L, 3), less what `surprise` does not need: frames of the time `KEPT`, and two at least."""
         recent = sum(seconds - then <= KEPT for then in self.seconds)
         first = -max(recent, 2)
         return Trail((*self.seconds[first:], seconds), (*self.points[first:], points))

@@ -23,8 +23,8 @@ MEMORY = 1.0
 ENOUGH = 0.5
 """Change of the drawn body over the area of the silhouette, summed, that a verdict needs."""
 LATE, IN_STEP = 0.3, 0.0
-"""Share of the body's change, by which another moment's body explains the silhouette better, from which on a camera is out of step; and up to
-which one is taken back. It is -1 if the silhouette is exactly the present body, 1 if it is the other's."""
+"""Share of the body's change, by which another moment's body explains the silhouette better, from which on a camera is out of step; and up
+to which one is taken back. It is -1 if the silhouette is exactly the present body, 1 if it is the other's."""
 MOST = 1.5
 """The same, beyond which older evidence gives way to newer."""
 OTHERS = 0.5
@@ -44,11 +44,11 @@ class Seen(NamedTuple):
 
 
 class StepWatch:
-    """Compares each camera's silhouettes with the body of earlier and later frames. `late` is a camera whose silhouette is better explained by
-    the body of an earlier frame, `early` one whose earlier silhouette is better explained by the present body.
+    """Compares each camera's silhouettes with the body of earlier and later frames. `late` is a camera whose silhouette is better explained
+    by the body of an earlier frame, `early` one whose earlier silhouette is better explained by the present body.
 
-    A frame set is read with `__call__`, and given back with `tracked` when its body is known, in the same order. What is set aside in a frame
-    depends on frames `AHEAD` or more before, so that it does not matter how far ahead frames are read.
+    A frame set is read with `__call__`, and given back with `tracked` when its body is known, in the same order. What is set aside in a
+    frame depends on frames `AHEAD` or more before, so that it does not matter how far ahead frames are read.
     """
 
     def __init__(self, number: int) -> None:
@@ -70,8 +70,8 @@ class StepWatch:
         return tuple(None if each else mask for mask, each in zip(masks, why))
 
     def tracked(self, drawn: Sequence[Bits]) -> None:
-        """The body of the first frame set that was read and is not yet tracked, as bits in each camera's picture of half the size; empty if it
-        has none."""
+        """The body of the first frame set that was read and is not yet tracked, as bits in each camera's picture of half the size; empty
+        if it has none."""
         seconds, masks = self._read.popleft()
         if not drawn:
             self._seen.clear()
