@@ -28,7 +28,7 @@ class Follower:
 
     def __init__(self, body, cameras) -> None:
         self.body, self.cameras, self.calls = body, tuple(cameras), []
-        self.views = BodyInViews(body, cameras)
+        self.views = BodyInViews(body, ())  # an upright body is no measure of whether cameras are in step
 
     def start(self, rng, points, masks) -> Standing:
         self.calls.append("start")

@@ -20,9 +20,9 @@ from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 GONE = 2.0
@@ -178,7 +178,7 @@ class LiveSession(ABC):
         observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks))
         self._state = self.subject.next_state(self.rng, self._state, observation)
         if self._watch is not None:
-            self._watch.tracked(self.subject, self._state)
+            self._watch.tracked(self.subject.drawn(self._state))
         seconds = shot.captured - self._began if shot.shown is None else shot.shown
         frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
         now = self.clock()

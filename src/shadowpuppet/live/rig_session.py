@@ -23,11 +23,11 @@ from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment
-from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey import OPENED, OPENING
 from shadowpuppet.silhouette import learn_background
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 STEP_IN = "step in between the cameras and move a little"

@@ -36,13 +36,13 @@ from shadowpuppet.pipeline.progress import (
     warn_of_set_aside,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
-from shadowpuppet.pipeline.rig_watch import RigWatch
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -216,7 +216,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
-                    watch.tracked(subject, state)
+                    watch.tracked(subject.drawn(state))
                 left_out.add(seen.time, subject.left_out(state))
                 with timer.time("doubt"):
                     found, before = motion_frame(subject, seen.time, state, observation, before)

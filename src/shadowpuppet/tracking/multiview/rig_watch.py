@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.pipeline.subject import TrackedSubject
+from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.tracking.frozen import CameraWatch, Interval
 from shadowpuppet.tracking.multiview.out_of_step import StepWatch
 
@@ -24,10 +23,10 @@ class RigWatch:
         """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside."""
         return self._steps(seconds, self._watch(seconds, masks))
 
-    def tracked(self, subject: TrackedSubject, state: Any) -> None:
-        """The tracker's state of the first frame set that has none yet."""
+    def tracked(self, drawn: Sequence[Bits]) -> None:
+        """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""
         if self._many:
-            self._steps.tracked(subject.drawn(state))
+            self._steps.tracked(drawn)
 
     @property
     def intervals(self) -> list[Interval]:
