@@ -15,7 +15,7 @@ import os
 import re
 import shutil
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import groupby
 from multiprocessing import get_context
@@ -36,6 +36,7 @@ from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.pipeline.verdict.of_run import expected_error
 from shadowpuppet.synthetic import Spec, read_spec, synthesize
 from shadowpuppet.synthetic.faults.kinds import KINDS
 from shadowpuppet.video import open_frames
@@ -44,6 +45,8 @@ HERE = Path(__file__).resolve().parent.parent / "build" / "faults"
 PLACE = r"(<!-- table: {} -->\n).*?(<!-- end of table -->)"
 NEAR = 0.1
 """Joint error (m) below which a doubtful limb is a false alarm."""
+WRONG = 2.0
+"""Ratio to the clean film's error above which a run is to be called bad."""
 SURE = 3
 """Number of good frames after which a person is recovered."""
 ONE_CAMERA, FOUR_CAMERAS = "one camera", "four cameras"
@@ -69,6 +72,10 @@ class Measures(NamedTuple):
     where the person cannot be seen."""
     refused: str = ""
     """Why the film could not be tracked."""
+    verdict: str = "bad"
+    """The run's verdict on itself."""
+    expected: float = np.nan
+    """Mean joint error, metres, that the stated standard deviations lead one to expect."""
 
 
 def made(film: Spec, row: Row, folder: Path, again: bool) -> Path:
@@ -95,7 +102,8 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             cache, options = SilhouetteCache(), make_options({})
-            motion = track_recording(path, path / "run", options, cache=cache).motion
+            run = track_recording(path, path / "run", options, cache=cache)
+            motion = run.motion
     except ShadowPuppetError as error:
         count = len(truth.times)
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
@@ -111,7 +119,8 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
     vouched = (motion.limb_status == "tracked").any(1)
-    return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(seen, alike, np.nan))
+    return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(seen, alike, np.nan),
+                    verdict=run.metrics["verdict"]["word"], expected=expected_error(motion))
 
 
 def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array, Array]:
@@ -220,12 +229,27 @@ class Figures(NamedTuple):
         """The row as Markdown."""
         name = self.row.name + (" (refused)" if any(one.refused for one, _ in self.runs) else "")
         cells = [name, *(self.error(part) for part in range(3)), self.masks(), self.status(), *self.judged(), self.noticed(),
-                 self.recovered()]
+                 self.recovered(), "/".join(one.verdict for one, _ in self.runs)]
         return "| " + " | ".join(cells) + " |"
 
+    def verdicts(self) -> Iterator[tuple[bool, bool]]:
+        """For each film whether its error is over twice the clean film's, and whether the run is called bad."""
+        for one, plain in self.runs:
+            shared = min(len(one.mean), len(plain.mean))
+            known = np.isfinite(one.mean[:shared]) & np.isfinite(plain.mean[:shared])
+            yield bool(one.mean[:shared][known].mean() > WRONG * plain.mean[:shared][known].mean()), one.verdict == "bad"
 
-HEAD = """| fault | before | in | after | masks | tracked/uncertain/lost/absent | far | silent | doubted | noticed | recovered |
-|---|---|---|---|---|---|---|---|---|---|---|"""
+
+HEAD = """| fault | before | in | after | masks | tracked/uncertain/lost/absent | far | silent | doubted | noticed | recovered | verdict |
+|---|---|---|---|---|---|---|---|---|---|---|---|"""
+
+
+def summed_up(films: Iterable[tuple[bool, bool]]) -> str:
+    """The verdicts of a table's films, in a sentence."""
+    told = list(films)
+    wrong, right = [bad for off, bad in told if off], [bad for off, bad in told if not off]
+    return (f"Of {len(wrong)} films with over {WRONG:g} times the clean film's error {sum(wrong)} are called bad, of the {len(right)} "
+            f"others {sum(right)}.")
 
 
 def tables(jobs: Sequence[tuple[str, Spec, Row]], folder: Path, workers: int, again: bool) -> Iterator[tuple[str, Figures]]:
@@ -290,7 +314,7 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path, help="write the tables there too, at their places in docs/faults.md")
     parser.add_argument("--json", type=Path, help="write all frames' measures there")
     args = smallest.parse(parser, _smallest)
-    lines, everything = dict[str, list[str]](), []
+    lines, films, everything = dict[str, list[str]](), dict[str, list[tuple[bool, bool]]](), []
     try:
         jobs = chosen(args.rows, args.cameras, args.films, args.small)
     except SettingsError as error:
@@ -299,10 +323,13 @@ def main() -> None:
         if table not in lines:
             print(f"\n{table}\n\n{HEAD}", flush=True)
         lines.setdefault(table, [HEAD]).append(figures.line())
+        films.setdefault(table, []).extend(figures.verdicts())
         everything.append(_plain(table, figures))
         print(lines[table][-1], flush=True)
-    for table, rows in lines.items() if args.markdown else ():
-        into_page(args.markdown, table, "\n".join(rows))
+    for table, rows in lines.items():
+        print(f"{table}: {summed_up(films[table])}")
+        if args.markdown:
+            into_page(args.markdown, table, "\n".join([*rows, "", summed_up(films[table])]))
     if args.json:
         args.json.write_text(json.dumps(everything) + "\n", encoding="utf-8")
 

@@ -76,13 +76,16 @@ def home(tmp_path) -> Path:
 
 @pytest.fixture
 def shell(capsys, monkeypatch, home, columns) -> Callable[..., Said]:
-    """Runs a command line; returns exit code, standard output and standard error."""
+    """Runs a command line; returns exit code, standard output, and standard error without lines of progress."""
+    from shadowpuppet.cli.terminal import PROGRESS
+
     monkeypatch.chdir(home)
     monkeypatch.setenv("COLUMNS", str(columns))
 
     def call(*tokens: object) -> Said:
         capsys.readouterr()
         code = cli.run([str(token) for token in tokens])
-        return Said(code, *capsys.readouterr())
+        out, err = capsys.readouterr()
+        return Said(code, out, "".join(line for line in err.splitlines(keepends=True) if not line.startswith(PROGRESS)))
 
     return call

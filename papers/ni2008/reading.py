@@ -15,7 +15,7 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.errors import RecordingError
+from shadowpuppet.errors import RecordingError, TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.table import read_joints
@@ -53,7 +53,8 @@ def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
     assert recording.training is not None
     rig = open_rig(source.path, options)
     survey = survey_rig(rig, options)
-    survey.check()
+    if survey.look.refusal is not None:
+        raise TrackingError(f"{survey.look.recording}: {survey.look.refusal}")
     sets = synchronized_frames(rig, survey.silhouettes, ready=source.masks)
     seen = (Seen(each.time, list(each.masks)) for each in sets)
     return rig.cameras, _arrays(rig.cameras, rig.rate, seen, read_joints(recording.truth), read_motion(recording.training), OPENED)

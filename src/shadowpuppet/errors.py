@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
+import errno
+import stat
 from collections.abc import Iterable
+from pathlib import Path
 
-BROKEN, MISTAKE, SOME_FAILED, INTERRUPTED = 1, 2, 3, 130
+NOTED, HARMFUL, RUINOUS = 1, 2, 3
+"""Weights of a `Caution`."""
+BROKEN, MISTAKE, SOME_FAILED, PERSON_LOST, INTERRUPTED = 1, 2, 3, 4, 130
 """Exit codes other than 0: the core does not work on this machine (`doctor`) or a bug of the program; unusable input; some of several runs
-failed (`batch`); Ctrl-C."""
+failed (`batch`); a run that lost the person in most frames (`track`); Ctrl-C."""
+
+
+LONGEST = 2000
+"""Number of characters of a message beyond which its middle is left out."""
+
+
+def one_line(text: object) -> str:
+    """A message on one line, without control characters and of limited length: names and values in it may come from anywhere."""
+    line = str(text)
+    if not line.isprintable():
+        line = "".join(each if each.isprintable() else " " if each.isspace() else "\ufffd" for each in line)
+    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
 class ShadowPuppetError(Exception):
     """A mistake of the user or bad input, in one sentence: where, what was found, what is possible.
 
-    The command line prints it without a traceback and exits with code 2.
+    The command line prints it without a traceback and exits with code 2. Its text is one line of limited length (`one_line`).
     """
+
+    def __str__(self) -> str:
+        """The sentence."""
+        return one_line(super().__str__())
 
 
 class CalibrationError(ShadowPuppetError):
@@ -44,6 +65,28 @@ class SettingsError(ShadowPuppetError, ValueError):
     """A setting with an unknown name or an impossible value."""
 
 
+class Caution(str):
+    """What may harm a run, and its remedy, in a sentence; `short` says both in at most ten words."""
+
+    short: str
+    weight: int
+    """`NOTED`: lengths or details may be off; `HARMFUL`: joints are; `RUINOUS`: most of the run is."""
+
+    def __new__(cls, sentence: str, short: str, weight: int) -> Caution:
+        """A sentence with its short form and weight."""
+        made = super().__new__(cls, sentence)
+        made.short, made.weight = short, weight
+        return made
+
+    def __getnewargs__(self) -> tuple[str, str, int]:
+        """What `__new__` takes, for copies."""
+        return str(self), self.short, self.weight
+
+    def about(self, what: str) -> Caution:
+        """The same doubt about one camera or file, which both forms name first."""
+        return Caution(f"{what}: {self}", f"{what}: {self.short}", self.weight)
+
+
 def choices(names: Iterable[str]) -> str:
     """Valid names for a message: `a, b, c`."""
     return ", ".join(sorted(names)) or "none"
@@ -60,5 +103,16 @@ def reason(error: BaseException) -> str:
     return (getattr(error, "strerror", None) or str(error) or "unknown reason").lower()
 
 
+def check_regular(path: Path) -> None:
+    """Raise `OSError` for what is no file, such as a pipe, which would be waited for without end, or a device."""
+    kind = path.stat().st_mode
+    if not stat.S_ISREG(kind):
+        raise OSError(errno.EINVAL, "is a directory" if stat.S_ISDIR(kind) else "is a pipe or a device, expected a file")
+
+
 class ShadowPuppetWarning(UserWarning):
     """A problem that does not stop the work."""
+
+    def __str__(self) -> str:
+        """The sentence, as that of a `ShadowPuppetError`."""
+        return one_line(super().__str__())

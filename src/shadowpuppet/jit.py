@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -41,3 +43,9 @@ REDUCTION_MATH = {"contract", "nsz", "arcp", "nnan"}
 compiled and the cached version are optimised separately and would differ in the last bit."""
 reduction_kernel = compiled(**KERNEL_OPTIONS, fastmath=REDUCTION_MATH)
 """Kernel of sums over finite numbers, lane by lane."""
+
+
+def is_compiled() -> bool:
+    """Whether kernels of the package were compiled before, and kept on disk; the first time takes a minute or more."""
+    place = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parent)
+    return next(place.rglob("*.nbi"), None) is not None

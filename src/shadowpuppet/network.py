@@ -13,6 +13,10 @@ from urllib.parse import urlsplit
 
 from shadowpuppet.errors import SettingsError, reason
 
+MAX_CONNECTIONS = 32
+"""Connections that each server keeps open at a time."""
+REQUEST_SECONDS = 5.0
+"""Time within which a client must have sent its request."""
 LOCAL = "127.0.0.1"
 """The loopback address."""
 Server = TypeVar("Server")
@@ -122,8 +126,9 @@ def is_same_origin(headers: Any) -> bool:
 
 
 def are_origins_allowed(headers: Any, allowed: frozenset[str]) -> bool:
-    """Whether a request comes from a page of this machine, of an origin in `allowed` (* for any), or not from a page."""
-    return all(is_loopback(host_of(origin)) or origin in allowed or "*" in allowed for origin in headers.get_all("Origin") or [])
+    """Whether a request comes from a page of an origin in `allowed` (* for any), or not from a page. Pages of this machine are no
+    exception: they may be any program's."""
+    return all(origin in allowed or "*" in allowed for origin in headers.get_all("Origin") or [])
 
 
 def host_of(url: str) -> str:
@@ -139,3 +144,13 @@ def page_headers(policy: str) -> dict[str, str]:
     return {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
             "Cross-Origin-Resource-Policy": "same-origin",
             "Content-Security-Policy": f"{policy}; frame-ancestors 'none'"}
+
+
+def silent_logger(name: str) -> Any:
+    """A logger without output: clients that break off, or send what is no request, are no problem of a session."""
+    import logging
+
+    logger = logging.getLogger(name)
+    logger.addHandler(logging.NullHandler())
+    logger.propagate = False
+    return logger

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import io
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +20,8 @@ import numpy as np
 import pytest
 
 from shadowpuppet.cli import app as cli
+from shadowpuppet.cli import terminal as terminal_module
+from shadowpuppet.errors import PERSON_LOST
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.metrics import UPPER_JOINTS
 from shadowpuppet.pipeline.options import Options, make_options, options_text
@@ -115,9 +119,11 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert "\x1b" not in out
     assert max(map(len, out.splitlines())) <= 80
     assert not any(line.endswith(" ") for line in out.splitlines())
-    for word in ("camera       cam, 160 x 120 pixels, 60 degrees wide, calibrated",
-                 f"film         {made.FRAMES} frames, 8 frames/s", "scale",
-                 "exact masks", "person", f"frames   {made.FRAMES}",
+    assert out.startswith("verdict  good\n")
+    assert out.count("verdict  ") == 2  # on the recording, and on the run
+    assert "exact masks" not in out
+    for word in ("camera     cam, 160 x 120 pixels, 60 degrees wide, calibrated",
+                 f"film       {made.FRAMES} frames, 8 frames/s", "scale", "person", f"frames   {made.FRAMES}",
                  "doubt    outline fits in", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
         assert word in out
     assert "run-tiny/joints.csv" in out
@@ -130,12 +136,34 @@ def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
     assert "--quiet" in shell(name, "--help")[1]
 
 
+def test_progress_is_printed_where_there_is_no_terminal(capsys, monkeypatch):
+    monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
+    with terminal_module.terminal() as listener:
+        listener.begin("looking at 4 films")
+        time.sleep(0.1)
+        listener.begin("tracking", 80)
+        listener.advance(20)
+        time.sleep(0.1)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "... looking at 4 films, 0 s"
+    assert lines[-1].startswith("... tracking 20/80, ")
+    time.sleep(0.1)
+    with terminal_module.terminal(quiet=True) as listener:
+        listener.begin("tracking")
+        time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+
+
 def test_quiet_is_quiet(shell, recording):
     assert shell("track", recording, "-o", "run", "--quiet", *QUICK) == (0, "", "")
 
 
 def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
     code, out, err = shell("info", recording)
+    assert (code, err) == (0, "")
+    assert out.startswith("verdict  good\n")
+    assert "exact masks" not in out
+    code, out, err = shell("info", recording, "--verbose")
     assert (code, err) == (0, "")
     assert "these silhouettes overlap the ready ones by 0.9" in out
     assert not list(tmp_path.iterdir())
@@ -178,9 +206,10 @@ def test_evaluate_says_when_the_truth_is_gone(shell, run, tmp_path):
 
 
 def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, tmp_path):
-    code, out, err = shell("track", recording, "--silhouette.method", "averaging", "-o", tmp_path / "plain", *QUICK)
-    assert code == 0
+    code, out, err = shell("track", recording, "--silhouette.method", "averaging", "-o", tmp_path / "plain", "--verbose", *QUICK)
+    assert code == PERSON_LOST  # the silhouettes of this method are too poor in so small a film
     assert "Traceback" not in err
+    assert err.splitlines()[-1].startswith("the person is lost: person lost in ")
     said = " ".join(out.split())
     assert "key averaging: as set" in said
     assert "all this in clean silhouettes by both: plain ones show no posture" in said
@@ -255,7 +284,7 @@ def test_a_run_can_be_made_again_from_its_own_file(shell, recording, run, tmp_pa
 
 
 @pytest.mark.parametrize(("text", "said"), [
-    ("particles = 3", "mine.toml: unknown setting 'particles'; there are: background, body, calibration"),
+    ("particles = 3", "mine.toml: unknown setting 'particles'; there are: anyway, background, body"),
     ("[tracker]\narms = 3", "mine.toml: tracker: unknown setting 'arms'; there are: arm, body"),
     ("[tracker.arm]\nparticles = -3", "mine.toml: tracker: arm.particles: found -3"),
     ("seed = ", "mine.toml: not valid TOML"),
@@ -317,7 +346,8 @@ def test_nobody_in_the_film(shell, spoilt, tmp_path):
     made.write_film(spoilt / "video" / "cam.mp4", made.images(spoilt / "background" / "cam.mp4") * 4)
     code, out, err = shell("track", spoilt, "-o", "run")
     assert code == 2
-    assert "silhouettes  0.0 % of the picture" in out  # what was seen is shown
+    assert out.startswith("verdict  bad\nbecause  the silhouette is empty in 100 % of the frames")
+    assert "silhouettes  0.0 % of the picture" in shell("track", spoilt, "-o", "run", "--verbose")[1]  # what was seen is shown
     assert err.startswith("error: ")
     assert "the silhouette is empty in 100 % of the frames: nobody is in the picture" in err
     assert not (tmp_path / "run").exists()
@@ -332,16 +362,18 @@ def test_silhouettes_of_everything(shell, spoilt):
 def test_a_person_partly_outside(shell, spoilt, tmp_path):
     shifted = [np.pad(mask[:, 40:], [(0, 0), (0, 40), (0, 0)][: mask.ndim]) for mask in made.images(spoilt / "masks" / "cam.mkv")]
     made.write_film(spoilt / "masks" / "cam.mkv", shifted, lossless=True)
-    code, _, err = shell("track", spoilt, "-o", "run", "--masks", *QUICK)
+    code, out, err = shell("track", spoilt, "-o", "run", "--masks", "--verbose", *QUICK)
     assert code == 0
+    assert "person is cut off at the left: step back" in out
     assert "warning: the silhouette touches the left border in" in err
     assert len(read_run(tmp_path / "run").motion) == made.FRAMES
 
 
 def test_no_references_no_height_no_distance(shell, recording, tmp_path):
     bare = made.copied(recording, tmp_path / "bare", without=["references", "recording.toml"])
-    code, out, err = shell("track", bare, "-o", "run", "--preset", "liu2011", *QUICK)
+    code, out, err = shell("track", bare, "-o", "run", "--preset", "liu2011", "--verbose", *QUICK)
     assert code == 0
+    assert "height not known, so no length is: give --height" in out
     assert "average height of 1.70 m, assumed" in out
     assert err.count("warning: neither height nor distance is known") == 1
     assert len(read_run(tmp_path / "run").motion) == made.FRAMES
@@ -400,21 +432,55 @@ def test_a_folder_that_holds_something_else(shell, recording, tmp_path):
     assert "found thesis.tex in it but no run.toml of a run" in refused(shell, "track", recording, "-o", "thesis")
 
 
-def test_control_c_leaves_a_run_that_can_be_read(recording, tmp_path):
-    folder = tmp_path / "run"
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recording, tmp_path, name, code):
+    folder, number = tmp_path / "run", getattr(signal, name)
     # Who starts the tests in the background has them, and so their children, ignore Ctrl-C.
-    heeding = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    heeding = functools.partial(signal.signal, number, signal.SIG_DFL)
     child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", preexec_fn=heeding)
     rows, end = folder / "joints.csv", time.monotonic() + 60
     while child.poll() is None and time.monotonic() < end and (not rows.exists() or rows.read_text().count("\n") < 4):
         time.sleep(0.01)
-    child.send_signal(signal.SIGINT)
+    child.send_signal(number)
     _, err = child.communicate()
-    assert child.returncode == 130
-    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}\n", err)
+    assert child.returncode == code
+    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}", err.splitlines()[-1])
     left = read_run(folder)
     assert not left.complete
     assert 2 <= len(left.motion) < made.FRAMES
+    assert (folder / "checkpoint.npz").exists()
+
+
+def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monkeypatch, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: pytest.fail("it was begun"))
+    said = "run: found a complete run, expected --force, which replaces it, or another folder"
+    assert said in refused(shell, "track", recording, "-o", "run")
+    info = tmp_path / "run" / "run.toml"
+    info.write_text(info.read_text().replace("complete = true", "complete = false"))
+    assert "run: found a run that was broken off, expected --resume" in refused(shell, "track", recording, "-o", "run")
+
+    monkeypatch.setattr("shadowpuppet.pipeline.track.track_recording", lambda *_, resume, **__: 1 / 0)
+    for answer in ("y\n", "n\n", ""):
+        typed = io.StringIO(answer)
+        typed.isatty = lambda: True
+        monkeypatch.setattr(sys, "stdin", typed)
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+        if answer == "y\n":
+            with pytest.raises(ZeroDivisionError):
+                shell("track", recording, "-o", "run")
+        else:
+            assert "run that was broken off; replace it? [y/N] error: " in shell("track", recording, "-o", "run").err
+    with pytest.raises(ZeroDivisionError):
+        shell("track", recording, "-o", "run", "--force")
+
+
+def test_a_run_that_is_complete_needs_not_go_on(shell, recording, run, monkeypatch, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: pytest.fail("it was begun"))
+    code, out, err = shell("track", recording, "-o", "run", "--resume", "--overlay", *QUICK)
+    assert (code, err) == (0, "run: the run is complete: nothing is left to be done\n")
+    assert "frames/s" in out
 
 
 def test_control_c_before_the_first_frame(shell, recording, monkeypatch, tmp_path):

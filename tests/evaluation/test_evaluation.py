@@ -50,6 +50,42 @@ def refused(shell, *tokens: object) -> str:
     return line
 
 
+# What is compared
+
+
+def test_of_a_part_of_a_recording_the_truth_of_that_part_is_compared(tmp_path):
+    """The rest is not lost: nothing was asked for there."""
+    write_joints(tmp_path / "truth.csv", TRUTH)
+    times = TRUTH.times
+    part = noisy().between(times[2], times[5])
+    assert part.times.tolist() == times[2:5].tolist()
+    write_run(tmp_path / "asked", part, truth=tmp_path / "truth.csv", begin=float(times[2]), end=float(times[5]))
+    write_run(tmp_path / "broken", part, truth=tmp_path / "truth.csv")
+    asked, broken = (evaluate_run(tmp_path / name)["errors"] for name in ("asked", "broken"))
+    assert (asked["frames"], asked["lost"]) == (3, 0)
+    assert (broken["frames"], broken["lost"]) == (len(times), len(times) - 3)
+
+
+@pytest.mark.parametrize(("start", "end", "frames"), [("2", "4", (2, 4)), ("2f", "4f", (2, 4)), (2, None, (2, 179))])
+def test_the_truth_s_frames_are_chosen_by_number(folder, start, end, frames):
+    errors = evaluate_run(folder / "run", start=start, end=end)
+    assert errors["clock"]["frames_compared"] == frames[1] - frames[0] + 1
+
+
+def test_the_truth_s_frames_are_chosen_by_time(folder):
+    begin, end = TRUTH.times[[1, 3]]
+    by_time = evaluate_run(folder / "run", start=f"{begin:.6f}s", end=f"{end:.6f}")
+    assert by_time["errors"] == evaluate_run(folder / "run", start=1, end=3)["errors"]
+
+
+@pytest.mark.parametrize(("flag", "value", "said"), [
+    ("--start", "soon", "start: found 'soon'; expected seconds such as 3.5, or frames such as 120f"),
+    ("--start", "999", "start: found 999, expected 0 to 179"), ("--end", "999f", "end: found 999f, expected 0 to 179"),
+    ("--end", "99.5", "end: found 99.5 s, expected 0.000 to")])
+def test_frames_that_are_not_there_are_refused(shell, folder, flag, value, said):
+    assert said in refused(shell, folder / "run", flag, value)
+
+
 # What is shown and written
 
 
@@ -57,7 +93,8 @@ def test_all_figures_fit_a_terminal(shell, folder):
     code, out, err = shell(folder / "run")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
-    for words in ("joint errors, mm", "run and truth laid over", "each frame moved and turned", "from the pelvis", "HumanEva ",
+    for words in ("joint errors, mm", "mean error (MPJPE), mm, after alignment", "(PA-MPJPE)", "0.810, fair (IoU of body",
+                  "from the pelvis", "HumanEva ",
                   "no pose    no frame", "axes ", "left_knee", "intervals  none stated: the run has no standard deviations",
                   "moves ", "compared at 180 times"):
         assert words in out, words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import sys
@@ -100,8 +101,10 @@ def test_a_killed_run_is_exported_as_far_as_it_came(shell, whole, tmp_path):
 
 def test_without_pyarrow_all_others_are_written(shell, whole, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert "Parquet needs pyarrow" in refused(shell, "export", whole, "--to", "all", "-o", tmp_path / "out")
+    code, _, err = shell("export", whole, "--to", "all", "-o", tmp_path / "out")
+    assert (code, err) == (0, "warning: parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'\n")
     assert {path.suffix[1:] for path in (tmp_path / "out").iterdir()} == set(EXPORTS) - {"parquet"}
+    assert "Parquet needs pyarrow" in refused(shell, "export", whole, "--to", "parquet", "-o", tmp_path / "out")
 
 
 def test_units_of_bvh(shell, whole, tmp_path):
@@ -220,6 +223,11 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
     assert "a.csv: cannot be read (no such file" in refused(shell, "convert", "a.csv", "b.csv")
     shutil.copy(joints, tmp_path / "a.csv")
     assert "found the file that is to be read" in refused(shell, "convert", "a.csv", "a.csv")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
+    os.link(tmp_path / "a.csv", tmp_path / "same.csv")
+    for other in (tmp_path / "a.csv", tmp_path / "." / "a.csv", "link.csv", "same.csv"):  # the same file by another name
+        assert "found the file that is to be read" in refused(shell, "convert", "a.csv", other)
+        assert "found the file that is to be read" in refused(shell, "convert", other, "a.csv")
     assert (tmp_path / "a.csv").read_bytes() == joints.read_bytes()
     assert "rate: found 0.0, expected frames a second" in refused(shell, "convert", "a.csv", "b.csv", "--rate", "0")
     (tmp_path / "m.csv").write_text("time,LASI_x,LASI_y,LASI_z\n0,1,2,3\n")

@@ -173,6 +173,8 @@ def test_a_live_camera_is_named_in_recording_toml(one, camera):
     ("[start]\ncam = -0.1", "start.cam: found -0.1, expected 0 to 100000 seconds"),
     ("[start]\nkam = 1", "found kam, but the calibration knows no such camera; cameras known: cam"),
     ("truth = 'nowhere.csv'", "truth: found 'nowhere.csv', expected the path of an existing file"),
+    (f"truth = '{'a' * 300}'", "expected the path of an existing file"),
+    ("truth = \"a\\u0000b\"", "expected the path of an existing file"),
     ("calibration = 3", "calibration: found 3"),
     ("[video]\ncam = 'nowhere.mp4'", "video.cam: found 'nowhere.mp4'"),
     ("[video]\ncam = true", "video.cam: found True"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +19,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.intervals import IntervalWriter, read_intervals
-from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.motion.table import read_joints, read_raw
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.motion.motion import STATUSES, Mode, Motion, MotionFrame
 
@@ -58,7 +60,7 @@ def assert_same(a: Motion, b: Motion, atol: float = 0.0) -> None:
             np.testing.assert_array_equal(left, right)
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.sampled_from(STATUSES), max_size=5))
 def test_what_is_written_is_read_exactly_and_from_the_tables_nearly(tmp_path, statuses):
     run = read_run(write(tmp_path / "run", statuses))
@@ -176,7 +178,7 @@ def child(folder: Path, frames: int, before: str = "", after: str = "") -> subpr
 def test_a_killed_run_is_read_from_its_tables(tmp_path):
     folder = write(tmp_path / "run")  # an earlier one, of which nothing must come through
     assert child(folder, 7, after="os.kill(os.getpid(), signal.SIGKILL)").returncode == -signal.SIGKILL
-    assert sorted(path.name for path in folder.iterdir()) == ["angles.csv", "intervals.csv", "joints.csv", "run.toml"]
+    assert sorted(path.name for path in folder.iterdir()) == [".lock", "angles.csv", "intervals.csv", "joints.csv", "run.toml"]
     whole = read_run(write(tmp_path / "whole", ["tracked"] * 7))
     found = read_run(folder)
     assert not found.complete
@@ -239,6 +241,63 @@ def test_an_earlier_run_is_replaced_by_the_first_frame_and_other_files_stay(tmp_
     assert not (folder / "overlay.mp4").exists()
 
 
+def test_a_second_writer_is_refused_by_name_and_the_first_goes_on(tmp_path):
+    folder = tmp_path / "run"
+    with writer(folder) as run:
+        run.write(a_frame(0))
+        said = rf"run: found another run at work in it \(process {os.getpid()} on .+\), expected a folder for each"
+        with pytest.raises(ShadowPuppetError, match=said), writer(folder):
+            pass
+        other = child(folder, 1)
+        assert "found another run at work in it" in other.stderr
+        run.write(a_frame(1))
+    assert read_run(folder).complete
+    assert len(read_run(folder).motion) == 2
+    assert not (folder / ".lock").exists()
+
+
+def test_a_lock_ends_with_its_process(tmp_path):
+    folder = tmp_path / "run"
+    assert child(folder, 2, after="os.kill(os.getpid(), signal.SIGKILL)").returncode == -signal.SIGKILL
+    assert (folder / ".lock").exists()
+    write(folder)
+    assert read_run(folder).complete
+
+
+def test_a_folder_is_never_a_mixture_of_two_runs(tmp_path, monkeypatch):
+    """A copy of the folder before every change of a file while a run replaces another: each is the old run, or the new one, unfinished."""
+    folder, copies = write(tmp_path / "run"), []
+    (folder / "person.toml").write_text("old")
+    changes = {"unlink": Path.unlink, "open": Path.open, "write_bytes": Path.write_bytes}
+
+    def copying(change):
+        def changed(path, *arguments, **more):
+            if path.parent == folder and not (change is changes["open"] and "b" in arguments and "w" not in arguments[0]):
+                copies.append(shutil.copytree(folder, tmp_path / f"copy-{len(copies)}"))
+            return change(path, *arguments, **more)
+
+        return changed
+
+    with writer(folder, method="newer") as run:
+        for name, change in changes.items():
+            monkeypatch.setattr(Path, name, copying(change))
+        run.begin()
+        monkeypatch.undo()
+        copies.append(shutil.copytree(folder, tmp_path / "last"))
+        run.write(a_frame(0))
+    assert len(copies) > 8
+    files = set[str]()
+    for copy in copies:
+        info = tomllib.loads((copy / "run.toml").read_text())
+        files = {path.name for path in copy.iterdir() if path.suffix in (".csv", ".json", ".npz") or path.name == "person.toml"}
+        if info["method"] == "newer":
+            assert not info["complete"]
+            assert all(len((copy / name).read_text().splitlines()) <= 1 for name in files)
+        elif info["complete"]:
+            assert files >= {"joints.csv", "angles.csv", "intervals.csv", "motion.npz", "metrics.json", "person.toml"}
+    assert files == {"joints.csv", "angles.csv", "intervals.csv"}
+
+
 def test_a_new_folder_goes_where_nothing_was_tracked(tmp_path):
     with pytest.raises(ValueError, match="no silhouette"), writer(tmp_path / "run"):
         raise ValueError("no silhouette")
@@ -292,10 +351,10 @@ def put(content: bytes):
     ("motion.npz", put(b"PK\x03\x04 cut off"), r"not a motion \(.*\); without this file the run is read from j"),
     ("motion.npz", put(b""), r"motion.npz: not a motion \("),
     ("motion.npz", lambda path: np.savez(path, times=np.zeros(3)), r"motion.npz: not a motion \(no array 'body_name'\)"),
-    ("motion.npz", lambda path: np.savez(path, **dict.fromkeys(FIELDS, np.array([{}], object))), r"not a motion \(Object arr"),
+    ("motion.npz", lambda path: np.savez(path, **dict.fromkeys(FIELDS, np.array([{}], object))), r"not a motion \(found Python obj"),
     ("metrics.json", put(b"[1]"), "metrics.json: found list, expected an object"),
     ("metrics.json", put(b'{"a": '), "metrics.json: not valid JSON"),
-    ("metrics.json", put(b"\xff\xff"), "metrics.json: not valid JSON"),
+    ("metrics.json", put(b"\xff\xff"), "metrics.json: found bytes that are no text at position 0, expected a JSON"),
     ("joints.csv", replaced("uncertain", "asleep"), "csv: line 4, column 'status': found 'asleep', expected one of tracked, "),
     ("joints.csv", replaced("tracked,predicted", "tracked,asleep"), "joints.csv: line 4, column 'left_arm_status': found 'asleep'"),
     ("joints.csv", replaced("left_arm_status", "left_arm"), "joints.csv: no column 'left_arm_status'; columns there: time, neck_x"),
@@ -411,3 +470,50 @@ def test_a_path_that_is_no_text_does_not_end_a_run(tmp_path):
     with writer(tmp_path / "run", recording=Path("film\udcff.mp4")) as run:
         run.write(a_frame(0))
     assert read_run(tmp_path / "run").info["recording"] == "film?.mp4"
+
+
+def test_revised_frames_replace_those_written_and_raw_csv_keeps_them(tmp_path):
+    with writer(tmp_path / "run") as run:
+        for i in range(5):
+            run.write(a_frame(i, "lost" if i == 2 else "tracked"))
+        raw = run.motion
+        run.revise(dataclasses.replace(raw, joints=raw.joints + 1, cost=raw.cost + 1))
+        run.info["smoothing"] = {"method": "tracker"}
+    found = read_run(tmp_path / "run")
+    assert_same(read_raw(tmp_path / "run" / "raw.csv", "cardbox"), raw, 1e-6)
+    np.testing.assert_array_equal(found.motion.joints, raw.joints + 1)
+    assert found.info["smoothing"] == {"method": "tracker"}
+    (tmp_path / "run" / "motion.npz").unlink()
+    assert_same(read_run(tmp_path / "run").motion, found.motion, 1e-6)
+    bounds = read_intervals(tmp_path / "run" / "intervals.csv")
+    places = found.motion.joints[[1, 3]]  # those with standard deviations
+    assert ((bounds.low <= places + 1e-6) & (places <= bounds.high + 1e-6)).all()
+    assert not list((tmp_path / "run").glob("*.part"))
+    write(tmp_path / "run")
+    assert not (tmp_path / "run" / "raw.csv").exists()
+
+
+def test_a_revision_that_cannot_be_written_leaves_the_tables(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    def revised():
+        with writer(tmp_path / "run") as run:
+            for i in range(3):
+                run.write(a_frame(i))
+            monkeypatch.setattr("shadowpuppet.io.run.run_rows", full)
+            run.revise(run.motion)
+
+    with pytest.raises(ShadowPuppetError, match=r"the 3 frames so far are in joints\.csv"):
+        revised()
+    assert not (tmp_path / "run" / "raw.csv").exists()
+    assert not list((tmp_path / "run").glob("*.part"))
+    assert len(read_run(tmp_path / "run").motion) == 3
+    assert not read_run(tmp_path / "run").complete
+
+
+def test_a_malformed_raw_table_is_named(tmp_path):
+    file = tmp_path / "raw.csv"
+    file.write_text("time,neck_x,neck_y,neck_z,neck_sd_x,neck_sd_y,neck_sd_z,status,cost,overlap,torso_y [m]\n")
+    with pytest.raises(FormatError, match=r"raw\.csv: found 1 degrees of freedom and 0 standard deviations, expected as many"):
+        read_raw(file, "cardbox")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import shutil
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 
 from shadowpuppet import network
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
+from shadowpuppet.live.display import web
 from shadowpuppet.live.display.choice import open_display
 from shadowpuppet.live.display.drawing import drawn
 from shadowpuppet.live.display.view import Angle, Display, View
@@ -222,6 +224,52 @@ def test_the_page_listens_to_this_machine_alone_by_default(page):
     with WebDisplay("0.0.0.0", 0) as wide:
         assert not wide.server.loopback
         assert ask(wide, "/")[0].status == 200
+
+
+def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
+    monkeypatch.setattr(web, "MAX_CONNECTIONS", 2)
+    with WebDisplay(port=0) as page:
+        address = ("127.0.0.1", page.server.server_port)
+        with socket.create_connection(address), socket.create_connection(address), socket.create_connection(address) as third:
+            third.settimeout(10)
+            assert third.recv(1) == b""
+        end = time.monotonic() + 10
+        while True:  # the first two are noticed to be gone
+            with contextlib.suppress(OSError, http.client.HTTPException):
+                if ask(page, "/")[0].status == 200:
+                    break
+            assert time.monotonic() < end, "a connection that ended still counts"
+            time.sleep(0.01)
+
+
+@pytest.mark.parametrize("begun", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
+def test_half_a_request_is_ended_however_slowly_it_goes_on(monkeypatch, begun):
+    monkeypatch.setattr(web, "REQUEST_SECONDS", 0.3)
+    with WebDisplay(port=0) as page, socket.create_connection(("127.0.0.1", page.server.server_port)) as slow:
+        slow.settimeout(0.05)
+        slow.sendall(begun)
+        end = time.monotonic() + 10
+        while True:
+            assert time.monotonic() < end, "it is still being waited for"
+            with contextlib.suppress(TimeoutError):
+                try:
+                    slow.sendall(b"x")
+                    if slow.recv(1000) == b"":
+                        break
+                except (ConnectionError, BrokenPipeError):
+                    break
+
+
+def test_a_stream_goes_on_after_the_time_for_requests(monkeypatch):
+    monkeypatch.setattr(web, "REQUEST_SECONDS", 0.2)
+    with WebDisplay(port=0) as page:
+        page.show(tracked())
+        answer, _ = ask(page, "/events", read=False)
+        told = events(answer)
+        next(told)
+        time.sleep(0.4)
+        page.show(tracked(latency=0.02))
+        assert any(view["latency"] == 20.0 for view in told)
 
 
 def test_a_taken_port_is_refused_and_without_one_another_is_found():

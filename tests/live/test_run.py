@@ -331,7 +331,8 @@ def test_a_camera_that_is_unplugged_is_said_once_and_taken_up_again(pictures, tm
     monkeypatch.setattr(live_run, "open_feed", lambda *_, **__: Feed("cam", (320, 240), math.nan, True, read))
     monkeypatch.setattr("shadowpuppet.video.capture.FIRST_WAIT", 0.1)
     run_live(tmp_path / "run", OPTIONS, replace(SETTINGS, countdown=0.1, learn=0.5), heard, Until())
-    assert heard.troubles == ["cam: gives no more pictures (it is tried again)"]
+    [trouble] = heard.troubles  # of a slow machine the first that is noticed may be that it cannot be opened again
+    assert trouble in ("cam: gives no more pictures (it is tried again)", "cam: gives no picture (it is tried again)")
     broken = next(n for n, view in enumerate(views) if view.trouble)
     assert {view.phase for view in views[broken:]} == {"tracking"}  # nobody had to be found anew
     assert {view.chip for view in views[broken:] if view.trouble} == {"paused"}

@@ -285,7 +285,8 @@ def test_a_program_gets_the_beginning_and_then_frames_and_is_told_goodbye():
 
 
 @pytest.mark.parametrize(("origins", "origin", "good"), [
-    ((), None, True), ((), "http://localhost:3000", True), ((), "http://127.0.0.1:8600", True), ((), "http://[::1]:8600", True),
+    ((), None, True), ((), "http://localhost:3000", False), ((), "http://127.0.0.1:8600", False), ((), "http://[::1]:8600", False),
+    (("http://localhost:3000",), "http://localhost:3000", True), (("http://localhost:3000",), "http://localhost:3001", False),
     ((), "https://evil.example", False), ((), "null", False), ((), "http://localhost.evil.example", False),
     ((), "http://127.0.0.1.evil.example", False), ((), "file://", False), ((), "", False),
     (("https://good.example",), "https://good.example", True), (("https://good.example",), "https://evil.example", False),
@@ -302,7 +303,7 @@ def test_pages_of_other_sites_may_not_listen(origins, origin, good):
             with pytest.raises(InvalidStatus) as refused:
                 connect(url, additional_headers=headers)
             assert refused.value.response.status_code == 403
-            assert b"pages of other sites may not listen" in refused.value.response.body
+            assert b"pages may not listen unless" in refused.value.response.body
             assert outlet.counts() == {"served": 0, "refused": 1}
 
 
@@ -385,7 +386,7 @@ def test_rubbish_from_elsewhere_is_no_trouble(rubbish):
 
 
 def test_no_more_than_so_many_listen_and_who_leaves_makes_room(monkeypatch):
-    monkeypatch.setattr(websocket, "MAX_CLIENTS", 2)
+    monkeypatch.setattr(websocket, "MAX_CONNECTIONS", 2)
     with served() as (outlet, url), connect(url):
         with connect(url), pytest.raises(InvalidStatus):
             connect(url)

@@ -9,7 +9,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.pipeline.footage import open_footage
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.progress import LeftOut, warn_of_left_out
+from shadowpuppet.pipeline.progress import add_left_out, left_out_metrics, warn_of_left_out
 from shadowpuppet.pipeline.survey import survey_film
 from shadowpuppet.silhouette.added import BesideBody, SceneHint
 from shadowpuppet.synthetic import Obstacle, Scene, Spec, Viewpoint, synthesize
@@ -21,22 +21,20 @@ def camera(name="front"):
 
 
 def test_left_out_parts_are_said_with_camera_times_and_place_in_the_films_pixels():
-    log, mask = LeftOut([camera(), camera("side")]), np.zeros((120, 160), bool)
+    mask = np.zeros((120, 160), bool)
     mask[10:20, 30:50] = True
-    log.add(0.0, ())
-    log.add(1.0, (None, mask))
-    log.add(1.5, (None, np.roll(mask, 5, axis=1)))
-    log.add(2.0, (None, None))
-    (found,) = log.metrics()["left_out"]
+    carried = ()
+    for seconds, masks in ((0.0, ()), (0.5, (None, None)), (1.0, (None, mask)), (1.5, (None, np.roll(mask, 5, axis=1))), (2.0, ()),
+                           (2.5, (None, None))):  # fmt: skip
+        carried = add_left_out(carried, seconds, masks)
+    (found,) = left_out_metrics(carried, [camera(), camera("side")])["left_out"]
     assert found == {"camera": "side", "frames": 2, "from_s": 1.0, "to_s": 1.5, "box": [60, 20, 110, 40]}
     with pytest.warns(ShadowPuppetWarning, match=r"camera 'side', 2 frames from 1\.0 to 1\.5 s, within x 60 to 110, y 20 to 40"):
         warn_of_left_out([found])
 
 
 def test_a_run_that_leaves_nothing_out_says_nothing(recwarn):
-    log = LeftOut([camera()])
-    log.add(0.0, (None,))
-    assert log.metrics() == {}
+    assert left_out_metrics(add_left_out((), 0.0, (None,)), [camera()]) == {}
     warn_of_left_out([])
     assert not recwarn.list
 

@@ -13,8 +13,8 @@ from solids import looking
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.pipeline.check_calibration import check_calibration
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, chosen_views
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, chosen_views, cut, spread_frames, take_sample
+from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
 from shadowpuppet.video import write_frames
 
@@ -118,6 +118,35 @@ def test_films_that_began_at_other_times_are_told_so(tmp_path):
 def test_a_recording_may_end_before_its_films(tmp_path):
     made = rig(tmp_path, steady(10), steady(12), starts=(0.0, 0.2), duration=0.5)
     assert numbers(made) == [(n, n + 2) for n in range(5)]
+
+
+def test_a_part_of_a_recording_keeps_its_times(tmp_path):
+    """Of frames at the median rate, after [start]."""
+    whole = rig(tmp_path, steady(10), steady(12), steady(24, 20.0), starts=(0.0, 0.2, 0.0), suffix=".mp4")
+    part = of_recording(whole, cut(whole.recording, make_options({"start": "3f", "end": 0.7})))
+    sets = list(synchronized_frames(part, [bright] * 3))
+    assert [each.time for each in sets] == pytest.approx([0.3, 0.4, 0.5, 0.6])
+    assert [footage.count for footage in part.footage] == [4, 4, 8]
+    for one, other in zip(sets, list(synchronized_frames(whole, [bright] * 3))[3:7], strict=True):
+        for image, same in zip(one.images, other.images, strict=True):
+            np.testing.assert_array_equal(image, same)
+    assert take_sample(part.footage[0]).times == pytest.approx([0.3, 0.4, 0.5, 0.6])
+    assert take_sample(part.footage[0]).first[0].time == pytest.approx(0.3)
+    np.testing.assert_array_equal(spread_frames(part.footage[0])[0], take_sample(part.footage[0]).frames[0].image)
+
+
+def test_a_part_outside_of_the_recording_is_refused(tmp_path):
+    whole = rig(tmp_path, steady(10), duration=0.5, suffix=".mp4").recording
+    assert cut(whole, make_options({})) is whole
+    assert cut(whole, make_options({"start": 0.1, "end": 30})).duration == 0.5
+    with pytest.raises(SettingsError, match=r"start: found 6f, 0.6 s, expected a moment before the film's end, 0.500 s"):
+        cut(whole, make_options({"start": "6f"}))
+    with pytest.raises(SettingsError, match=r"start: found 'soon'; expected seconds such as 3.5, or frames such as 120f"):
+        make_options({"start": "soon"})
+
+
+def of_recording(made: Rig, recording: Recording) -> Rig:
+    return Rig(recording, tuple(Footage(recording, each.view, each.camera) for each in made.footage))
 
 
 def test_how_many_sets_there_are_is_told_where_films_tell_it(tmp_path):

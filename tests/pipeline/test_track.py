@@ -8,14 +8,16 @@ import made
 import numpy as np
 import pytest
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.body.models import make_body
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.evaluation.interval_coverage import rank_histogram
+from shadowpuppet.geometry import align
 from shadowpuppet.io.intervals import read_intervals
-from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.motion.table import read_joints, read_raw
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import limb_of
-from shadowpuppet.motion.metrics import overlap
+from shadowpuppet.motion.metrics import jitter, overlap
 from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
 from shadowpuppet.pipeline.progress import StageTimer
@@ -135,7 +137,9 @@ def test_a_run_that_breaks_off_keeps_what_it_has(recording, run, tmp_path, error
     assert not left.complete
     assert len(left.motion) == 5
     # Causal: what was found does not depend on how long the film goes on.
-    np.testing.assert_array_equal(left.motion.joints, run.motion.joints[:5])
+    np.testing.assert_allclose(left.motion.joints, read_raw(run.folder / "raw.csv", "rounded").joints[:5], rtol=0, atol=1e-6)
+    assert not (left.folder / "raw.csv").exists()
+    assert "smoothing" not in left.info
     assert left.metrics["ms_per_frame"]["track"] > 0
     assert len(made.images(tmp_path / "run" / "overlay.part.mp4")) == 5
 
@@ -164,7 +168,7 @@ def test_frames_before_the_person_and_without_them_are_absent(recording, tmp_pat
     for n in (0, 1, 2, 15, 16):
         masks[n] = np.zeros_like(masks[n])
     made.write_film(spoilt / "masks" / "cam.mkv", masks, lossless=True)
-    result = track_recording(spoilt, tmp_path / "run", make_options(QUICK | {"masks": True, "overlay": True}))
+    result = track_recording(spoilt, tmp_path / "run", make_options(QUICK | {"masks": True, "overlay": True, "gaps": 0}))
     absent = np.isin(np.arange(len(masks)), (0, 1, 2, 15, 16))
     np.testing.assert_array_equal(result.motion.status == "absent", absent)
     np.testing.assert_array_equal(np.isnan(result.motion.joints).all((1, 2)), absent)
@@ -204,7 +208,7 @@ def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
     third = track_recording(recording, tmp_path / "run", make_options(QUICK | {"every": 3, "overlay": True}), Told())
     times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
     assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
-    assert said[-1] == ("tracking", len(third.motion))
+    assert said[-2:] == [("tracking", len(third.motion)), ("smoothing", None)]
     assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
 
 
@@ -350,3 +354,38 @@ def test_memory_does_not_grow_with_the_film(recording):
         assert len(sample.times) == made.FRAMES * times
         assert len(sample.frames) == RUNS * RUN
     assert peaks[1] < 1.3 * peaks[0]
+
+
+def test_the_motion_is_smoothed_at_the_end_and_is_one_of_the_body(run):
+    raw, found = read_raw(run.folder / "raw.csv", "rounded"), read_run(run.folder)
+    assert found.info["smoothing"] == {"method": "tracker", "gaps_s": 0.5, "bridged_frames": 0, "turned_frames": 0}
+    assert jitter(found.motion.table) < 0.7 * jitter(raw.table)
+    np.testing.assert_array_equal(found.motion.joint_sd, run.motion.joint_sd)
+    body = make_body("rounded", read_person(run.folder / "person.toml", "rounded").sizes)
+    own = body.points(found.motion.poses, names=found.motion.joint_names)
+    place = align(own[:1].reshape(-1, 3), found.motion.joints[:1].reshape(-1, 3))
+    np.testing.assert_allclose(place.apply(own), found.motion.joints, atol=1e-5)
+
+
+def test_the_papers_preset_stays_as_tracked_and_gaps_are_bridged_if_that_is_asked_for(recording, tmp_path):
+    spoilt = made.copied(recording, tmp_path / "gap")
+    masks = made.images(recording / "masks" / "cam.mkv")
+    for n in (8, 9):
+        masks[n] = np.zeros_like(masks[n])
+    made.write_film(spoilt / "masks" / "cam.mkv", masks, lossless=True)
+    paper = make_options(QUICK | {"masks": True, "preset": "liu2011"})
+    assert paper.smoothing == ("off", 0.0)
+    raw = track_recording(spoilt, tmp_path / "raw", paper)
+    assert read_run(raw.folder).info["smoothing"] == {"method": "off"}
+    assert not (raw.folder / "raw.csv").exists()
+    bridged = track_recording(spoilt, tmp_path / "bridged", make_options(QUICK | {"masks": True, "preset": "liu2011", "gaps": 0.6}))
+    gap = np.isin(np.arange(len(masks)), (8, 9))
+    np.testing.assert_array_equal(bridged.motion.status == "predicted", gap)
+    np.testing.assert_array_equal(bridged.motion.joints[~gap], raw.motion.joints[~gap])
+    assert read_run(bridged.folder).info["smoothing"]["bridged_frames"] == 2
+
+
+def test_a_cutoff_that_the_rate_does_not_allow_is_refused_before_tracking(recording, tmp_path):
+    with pytest.raises(SettingsError, match="cutoff: found 50 Hz"):
+        track_recording(recording, tmp_path / "run", make_options({"smooth": "butterworth", "cutoff": 50}))
+    assert not (tmp_path / "run" / "joints.csv").exists()

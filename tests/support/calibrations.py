@@ -95,8 +95,9 @@ def opencv_xml(camera: Camera) -> str:
 
     T = camera.T_camera_world
     return ('<?xml version="1.0"?>\n<opencv_storage>\n<calibration_time>"Tue 01 Jul"</calibration_time>\n'
-            f"<image_size>\n  {camera.size[0]} {camera.size[1]}</image_size>\n" + node("cameraMatrix", camera.matrix)
-            + node("distCoeffs", camera.distortion[None, :5]) + node("R", T[:3, :3]) + node("T", T[:3, 3:]) + "</opencv_storage>\n")
+            f"<image_size>\n  {camera.size[0]} {camera.size[1]}</image_size>\n" + node("camera_matrix", camera.matrix)
+            + node("distortion_coefficients", camera.distortion[None, :5])
+            + node("R", T[:3, :3]) + node("T", T[:3, 3:]) + "</opencv_storage>\n")
 
 
 def qualisys(made: Sequence[Camera]) -> str:

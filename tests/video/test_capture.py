@@ -78,7 +78,7 @@ def test_however_slow_the_work_a_picture_is_never_older_than_one_interval_when_i
 
 def source(times, name="film"):
     frames = [Frame(t, np.full((12, 16, 3), i, np.uint8)) for i, t in enumerate(times)]
-    return FrameSource(name, (16, 12), 10.0, len(times), math.nan, lambda: iter(frames))
+    return FrameSource(name, (16, 12), 10.0, len(times), math.nan, lambda _: iter(frames))
 
 
 def test_a_film_s_frames_come_when_they_are_due():

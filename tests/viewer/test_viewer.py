@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import json
+import socket
 import subprocess
 import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic, sleep
 
 import made
 import made_rig
@@ -640,6 +644,39 @@ def test_other_sites_pages_and_names_are_refused():
         server.request_share_url()  # does nothing
     finally:
         close_server(server)
+
+
+def test_rubbish_prints_nothing_clients_are_counted_and_their_memory_comes_back(monkeypatch, capfd):
+    viser = pytest.importorskip("viser")
+    from websockets.exceptions import ConnectionClosed, InvalidStatus
+    from websockets.sync.client import connect
+
+    from shadowpuppet.viewer.web import server as module
+
+    monkeypatch.setattr(module, "MAX_CONNECTIONS", 3)
+    server = module.open_server(port=0)
+    try:
+        url, known = f"ws://127.0.0.1:{server.get_port()}", {"subprotocols": [_protocol()], "max_size": None}
+        capfd.readouterr()
+        for rubbish in (b"\xc1", b"\x81\xa4type\xa1x", "text", b"\xdd\xff\xff\xff\xff", b"\x90" * 500):
+            with contextlib.suppress(ConnectionClosed), connect(url, **known) as client:
+                client.send(rubbish)
+                for _ in range(100):
+                    client.recv(timeout=0.5)
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", server.get_port())) as raw:
+            raw.sendall(b"\x16\x03\x01" * 50)
+        with connect(url, **known), connect(url, **known), connect(url, **known), pytest.raises(InvalidStatus, match="503"):
+            connect(url, **known)
+        for _ in range(10):
+            with connect(url, **known) as client:
+                client.recv(timeout=5)
+        end = monotonic() + 10
+        while sum(isinstance(each, viser.ClientHandle) for each in gc.get_objects()) > 2:
+            assert monotonic() < end, "clients that left are still kept"
+            sleep(0.05)
+        assert capfd.readouterr() == ("", "")
+    finally:
+        module.close_server(server)
 
 
 def _protocol():

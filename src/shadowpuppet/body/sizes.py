@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Self
@@ -23,7 +24,9 @@ def is_within(value: object, limits: tuple[float, float]) -> bool:
 
 def expected_metres(value: object, limits: tuple[float, float]) -> str:
     """The end of an error message: the range in metres, and a hint if the value would fit in centimetres."""
-    hint = f" ({value:g} cm are {value / 100:g})" if isinstance(value, (int, float, np.integer)) and is_within(value / 100, limits) else ""
+    hint = ""
+    if isinstance(value, (int, float, np.integer)) and is_within(value, (100 * limits[0], 100 * limits[1])):
+        hint = f" ({value:g} cm are {value / 100:g})"
     return f"expected {limits[0]:g} to {limits[1]:g} metres{hint}"
 
 
@@ -60,7 +63,7 @@ class Sizes:
             what = f"unknown {choices(unknown)}" if unknown else f"missing {choices(missing)}"
             raise ShadowPuppetError(f"{source}: {what}; the sizes are: {choices(cls.names())}")
         for name, value in values.items():
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > sys.float_info.max:
                 raise ShadowPuppetError(f"{source}: {name}: found {shown(value)}, expected a number of metres")
         return cls(**{name: float(value) for name, value in values.items()})
 

@@ -10,7 +10,7 @@ from typing import Literal
 
 from cyclopts import App, CycloptsError
 
-from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, one_line
 
 COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
@@ -76,7 +76,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
         code = app(list(tokens), exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except (ShadowPuppetError, CycloptsError) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"error: {' '.join(one_line(error).split())}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt as interrupt:
         print(f"interrupted{': ' if interrupt.args else ''}{' '.join(map(str, interrupt.args))}", file=sys.stderr)

@@ -12,7 +12,7 @@ from shadowpuppet.cli.tables import error_table, metrics_table, pairs, show, sho
 DOFS_IN_ROW = 2
 
 
-def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: int = 0, end: int | None = None,
+def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: str = "0", end: str | None = None,
              offset: float = 0.0, sync: Switch = False, align: Switch = False, angles: Switch = False,
              file: Annotated[Path | None, output("File that gets all figures (.json).")] = None,
              report: Annotated[Path | None, flag("File that gets a page with plots and pictures (.html); needs matplotlib.")] = None,
@@ -29,9 +29,9 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     joints
         Joints to compare, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
-        First frame of the truth to compare.
+        First frame of the truth to compare: its number (120 or 120f), or its time (3.5s).
     end
-        Last frame of the truth to compare. [default: its last]
+        Last frame of the truth to compare, likewise. [default: its last]
     offset
         Seconds to add to the truth's times.
     sync
@@ -76,14 +76,14 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
     if "errors" in measured:
         aligned = measured["aligned_mm"]
         yield error_table(measured["errors"])
-        yield table("mean error, mm, run and truth laid over each other", ("", "mm"),
+        yield table("mean error (MPJPE), mm, after alignment", ("", "mm"),
                     ((text.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
     if "angles_deg" in measured:
         yield table("", ("turned at", "by degrees, rmse"), ((name, f"{value:.1f}") for name, value in measured["angles_deg"].items()))
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, losses_text, world_text
+    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, exchanges_text, losses_text, world_text
 
     yield "no pose", losses_text(measured["losses"])
     if "errors" not in measured:
@@ -102,6 +102,8 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
                         f"{moves['difference_m_s2']:.1f} in the mean")
     if measured["bone_errors"]:
         yield "bones", bones_text(measured["bone_errors"])
+    if sides := exchanges_text(measured["exchanges"]):
+        yield "sides", f"exchanged {sides}" if sides == "never" else f"exchanged: {sides}"
     yield "intervals", coverage_text(measured["coverage"])
     if "dofs_deg" in measured:
         dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]

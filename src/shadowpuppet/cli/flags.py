@@ -19,11 +19,12 @@ HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other prog
 RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
 """Headings of `--help`."""
 GROUPS = {
-    **dict.fromkeys(("preset", "seed", "overlay"), RUN),
-    **dict.fromkeys(("height", "distance", "body", "person", "prior"), PERSON),
+    **dict.fromkeys(("preset", "seed", "smooth", "cutoff", "gaps", "overlay"), RUN),
+    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
-    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "max_size", "every"), PICTURES),
+    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size", "every"),
+                    PICTURES),
 }
 
 
@@ -47,6 +48,7 @@ Switch = Annotated[bool, Parameter(negative=(), show_default=False)]
 Config = Annotated[Path | None, flag("Settings file, TOML, as `shadowpuppet settings` prints it, or an earlier run's run.toml. Flags "
                                      "override it.", OTHER)]
 Quiet = Annotated[bool, switch("Show only warnings and errors.", OTHER)]
+Verbose = Annotated[bool, switch("Show all that was found, and all warnings.", OTHER)]
 AsJson = Annotated[bool, switch("Print JSON.", OTHER, "--json")]
 Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; or a film or folder of pictures (then with --fov).")]
 
@@ -101,7 +103,7 @@ def _bare(hint: Any) -> Any:
 def _parameter(setting: Setting, visible: bool, groups: Mapping[str, Group]) -> Parameter:
     default = setting.default
     end = "" if default is None or isinstance(default, bool) else f" [default: {default}]"
-    return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name), show_choices=False)
+    return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name), show_choices=setting.name in ("body", "show"))
 
 
 if TYPE_CHECKING:
@@ -110,7 +112,7 @@ else:
     Flags = flags_of(Options)
     RunFlags = unpacked(Flags)
     """All options."""
-    LookFlags = unpacked(flags_of(Options, without=("every", "overlay")))
+    LookFlags = unpacked(flags_of(Options, without=("every", "smooth", "facing", "cutoff", "gaps", "overlay")))
     """Options of commands that do not track."""
     OutletFlags = unpacked(flags_of(OutletSettings))
     """Programs that receive the motion."""

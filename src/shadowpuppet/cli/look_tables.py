@@ -12,8 +12,17 @@ from shadowpuppet.cli.tables import pairs, table
 from shadowpuppet.pipeline.look import CameraLook, Look, RigLook
 
 
-def look_table(look: Look) -> RenderableType:
-    """Table of the look at a recording of one camera."""
+def look_table(look: Look | RigLook, everything: bool = True) -> RenderableType:
+    """Table of the look at a recording; the recording, its scale and the person only, if not `everything`."""
+    if isinstance(look, RigLook):
+        return _rig_table(look) if everything else pairs([*_rig_rows(look), *_rig_scale(look)])
+    if not everything:
+        return pairs([("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
+                      ("person", _person(look.person) if look.person is not None else None)])
+    return _camera_table(look)
+
+
+def _camera_table(look: Look) -> RenderableType:
     exact_plain = f"; those of the plain rule by {look.exact_overlap_plain:.3f}" if look.exact_overlap_plain is not None else ""
     exact = f"these silhouettes overlap the ready ones by {look.exact_overlap:.3f}{exact_plain}" if look.exact_overlap is not None else None
     return pairs([
@@ -56,21 +65,29 @@ def _person(person: Mapping[str, Any]) -> str:
             + (f" (overlap: {fits})" if fits else "") + f"; overlaps the film's first silhouette by {person['start_overlap']:.2f}{clean}")
 
 
-def rig_look_table(look: RigLook) -> RenderableType:
-    """Table of the look at a recording of several cameras, one row per camera."""
+def _rig_rows(look: RigLook) -> list[tuple[str, str | None]]:
     count = f"{look.frames} sets" if look.frames else "sets not counted"
-    above = [("recording", look.recording), ("cameras", f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second")]
-    cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.2f}" for value in camera.place),
+    return [("recording", look.recording), ("cameras", f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second")]
+
+
+def _rig_scale(look: RigLook) -> list[tuple[str, str | None]]:
+    height = look.agreement.height
+    return [("height", None if height is None else f"{height:.2f} m from end to end, as the cameras see it"),
+            ("person", _rig_person(look.person) if look.person is not None else None)]
+
+
+def _rig_table(look: RigLook) -> RenderableType:
+    """A row for each camera."""
+    cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.1f}" for value in camera.place),
                 f"{100 * camera.quality.area:.1f} %", "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}",
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
-    height = look.agreement.height
     below = [("background", "; ".join(sorted({camera.background.replace(camera.name, "<camera>") for camera in look.cameras}))),
-             ("keys", ", ".join(keys) or None),
-             ("height", None if height is None else f"{height:.2f} m from end to end, as the cameras see it"),
-             ("person", _rig_person(look.person) if look.person is not None else None)]  # fmt: skip
+             ("keys", ", ".join(keys) or None), *_rig_scale(look)]
     columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
-    return Group(pairs(above), "", table("", columns, cameras, right=(2, 4, 5, 6)), "", pairs(below))
+    if all(camera.exact_overlap is None for camera in look.cameras):
+        columns, cameras = columns[:5] + columns[6:], (row[:5] + row[6:] for row in cameras)
+    return Group(pairs(_rig_rows(look)), "", table("", columns, cameras, right=range(2, len(columns))), "", pairs(below))
 
 
 def _pixels(camera: CameraLook) -> str:

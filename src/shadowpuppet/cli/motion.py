@@ -66,11 +66,16 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     unit
         Unit of BVH files, which do not state it; Blender expects m.
     """
+    from importlib.util import find_spec
+
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import export_run
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
+        if to == "all" and find_spec("pyarrow") is None:
+            names.remove("parquet")
+            listener.warn("parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
         listener.begin("exporting")
         written = export_run(run, names, folder, unit)
     if not quiet:

@@ -19,6 +19,7 @@ from shadowpuppet.cli.flags import (
     Config,
     LookFlags,
     Quiet,
+    Verbose,
     flag,
     flags_of,
     given,
@@ -59,7 +60,7 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
          unit: Annotated[str | None, flag("Unit of the calibration's lengths, if the file does not say: m, cm or mm.", CAMERAS)] = None,
          up: Annotated[str | None, flag("Up axis of the calibration's world: z, y, x, -z, -y, -x, or cameras (the average of the "
                                         "pictures' up).", CAMERAS, allow_leading_hyphen=True)] = None,
-         config: Config = None, as_json: AsJson = False, flags: LookFlags = None) -> None:  # fmt: skip
+         config: Config = None, verbose: Verbose = False, as_json: AsJson = False, flags: LookFlags = None) -> None:  # fmt: skip
     """Look at a recording, as `track` does before it starts: cameras, scale, background, silhouettes, the person. Or explain a calibration:
     where its cameras stand, what they look at and see together, from above; and write it in another format."""
     if calibration.is_explained(recording):
@@ -68,9 +69,9 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.track import look_at
 
-    with terminal(quiet=as_json) as listener:
+    with terminal(quiet=as_json, verbose=verbose) as listener:
         listener.begin("looking")
-        look = look_at(recording, options_from(flags, config))
+        look = look_at(recording, options_from(flags, config), listener)
         listener.look(look)
     if as_json:
         show_json(look)

@@ -12,6 +12,8 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from shadowpuppet.pipeline.verdict.verdict import Verdict
+
 
 def show(*parts: RenderableType) -> None:
     """Print tables with an empty line between them."""
@@ -53,6 +55,12 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], rig
     return out
 
 
+def verdict_table(verdict: Verdict) -> RenderableType:
+    """One word, and the reasons below it."""
+    joined = "but" if verdict.word == "good" else "because"
+    return pairs([("verdict", verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
+
+
 def files_in(folder: Path, *names: str) -> tuple[str, str]:
     """The row that names those files of a folder that exist."""
     return "made", "\n".join(str(folder / name) for name in names if (folder / name).exists())
@@ -70,29 +78,30 @@ def error_table(errors: Mapping[str, Any]) -> RenderableType:
 
 def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     """Metrics of a run, with and without a truth."""
-    from shadowpuppet.evaluation.summary_text import doubt_text
+    from shadowpuppet.evaluation.summary_text import doubt_text, overlap_sense
     from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 
     multiview = "cost_m2" in metrics
     overlap, cost = metrics["overlap"], metrics["cost_m2" if multiview else "cost_px"]
     scale, unit, digits = (1e4, "cm2", 1) if multiview else (1, "pixels", 0)
     statuses = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
-    truth_jitter = metrics.get("truth_jitter_m_s2")
+    jitter, truth_jitter = metrics["jitter_m_s2"], metrics.get("truth_jitter_m_s2")
     rows: list[tuple[str, str | None]] = [
         ("frames", f"{metrics['frames']}: {statuses}" if statuses else "none"),
         ("doubt", doubt_text(metrics)),
-        ("overlap", f"{overlap['mean']:.3f} (5 % of frames under {overlap['p5']:.3f})" if overlap["count"] else None),
-        ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (5 % of frames over {scale * cost['p95']:.{digits}f})" if cost["count"]
+        ("overlap", f"{overlap['mean']:.3f}, {overlap_sense(overlap['mean'])} (IoU of body and silhouette; p5 {overlap['p5']:.3f})"
+                    if overlap["count"] else None),
+        ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (p95 {scale * cost['p95']:.{digits}f})" if cost["count"]
                  else None),
-        ("jitter", f"{_number(metrics['jitter_m_s2'])} m/s2"
+        ("jitter", None if jitter is None or not isfinite(jitter) else f"{jitter:.2f} m/s2"
                    + (f", the truth's {_number(truth_jitter)}" if truth_jitter is not None else "")),
     ]  # fmt: skip
     if errors := metrics.get("errors"):
         parts = f"rmse {errors['rmse_mm']:.1f}" if multiview else f"plane {errors['plane_mm']:.1f}, depth {errors['depth_mm']:.1f}"
         lost, known, frames = errors["lost"], errors["frames"], metrics["frames"]
         rows += [
-            ("error", f"{errors['mean_mm']:.1f} mm ({parts}); aligned {errors['aligned_mean_mm']:.1f} mm; "
-                      f"{100 * errors['far']:.1f} % off by over {1000 * FAR_ERROR:.0f} mm"),
+            ("error", f"{errors['mean_mm']:.1f} mm (MPJPE; {parts}); {errors['aligned_mean_mm']:.1f} mm with each frame moved to the "
+                      f"truth's place; {100 * errors['far']:.1f} % off by over {1000 * FAR_ERROR:.0f} mm"),
             ("lost", f"{lost} of the truth's {known} frames have no pose: {1000 * LOST_ERROR:.0f} mm off each" if lost else None),
             ("compared", f"the truth has {known} frames, the run {frames}: is it this recording's?"
                          if known != frames and "clock" not in metrics else None),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,32 +13,67 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from shadowpuppet.cli.look_tables import look_table, rig_look_table
-from shadowpuppet.cli.tables import show
+from shadowpuppet.cli.look_tables import look_table
+from shadowpuppet.cli.tables import show, verdict_table
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.live.run import LiveListener
 from shadowpuppet.pipeline.look import Look, RigLook
+from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
 
+LOG_EVERY = 2.0
+"""Seconds between lines of progress where there is no terminal."""
+PROGRESS = "..."
+"""Beginning of such a line."""
 REPEAT_AFTER = 10.0
 """Seconds after which the same note is printed again."""
+
+
+class _Log:
+    """Progress as lines, for output that is no terminal: what is being done, every `LOG_EVERY` seconds."""
+
+    def __init__(self, console: Console) -> None:
+        self.console, self.what, self.total, self.done, self.began = console, "", None, 0, 0.0
+        self._end: threading.Event | None = None
+
+    def begin(self, what: str, total: int | None) -> None:
+        """A phase begins; the thread that prints starts with the first."""
+        self.what, self.total, self.done, self.began = what, total, 0, monotonic()
+        if self._end is None:
+            self._end = threading.Event()
+            threading.Thread(target=self._run, args=(self._end,), name="progress", daemon=True).start()
+
+    def stop(self) -> None:
+        """Print no more, until the next phase begins."""
+        if self._end is not None:
+            self._end.set()
+            self._end = None
+
+    def _run(self, end: threading.Event) -> None:
+        while not end.wait(LOG_EVERY):
+            seconds = monotonic() - self.began
+            count = f" {self.done}{f'/{self.total}' if self.total else ''}, {self.done / seconds:.1f} a second" if self.done else ""
+            self.console.print(f"{PROGRESS} {self.what}{count}, {seconds:.0f} s", markup=False, soft_wrap=True)
 
 
 class Terminal(LiveListener):
     """Shows the look on standard output, progress and warnings on standard error."""
 
-    def __init__(self, quiet: bool = False) -> None:
-        """`quiet`: show only warnings."""
-        self.quiet, self.frames = quiet, 0
+    def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
+        """`quiet`: show only warnings; `verbose`: also all that a look found."""
+        self.quiet, self.verbose, self.frames = quiet, verbose, 0
         self.console = Console(stderr=True, highlight=False)
         self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
                                   TimeRemainingColumn(), console=self.console, transient=True,
                                   disable=quiet or not self.console.is_terminal)
+        self._log = None if quiet or self.console.is_terminal else _Log(self.console)
         self._task: TaskID | None = None
         self._said: set[str] = set()
         self._noted: dict[str, float] = {}
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """Start the progress bar of a phase."""
+        """Start the progress bar of a phase; without a terminal, lines of progress."""
+        if self._log is not None:
+            self._log.begin(what, total)
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._task = self._progress.add_task(what, total=total, done="")
@@ -47,6 +83,8 @@ class Terminal(LiveListener):
     def advance(self, frames: int) -> None:
         """Show the number of frames done and the speed."""
         self.frames = frames
+        if self._log is not None:
+            self._log.done = frames
         if self._task is not None and not self._progress.disable:
             task = self._progress.tasks[-1]
             total = f"/{task.total:.0f}" if task.total else ""
@@ -54,11 +92,12 @@ class Terminal(LiveListener):
             self._progress.update(self._task, completed=frames, done=f"{frames}{total}{speed}")
 
     def look(self, look: Look | RigLook) -> None:
-        """Show the look and its doubts."""
+        """Show the verdict on a recording and its reasons, and what it holds; if `verbose`, all that was found."""
         if not self.quiet:
             self.stop()
-            show(rig_look_table(look) if isinstance(look, RigLook) else look_table(look))
-        self.doubt(look)
+            show(verdict_table(verdict_of_look(look)), look_table(look, self.verbose))
+        if self.quiet or self.verbose:
+            self.doubt(look)
 
     def doubt(self, look: Look | RigLook) -> None:
         """Warn of everything that may harm a run."""
@@ -86,7 +125,9 @@ class Terminal(LiveListener):
         self.console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
 
     def stop(self) -> None:
-        """Remove the progress bar."""
+        """Remove the progress bar, or end the lines of progress."""
+        if self._log is not None:
+            self._log.stop()
         if not self._progress.disable:  # rich 14.0 ends with an empty line even then
             self._progress.stop()
 
@@ -97,12 +138,13 @@ class Terminal(LiveListener):
 
 
 @contextmanager
-def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written") -> Iterator[Terminal]:
+def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written",
+             verbose: bool = False) -> Iterator[Terminal]:
     """A listener that shows progress and warnings.
 
     After Ctrl-C it names `folder`, which has the frames so far, or says `nothing` before the first frame.
     """
-    listener = Terminal(quiet)
+    listener = Terminal(quiet, verbose)
     with warnings.catch_warnings():
         warnings.simplefilter("always", ShadowPuppetWarning)
         warnings.showwarning = listener._show_warning

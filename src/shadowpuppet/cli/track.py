@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,17 +17,20 @@ from shadowpuppet.cli.flags import (
     Recording,
     RunFlags,
     Switch,
+    Verbose,
     flags_of,
     given,
     options_from,
     output,
+    switch,
     unpacked,
 )
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, show, table
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, show, table, verdict_table
+from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.pipeline.options import PATHS, Options
+from shadowpuppet.pipeline.verdict.verdict import Verdict
 from shadowpuppet.settings import validate
 
 if TYPE_CHECKING:
@@ -34,10 +38,11 @@ if TYPE_CHECKING:
 
     DemoFlags = SessionFlags = LiveFlags = Any
 else:
-    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "max_size", "every", "overlay")
+    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
-    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "training")))
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "smooth", "facing", "cutoff", "gaps",
+                                                      "training")))
     """Options of a live session."""
     LiveFlags = unpacked(flags_of(LiveSettings))
 
@@ -45,21 +50,53 @@ BARS = "▁▂▃▄▅▆▇█"
 
 
 def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
-          config: Config = None, quiet: Quiet = False, flags: RunFlags = None) -> None:
+          resume: Annotated[bool, switch("Go on with a run that was broken off, to the same result.")] = False,
+          force: Annotated[bool, switch("Replace an earlier run in the folder.")] = False,
+          config: Config = None, quiet: Quiet = False, verbose: Verbose = False, flags: RunFlags = None) -> int:
     """Track a person: from video to joints.csv, angles.csv, motion.npz, run.toml and metrics.json.
 
-    Prints what it found first, as `info` does.
+    Prints what it found first, as `info` does. Ends with exit code 4 if the person is lost in most frames.
     `shadowpuppet settings` lists more settings; each is a flag, such as --tracker.arm.particles 300.
     """
     from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.io.run import CompleteRun, read_run
     from shadowpuppet.pipeline.track import track_recording
+    from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST, lost_share
 
     options = options_from(flags, config)
     folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
-    with terminal(quiet, folder) as listener:
-        summary = track_recording(recording, folder, options, listener)
+    if not resume:
+        _check_earlier(folder, force)
+    try:
+        with terminal(quiet, folder, verbose=verbose) as listener:
+            summary = track_recording(recording, folder, options, listener, resume=resume)
+        motion, metrics = summary.motion, summary.metrics
+    except CompleteRun as error:
+        print(error, file=sys.stderr)
+        motion, metrics = read_run(folder).motion, read_run(folder).metrics
     if not quiet:
-        _show_run(folder, summary.metrics)
+        _show_run(folder, metrics)
+    if lost_share(motion) <= MOSTLY_LOST:
+        return 0
+    print(f"the person is lost: {'; '.join(metrics['verdict']['reasons'])}", file=sys.stderr)
+    return PERSON_LOST
+
+
+def _check_earlier(folder: Path, force: bool) -> None:
+    """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be."""
+    from shadowpuppet.io.run import earlier_run
+
+    earlier = None if force else earlier_run(folder)
+    if earlier is None:
+        return
+    said = f"{folder}: found a run that was broken off, expected --resume, which goes on with it, --force, which starts over"
+    if earlier["complete"]:
+        said = f"{folder}: found a complete run, expected --force, which replaces it"
+    if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
+        print(f"{said.partition(', expected')[0]}; replace it? [y/N] ", end="", file=sys.stderr, flush=True)
+        if sys.stdin.readline().strip().lower() in ("y", "yes"):
+            return
+    raise ShadowPuppetError(f"{said}, or another folder (-o)")
 
 
 def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
@@ -69,7 +106,6 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
     Pictures are kept only with --record. Joints are sent to other programs only with --osc, --websocket or --lsl.
     """
-    import sys
     from time import strftime
 
     from shadowpuppet.cli.terminal import terminal
@@ -135,6 +171,17 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
     for summary in () if quiet else summaries:
         print(f"\n{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
         _show_run(summary.folder, summary.metrics, "overlay.png")
+    if not quiet:
+        _show_next(folder)
+
+
+def _show_next(folder: Path) -> None:
+    """Commands to try after the demo, as they are to be typed here."""
+    import os
+
+    program, run = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet"), folder / "run-ring"
+    print(f"\nnext\n  {program} view {run}\n  {program} evaluate {run} --report {folder / 'run-ring.html'}\n"
+          f"  {program} export {run} --to bvh,trc\n  {program} track YOUR-FILM.mp4 --fov 65 --height 1.75 --overlay")
 
 
 def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
@@ -147,7 +194,7 @@ def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File th
 
     with terminal(quiet) as listener:
         listener.begin("looking")
-        found, look = fit_person(recording, file, options_from(flags, config))
+        found, look = fit_person(recording, file, options_from(flags, config), listener)
         listener.doubt(look)
     if not quiet:
         curves, rows = _fit_tables(found) if isinstance(found, MonocularSubject) else ((), _rig_fit_rows(found.summary))
@@ -160,7 +207,8 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
     files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv", "intervals.csv")
-    show(metrics_table(metrics), *errors, pairs([("speed", speed), files]))
+    verdict = verdict_table(Verdict(metrics["verdict"]["word"], tuple(metrics["verdict"]["reasons"])))
+    show(verdict, metrics_table(metrics), *errors, pairs([("speed", speed), files]))
 
 
 def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:

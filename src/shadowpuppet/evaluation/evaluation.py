@@ -24,6 +24,7 @@ from shadowpuppet.evaluation.error_metrics import (
     whole_alignment,
     world_difference,
 )
+from shadowpuppet.evaluation.exchanges import exchanges
 from shadowpuppet.evaluation.interval_coverage import coverage
 from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, turn_errors
 from shadowpuppet.io.calibration.calibration_files import read_calibration
@@ -32,8 +33,9 @@ from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import names_in, read_truth
 from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
-from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.motion import ROUNDING, JointTable
 from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
+from shadowpuppet.video.moments import read_moment
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,10 @@ class Comparison:
 
     joints: Sequence[str] | None = None
     """Joints to compare, or names of `metrics.GROUPS`; None: `metrics.default_joints`."""
-    start: int = 0
-    """First frame of the truth to compare."""
-    end: int | None = None
-    """Last frame of the truth to compare; None: its last."""
+    start: int | str = 0
+    """First frame of the truth to compare: its number, `120f`, or its time, `3.5s` (a whole number is a frame, any other a time)."""
+    end: int | str | None = None
+    """Last frame of the truth to compare, likewise; None: its last."""
     offset: float = 0.0
     """Seconds added to the truth's times."""
     sync: bool = False
@@ -89,7 +91,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     if table is None:
         measured = evaluate(run.motion, joints=_joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
         return Evaluation(run, info | measured | lost, cameras)
-    read = _cut(read_truth(table, run.motion.joint_names), how, table)
+    read = _cut(_within(run, read_truth(table, run.motion.joint_names), how), how, table)
     reference, clock = _on_our_clock(run, read, how, table)
     try:
         reference, world = _in_our_world(run, reference, how)
@@ -138,17 +140,47 @@ def _error_metrics(run: Run, ours: JointTable, theirs: JointTable, errors: Joint
     return {"aligned_mm": aligned_errors(errors, ours, theirs), "axes_mm": axis_errors(errors),
             "humaneva": humaneva_error(ours, theirs), "bends_deg": hinge_errors(ours, theirs),
             "acceleration": acceleration_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
-            "coverage": coverage(errors.delta, sd, errors.names)}
+            "coverage": coverage(errors.delta, sd, errors.names), "exchanges": exchanges(ours, theirs)}
+
+
+def _within(run: Run, truth: JointTable, how: Comparison) -> JointTable:
+    """The truth in the span that the run was asked to track; all of it if it has another clock."""
+    begin, end = (run.info.get(key) for key in ("begin", "end"))
+    if how.sync or how.offset or (begin is None and end is None):
+        return truth
+    return truth.between(begin or 0.0, np.inf if end is None else end)
 
 
 def _cut(truth: JointTable, how: Comparison, path: str | Path) -> JointTable:
     last = len(truth.times) - 1
-    if not 0 <= how.start <= last:
+    start = _frame("start", how.start, truth, path)
+    end = last if how.end is None else _frame("end", how.end, truth, path)
+    if not 0 <= start <= last:
         raise ShadowPuppetError(f"start: found {how.start}, expected 0 to {last}, a frame of {path}")
-    if how.end is not None and not how.start <= how.end <= last:
-        raise ShadowPuppetError(f"end: found {how.end}, expected {how.start} to {last}, a frame of {path}")
-    frames = slice(how.start, None if how.end is None else how.end + 1)
+    if not start <= end <= last:
+        raise ShadowPuppetError(f"end: found {how.end}, expected {start} to {last}, a frame of {path}")
+    frames = slice(start, end + 1)
     return JointTable(truth.times[frames], truth.names, truth.positions[frames])
+
+
+def _frame(name: str, moment: int | str, truth: JointTable, path: str | Path) -> int:
+    """Number of the truth's frame at a moment. Raises `ShadowPuppetError` if it lies outside of the truth."""
+    try:
+        number = int(moment)
+    except ValueError:
+        pass
+    else:
+        return number
+    try:
+        found = read_moment(moment)
+    except ValueError as error:
+        raise ShadowPuppetError(f"{name}: found {moment!r}; {error}") from None
+    if found.in_frames:
+        return int(found.number)
+    times = truth.times
+    if not len(times) or not times[0] - ROUNDING <= found.number <= times[-1] + ROUNDING:
+        raise ShadowPuppetError(f"{name}: found {moment} s, expected {times[0]:.3f} to {times[-1]:.3f} s, the times of {path}")
+    return int(np.abs(times - found.number).argmin())
 
 
 def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path) -> tuple[JointTable, dict[str, Any]]:

@@ -12,7 +12,9 @@ from shadowpuppet.motion.limbs import DOUBTFUL
 from shadowpuppet.motion.motion import BLANK
 
 WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved",
-        "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled"}
+        "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled (PA-MPJPE)"}
+OVERLAPS = {"good": 0.85, "fair": 0.7}
+"""Least overlap of body and silhouette for each word; below that it is poor."""
 """The alignments of `error_metrics.aligned_errors`, in words."""
 
 
@@ -28,6 +30,11 @@ def coverage_text(coverage: Mapping[str, Any] | None) -> str:
     shares = ", ".join(f"{100 * coverage[f'within_{level}']:.0f} % within those of {level} %" for level in LEVELS)
     verdict = "too narrow" if coverage["rms_z"] > 1.1 else "too wide" if coverage["rms_z"] < 0.9 else "right"
     return f"{shares}; errors are {coverage['rms_z']:.2f} of the stated deviations (rms): {verdict}"
+
+
+def overlap_sense(overlap: float) -> str:
+    """An overlap of body and silhouette in a word."""
+    return next((word for word, least in OVERLAPS.items() if overlap >= least), "poor")
 
 
 def doubt_text(metrics: Mapping[str, Any]) -> str | None:
@@ -82,3 +89,13 @@ def bones_text(bones: Mapping[str, Mapping[str, float]]) -> str:
     off = np.mean([abs(bone["longer_mm"]) for bone in bones.values()])
     return (f"{off:.1f} mm from the truth's in the mean, worst {worst} by {bones[worst]['longer_mm']:+.1f}; lengths change by "
             f"{change:.2f} mm (sd) at most, the truth's by {max(bone['truth_sd_mm'] for bone in bones.values()):.2f}")
+
+
+def exchanges_text(found: Mapping[str, Mapping[str, float]] | None) -> str | None:
+    """Share of the frames in which arms or legs are nearer to the other side's; None if unknown."""
+    if not found:
+        return None
+    if not any(pair["frames"] for pair in found.values()):
+        return "never"
+    return "; ".join(f"{name} in {_percent(pair['share'])} of the frames, for {pair['longest_s']:.2f} s at most" if pair["frames"]
+                     else f"{name} never" for name, pair in found.items())

@@ -155,10 +155,24 @@ class _RunExport:
         return np.where(doubtful, MAX_RESIDUAL / MM, np.sqrt((motion.joint_sd**2).mean(2)))
 
     @property
+    def smoothing(self) -> str:
+        """How the motion was smoothed, in words; empty if unknown."""
+        return smoothing_text(self.run.info.get("smoothing"))
+
+    @property
     def angles(self) -> dict[str, tuple[str, Array]]:
         """Unit, deg or m, and values (T,) of each degree of freedom."""
         columns = zip(self.run.motion.dof_names, self.run.motion.poses.T)
         return {name: ("m", column) if dof_unit(name) == "m" else ("deg", np.degrees(column)) for name, column in columns}
+
+
+def smoothing_text(info: object) -> str:
+    """The table [smoothing] of a run.toml in words; empty if there is none."""
+    if not isinstance(info, dict) or "method" not in info:
+        return ""
+    if info["method"] == "butterworth":
+        return f"Butterworth, {info.get('cutoff_hz')} Hz, order {info.get('order')}, zero lag"
+    return "none" if info["method"] == "off" else "fixed-interval, over poses"
 
 
 def _made(folder: Path) -> Path:
@@ -197,14 +211,17 @@ def _write_markers(path: Path, table: JointTable) -> None:
 
 
 FORMATS = {
-    "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles), write_c3d),
+    "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing),
+                  write_c3d),
     "trc": Format(lambda export, path: _write_markers(path, export.run.motion.table), _write_markers),
     "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)), write_joints),
     "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), write_npz),
     "bvh": Format(skeleton=lambda path, animation, mesh, unit: write_bvh(path, animation, unit), any_skeleton=True),
-    "glb": Format(skeleton=lambda path, animation, mesh, unit: write_glb(path, animation, mesh), any_skeleton=True),
-    "mot": Format(skeleton=lambda path, animation, mesh, unit: write_mot(path, animation.times, coordinates(animation))),
-    "parquet": Format(lambda export, path: write_parquet(path, motion_columns(export.run.motion)),
+    "glb": Format(lambda export, path: write_glb(path, export.animation, body_mesh(export.body), export.smoothing),
+                  skeleton=lambda path, animation, mesh, unit: write_glb(path, animation, mesh), any_skeleton=True),
+    "mot": Format(lambda export, path: write_mot(path, export.animation.times, coordinates(export.animation), export.smoothing),
+                  skeleton=lambda path, animation, mesh, unit: write_mot(path, animation.times, coordinates(animation))),
+    "parquet": Format(lambda export, path: write_parquet(path, motion_columns(export.run.motion), export.smoothing),
                       lambda path, table: write_parquet(path, table_columns(table))),
 }
 """The writers of each of `EXPORTS`."""

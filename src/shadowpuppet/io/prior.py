@@ -18,6 +18,7 @@ NUMBERS = ("centres", "bases", "variances", "noise", "transitions", "initial", "
 """Numeric arrays of the file: fields of `Subspaces` and `MotionPrior`; `rate` is NaN if unknown."""
 
 
+@np.errstate(all="ignore")  # impossible numbers are refused where they are checked
 def read_prior(path: str | Path) -> MotionPrior:
     """Read a prior. Raises `FormatError`, naming file and array, if it is malformed."""
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,6 +80,8 @@ class Recording:
     """Frames/s that replace the films' times; None to keep the films' times."""
     duration: float | None = None
     """Duration used, seconds from time 0; None for all."""
+    begin: float = 0.0
+    """First moment used, seconds after time 0; the frames before are passed over, and times stay those after time 0."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
@@ -183,7 +186,7 @@ class _Notes:
 
     def _existing(self, key: str, value: object) -> Path:
         path = self.folder / value if isinstance(value, str) else None
-        if path is None or not path.exists():
+        if path is None or not os.path.exists(path):  # unlike that of `Path`, false for an impossible name
             raise RecordingError(f"{self.path}: {key}: found {value!r}, expected the path of an existing file, from this folder")
         return path
 

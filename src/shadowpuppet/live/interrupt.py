@@ -1,11 +1,11 @@
-"""Ctrl-C as the normal end of a session, which finishes its current step first."""
+"""Ctrl-C as the normal end of a session, which finishes its current step first; SIGTERM and SIGHUP likewise where they end the program."""
 
 from __future__ import annotations
 
 import signal
 import threading
 from types import FrameType
-from typing import Self
+from typing import Any, Self
 
 
 class Stop:
@@ -14,18 +14,21 @@ class Stop:
     def __init__(self) -> None:
         """Neither flag is set."""
         self.wished = self.hasty = False
-        self._before = None
+        self._before = dict[int, Any]()
 
     def __enter__(self) -> Self:
-        """Replace the handler of SIGINT, if the signal is not ignored and this is the main thread."""
-        if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
-            self._before = signal.signal(signal.SIGINT, self._heard)
+        """Replace the handlers of the signals that have one, if this is the main thread."""
+        if threading.current_thread() is threading.main_thread():
+            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+                number = getattr(signal, name, None)
+                if number is not None and callable(signal.getsignal(number)):
+                    self._before[number] = signal.signal(number, self._heard)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the former handler."""
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        """Restore the former handlers."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     def _heard(self, number: int, frame: FrameType | None) -> None:
         if self.wished or self.hasty:

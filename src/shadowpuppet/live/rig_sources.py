@@ -16,7 +16,7 @@ from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.live.phases import KEPT
 from shadowpuppet.live.rig_capture import RigCapture, SnapshotSet
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, cut
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, open_rig, synchronized_frames
 from shadowpuppet.silhouette.background import sample_frames
@@ -58,10 +58,12 @@ def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
     names = _parts(settings.camera)
     cameras = _calibrated(options, len(names))
     if any(name.isdecimal() or ADDRESS.match(name) for name in names):
-        return _feeds([open_feed(name, rate=settings.rate, speed=settings.speed) for name in names], cameras, options)
+        feeds = [open_feed(name, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end) for name in names]
+        return _feeds(feeds, cameras, options)
     recording = Recording(Path(settings.camera), "live", tuple(map(View, cameras, map(Path, names))), rate=settings.rate)
     for view in recording.views:
         _check_size(view.camera, open_frames(view.video).size)
+    recording = cut(recording, options)
     return _films(Rig(recording, tuple(camera_footage(recording, view, options) for view in recording.views)), options, settings)
 
 

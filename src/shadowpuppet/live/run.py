@@ -102,12 +102,13 @@ class _Live:
 
     def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
         """The session of one camera, its reader, its frames/s, and whether it is live (not a film)."""
-        person, settings = known_person(self.options), self.settings
-        feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed)
-        full = lens(self.options, feed.size)
-        session = Session(self.options, settings, np.random.default_rng(self.options.seed), self.clock, Timing(feed.rate), in_background,
+        options, settings = self.options, self.settings
+        person = known_person(options)
+        feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end)
+        full = lens(options, feed.size)
+        session = Session(options, settings, np.random.default_rng(options.seed), self.clock, Timing(feed.rate), in_background,
                           full=full, watchdog=CameraWatchdog(feed.name, feed.size, feed.live), person=person,
-                          scene=empty_scene(self.options, full))
+                          scene=empty_scene(options, full))
         return session, Capture(feed), feed.rate, feed.live
 
     def _several(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
@@ -192,6 +193,7 @@ class _Live:
 
     def _write_beside(self) -> None:
         """Write person.toml and calibration.toml; called again whenever the person was measured again."""
+        self.run_.begin()
         write_person(self.run_.folder / "person.toml", self._person.person)
         write_calibration(self.run_.folder / "calibration.toml", self.session.cameras)
 

@@ -95,6 +95,17 @@ def _interpolated(times: Array, values: Array, wanted: Array) -> Array:
     return out
 
 
+def filled(times: ArrayLike, values: ArrayLike) -> Array:
+    """Values (T, ...) at times (T,), seconds, with a straight line through unknown ones, and the nearest known one at the ends."""
+    times, values = np.asarray(times, float), np.asarray(values, float)
+    out = values.reshape(len(times), -1).copy()
+    for column in out.T:
+        unknown = np.isnan(column)
+        if unknown.any() and not unknown.all():
+            column[unknown] = np.interp(times[unknown], times[~unknown], column[~unknown])
+    return out.reshape(values.shape)
+
+
 def true_runs(known: ArrayLike) -> list[tuple[int, int]]:
     """Starts and ends of the runs of true values in (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], np.asarray(known, bool), [False]]).astype(int)))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -18,6 +19,8 @@ STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
 """Statuses of a frame: tracked; tracked but doubtful; extrapolated without a picture; position unknown; no person visible."""
 BLANK = ("lost", "absent")
 """Statuses of frames without pose and joints."""
+ROUNDING = 1e-6
+"""Rounding error of a time, seconds."""
 PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status", "limb_status")
 """Fields of a `Motion` with one row a frame."""
 
@@ -44,6 +47,11 @@ class JointTable:
         if missing:
             raise ShadowPuppetError(f"unknown joint {missing[0]!r}; there are: {choices(self.names)}")
         return JointTable(self.times, tuple(names), self.positions[:, [self.names.index(name) for name in names]])
+
+    def between(self, begin: float, end: float) -> JointTable:
+        """The frames from `begin` on and before `end`, seconds."""
+        chosen = (self.times > begin - ROUNDING) & (self.times < end - ROUNDING)
+        return JointTable(self.times[chosen], self.names, self.positions[chosen])
 
 
 class Mode(NamedTuple):
@@ -167,6 +175,12 @@ class Motion:
     def table(self) -> JointTable:
         """The joints as a table."""
         return JointTable(self.times, self.joint_names, self.joints)
+
+    def frames(self) -> Iterator[MotionFrame]:
+        """Its frames, one after another."""
+        columns = (self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd, self.joint_sd, self.cost.tolist(),
+                   self.overlap.tolist(), self.limb_status.tolist())
+        yield from itertools.starmap(MotionFrame, zip(*columns))
 
 
 class MotionBuilder:

@@ -16,14 +16,14 @@ from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, 
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
+from shadowpuppet.video.frames import ROUNDING
+from shadowpuppet.video.moments import span_of
 from shadowpuppet.video.seeking import Seeker
 
 LOOKED_AT = 1500
 """Number of frames, from the film's beginning, that a sample is taken from: examining a film must not take as long as tracking it."""
 RUNS, RUN = 10, 4
 """Number of a sample's runs, spread over these frames, and of consecutive frames in each."""
-ROUNDING = 1e-6
-"""Rounding error of a time, seconds."""
 FIRST_SECONDS, FIRST = 8.0, 16
 """Length of the film's beginning (s), and number of its frames that a sample keeps."""
 SPREAD = 60
@@ -57,19 +57,20 @@ class Footage:
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
 
     def frames(self, ready: bool, strict: bool = True) -> Iterator[CameraFrame]:
-        """The film's frames from the recording's time 0 on; with `ready`, the ready silhouettes too.
+        """The film's frames from the recording's begin on; with `ready`, the ready silhouettes too.
 
         Raises `SilhouetteError` if these end before the film does; if not `strict`, later frames have None instead.
         """
         masks = iter(open_frames(self.view.masks, size=self.camera.size)) if ready and self.view.masks else None
-        start, end = self.view.start, self.recording.duration
-        for n, frame in enumerate(self.film()):
+        start, begin, end = self.view.start, self.recording.begin, self.recording.duration
+        passed_over = 0.0 if masks is not None else start + begin - ROUNDING  # masks have no times: they are counted with the frames
+        for n, frame in enumerate(self.film().read(passed_over)):
             mask, time = None if masks is None else next(masks, None), frame.time - start
             if masks is not None and mask is None and strict:
                 raise SilhouetteError(f"{self.view.masks}: found {n} silhouettes, expected one for each frame of {self.view.video}")
             if end is not None and time > end - ROUNDING:
                 return
-            if time > -ROUNDING:
+            if time > begin - ROUNDING:
                 yield CameraFrame(max(time, 0.0), frame.image, None if mask is None else mask.image)
 
     @property
@@ -78,7 +79,7 @@ class Footage:
         film = self.film()
         if film.count is None or not np.isfinite(film.rate):
             return film.count
-        first = int(np.ceil((self.view.start - ROUNDING) * film.rate))
+        first = int(np.ceil((self.view.start + self.recording.begin - ROUNDING) * film.rate))
         last = film.count if self.recording.duration is None else int(np.ceil((self.view.start + self.recording.duration) * film.rate))
         return max(min(last, film.count) - first, 0)
 
@@ -109,15 +110,33 @@ def open_footage(path: str | Path, options: Options) -> Footage:
 
 
 def open_recording(path: str | Path, options: Options) -> Recording:
-    """Read a recording; height and distance in the options override its own.
+    """Read a recording; height, distance and span in the options override its own.
 
-    Raises `RecordingError`, `CalibrationError` or `VideoError`.
+    Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError`.
     """
     fov = None if options.fov is None else float(np.radians(options.fov))
     recording = read_recording(path, fov=fov, calibration=options.calibration)
     subject = recording.subject
-    return replace(recording, subject=replace(subject, height=options.height or subject.height,
-                                              distance=options.distance or subject.distance))
+    return cut(replace(recording, subject=replace(subject, height=options.height or subject.height,
+                                                  distance=options.distance or subject.distance)), options)
+
+
+def cut(recording: Recording, options: Options) -> Recording:
+    """The recording from `options.start` to `options.end`; frames are counted at the films' median rate.
+
+    Raises `SettingsError` if that holds no moment of it, `VideoError` if a film cannot be opened.
+    """
+    if options.start is None and options.end is None:
+        return recording
+    views = chosen_views(recording, options.camera)
+    films = [open_frames(view.video, rate=recording.rate) for view in views]
+    rates = sorted(film.rate for film in films if np.isfinite(film.rate))
+    rate = rates[(len(rates) - 1) // 2] if rates else np.nan
+    lengths = [(film.count / film.rate if film.count else film.duration) - view.start for film, view in zip(films, views)]
+    length = min(max((each for each in lengths if np.isfinite(each)), default=np.inf), recording.duration or np.inf)
+    begin, end = span_of(options.start, options.end, rate, length)
+    end = min(end, recording.duration or np.inf)
+    return replace(recording, begin=begin, duration=end if np.isfinite(end) else None)
 
 
 def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
@@ -205,12 +224,13 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
     wanted = _spread(min(int(length), longest))
     runs: dict[int, list[CameraFrame]] = {}
-    first, times, next_first = list[CameraFrame](), list[float](), 0.0
+    first, times, begin = list[CameraFrame](), list[float](), footage.recording.begin
+    next_first = begin
     for n, frame in enumerate(islice(footage.frames(ready=True, strict=need_masks), longest)):
         times.append(frame.time)
         if n in wanted:
             runs.setdefault(wanted[n], []).append(frame)
-        if next_first <= frame.time <= FIRST_SECONDS:
+        if next_first <= frame.time <= begin + FIRST_SECONDS:
             first.append(frame)
             next_first = frame.time + 0.99 * FIRST_SECONDS / FIRST
     return Sample(list(runs.values()), list(runs), first, np.array(times))
@@ -224,7 +244,7 @@ def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
         return []
     wanted = np.unique(np.linspace(0, max(length - 1, 0), number).round())
     with Seeker(Path(str(footage.view.video)), footage.camera.size, footage.recording.rate) as seeker:
-        found = (seeker.at(footage.view.start + float(n) / film.rate) for n in wanted)
+        found = (seeker.at(footage.view.start + footage.recording.begin + float(n) / film.rate) for n in wanted)
         return [image for image in found if image is not None]
 
 

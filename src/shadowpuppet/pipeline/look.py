@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import TrackingError
+from shadowpuppet.errors import Caution
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.correction.condition import FilmCondition
@@ -61,7 +61,7 @@ class Look:
     person: dict[str, Any] | None = None
     """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
     it was not fitted."""
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Caution, ...] = ()
     """Possible problems of the run with their remedies, a sentence each."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
@@ -115,7 +115,7 @@ class RigLook:
     """Agreement of the cameras, from the silhouettes of the first seconds."""
     person: dict[str, Any] | None = None
     """Sizes and how they were found; None if the person was not measured."""
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Caution, ...] = ()
     """Possible problems of the run with their remedies, a sentence each."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
@@ -143,11 +143,6 @@ class Survey:
     """Silhouettes of the beginning, made by `clean`."""
     look: Look | RigLook
 
-    def check(self) -> None:
-        """Raise `TrackingError` if tracking is hopeless."""
-        if self.look.refusal is not None:
-            raise TrackingError(f"{self.look.recording}: {self.look.refusal}")
-
-    def look_with(self, person: dict[str, Any], doubts: tuple[str, ...]) -> Look | RigLook:
+    def look_with(self, person: dict[str, Any], doubts: tuple[Caution, ...]) -> Look | RigLook:
         """A copy of `look` with the fitted person and the doubts about the fit."""
         return replace(self.look, person=person, doubts=(*self.look.doubts, *doubts))

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
@@ -20,6 +20,8 @@ from shadowpuppet.settings import checked, plain_values, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.tracking.monocular.settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
+from shadowpuppet.tracking.smoothing.method import Method
+from shadowpuppet.video.moments import moment_text
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
@@ -80,12 +82,28 @@ class Options:
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
     region: Annotated[tuple[int, int, int, int], BeforeValidator(_corners)] | None = None
     """Region of interest x0,y0,x1,y1, pixels of the film; everything outside is background."""
+    start: Annotated[str, BeforeValidator(moment_text)] | None = None
+    """Where to begin, on the recording's clock: 3.5 (seconds) or 120f (frames). Times in the results stay the recording's."""
+    end: Annotated[str, BeforeValidator(moment_text)] | None = None
+    """Where to end, likewise; the frame at that moment is left out."""
     max_size: Annotated[int, Field(ge=64, le=8192)] = 640
     """Longest side of a frame, pixels; larger frames are scaled down."""
     every: Annotated[int, Field(ge=1, le=1000)] = 1
     """Only every Nth frame is tracked, which saves time with films of a high frame rate."""
+    anyway: bool = False
+    """Track even where the examination of the recording says that it cannot work."""
     overlay: bool = False
     """Also write overlay.mp4: model, matching result and raw picture, one below the other."""
+    smooth: Literal["off", "tracker", "butterworth"] | None = None
+    """Smoothing of the tracked motion over time, when the film is over: tracker (by the doubt of every frame, with people's accelerations),
+    butterworth (a low-pass filter, fourth order, without lag), off. By default tracker, and off with the papers' presets."""
+    facing: Literal["camera", "away"] = "camera"
+    """Whether the person faces the camera in the first frame, or looks away from it: one camera's silhouettes do not tell. With several
+    cameras it has no effect; nor has it with `smooth = "off"`."""
+    cutoff: Annotated[float, Field(gt=0, le=1000)] = 6.0
+    """Cut-off frequency of the Butterworth filter, Hz."""
+    gaps: Annotated[float, Field(ge=0, le=10)] | None = None
+    """Longest gap in the motion that is bridged, seconds; its frames are `predicted`. By default 0.5, and 0 with the papers' presets."""
     tracker: MonocularSettings = MonocularSettings()
     """Tracker for one camera."""
     multiview: MultiviewSettings = MultiviewSettings()
@@ -96,6 +114,12 @@ class Options:
     """Estimation of the person's sizes."""
     training: PriorSettings = PriorSettings()
     """Learning a motion prior, from the recording's training motion or by `fit-prior`."""
+
+    @property
+    def smoothing(self) -> tuple[Method, float]:
+        """How the motion is smoothed, and the longest gap that is bridged, seconds."""
+        method, gaps = ("tracker", 0.5) if self.preset == "default" else ("off", 0.0)
+        return self.smooth or method, gaps if self.gaps is None else self.gaps
 
 
 def make_options(values: Mapping[str, Any] | None = None, source: str = "settings") -> Options:

@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.errors import RecordingError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, Caution, RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
@@ -32,12 +32,14 @@ from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
+from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
-from shadowpuppet.tracking.unexplained import left_out, look_beside, looks_in
+from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
 WRONG = {"front_t_pose": 0.65, "side_arms_hanging": 0.62, "front_arms_t_pose": 0.65}
@@ -71,6 +73,7 @@ class MonocularSubject(TrackedSubject):
     fit: SizeFit
     """Sizes and place, and how they were found."""
     tracker: MonocularTracker
+    state_types = (State, Particles, Unexplained, Before, Trail)
 
     @classmethod
     def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str, rate: float) -> MonocularSubject:
@@ -113,6 +116,10 @@ class MonocularSubject(TrackedSubject):
         """The pixels (H, W) that a state leaves out of the silhouette; None for none."""
         return (None,) if state is None else (left_out(state.unexplained),)
 
+    def kept(self, state: State | None) -> State | None:
+        """A state without its observation."""
+        return None if state is None else state._replace(observation=None)
+
     def doubt(self, state: State, observation: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a mask."""
         return self._doubt(state, observation, seconds, before)
@@ -121,9 +128,9 @@ class MonocularSubject(TrackedSubject):
     def _doubt(self) -> MonocularDoubt:
         return MonocularDoubt(self.tracker)
 
-    def points(self, pose: Array) -> Array:
-        """Landmarks (L, 3) of a pose (D,) in the world, metres."""
-        return self.picture.points_world(pose[None])[0]
+    def landmarks(self, poses: Array) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
+        return self.picture.points_world(poses)
 
     def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
         """Model, matching result and raw picture, one below the other."""
@@ -161,14 +168,15 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start)), beside=(beside,))
 
 
-def _doubts(fit: SizeFit, source: str, start: float) -> list[str]:
+def _doubts(fit: SizeFit, source: str, start: float) -> list[Caution]:
     """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette."""
-    doubts = [f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
-              "is the silhouette whole? take it again, or remove it" for name, overlap in fit.overlaps.items()
-              if source == "references" and overlap < DOUBTFUL[name]]
+    doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
+                      "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
+              for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
     if start < POOR:
-        doubts.append(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
-                      "silhouette a person's, and does the person face the camera?")
+        doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
+                              "silhouette a person's, and does the person face the camera?",
+                              "body fits the first silhouette badly: check height and distance", HARMFUL))
     return doubts
 
 

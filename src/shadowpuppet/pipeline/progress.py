@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 from warnings import warn
 
 import numpy as np
@@ -39,7 +39,7 @@ class Listener:
     """Receives a run's progress. Every method does nothing: override those of interest."""
 
     def begin(self, what: str, total: int | None = None) -> None:
-        """A phase begins: `looking` or `tracking`; `total`: its number of frames, if known."""
+        """A phase begins, such as `tracking`; `total`: its number of frames, if known."""
 
     def advance(self, frames: int) -> None:
         """`frames` frames are tracked."""
@@ -90,30 +90,35 @@ class StageTimer:
             yield item
 
 
-class LeftOut:
-    """What a run leaves out of the cameras' silhouettes because the body does not explain it."""
+class LeftOut(NamedTuple):
+    """What a run leaves out of a camera's silhouettes because the body does not explain it."""
 
-    def __init__(self, cameras: Sequence[Camera]) -> None:
-        """`cameras`: of the films' size."""
-        self.cameras = cameras
-        self._times: list[list[float]] = [[] for _ in cameras]
-        self._where: list[Mask | None] = [None for _ in cameras]
+    frames: int
+    first: float
+    """Seconds."""
+    last: float
+    """Seconds."""
+    where: Mask
+    """Pixels (H, W) that are left out in any of the frames, in a mask of any size."""
 
-    def add(self, time: float, left_out: Sequence[Mask | None]) -> None:
-        """Add one frame: its time (s), and for each camera the pixels (H, W) that are left out, or None."""
-        for n, mask in enumerate(left_out):
-            if mask is not None:
-                before = self._where[n]
-                self._times[n].append(time)
-                self._where[n] = mask if before is None else before | mask
 
-    def metrics(self) -> dict[str, Any]:
-        """The entry `left_out` of metrics.json, none if nothing was left out: for each camera the number of frames, the times of the first
-        and the last, seconds, and left, top, right and bottom of the place, the film's pixels."""
-        found = [{"camera": camera.name, "frames": len(times), "from_s": round(times[0], 3), "to_s": round(times[-1], 3),
-                  "box": _box(where, camera.size)}
-                 for camera, times, where in zip(self.cameras, self._times, self._where) if where is not None]
-        return {"left_out": found} if found else {}
+def add_left_out(before: Sequence[LeftOut | None], time: float, masks: Sequence[Mask | None]) -> tuple[LeftOut | None, ...]:
+    """What is left out, by camera, with one more frame: its time (s), and for each camera the pixels (H, W) that are left out, or None;
+    no masks for none. `before`: at first empty."""
+    found = list[LeftOut | None]()
+    for n, mask in enumerate(masks):
+        last = before[n] if before else None
+        found.append(last if mask is None else LeftOut(1, time, time, mask) if last is None
+                     else LeftOut(last.frames + 1, last.first, time, last.where | mask))
+    return tuple(found) or tuple(before)
+
+
+def left_out_metrics(found: Sequence[LeftOut | None], cameras: Sequence[Camera]) -> dict[str, Any]:
+    """The entry `left_out` of metrics.json, none if nothing was left out: for each camera, of the films' size, the number of frames, the
+    times of the first and the last, seconds, and left, top, right and bottom of the place, the film's pixels."""
+    entries = [{"camera": camera.name, "frames": each.frames, "from_s": round(each.first, 3), "to_s": round(each.last, 3),
+                "box": _box(each.where, camera.size)} for camera, each in zip(cameras, found) if each is not None]
+    return {"left_out": entries} if entries else {}
 
 
 def _box(mask: Mask, size: tuple[int, int]) -> list[int]:
@@ -186,6 +191,8 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
     camera, cameras = None if rig.is_multiview else rig.cameras[0], len(rig.cameras)
     try:
         truth = read_truth(rig.recording.truth, motion.joint_names) if rig.recording.truth is not None else None
+        if truth is not None:
+            truth = truth.between(rig.recording.begin, np.inf if rig.recording.duration is None else rig.recording.duration)
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
         warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)

@@ -18,7 +18,8 @@ from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 
-SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "max_size", "every", "silhouette")
+SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size",
+          "every", "silhouette")
 """Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
 """Greatest size of the kept silhouettes, bytes, at a bit a pixel: half an hour of one camera's 25 frames/s at 320 x 240."""

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Bits
+from shadowpuppet.errors import Caution
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.motion.motion import BLANK, MotionFrame
@@ -67,10 +68,13 @@ class TrackedSubject(ABC):
     """Sizes that other runs can use, written to person.toml."""
     summary: dict[str, Any]
     """How the person was fitted, as plain values: the entry `person` of look.json."""
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Caution, ...] = ()
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
+
+    state_types: ClassVar[tuple[type, ...]]
+    """The named tuples in the tracker's state and in what the doubt about the next frame needs."""
 
     @abstractmethod
     def observe(self, masks: Sequence[Mask | None]) -> Any:
@@ -99,6 +103,10 @@ class TrackedSubject(ABC):
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
         return ()
 
+    def kept(self, state: Any) -> Any:
+        """A tracker's state without what the next frame does not need."""
+        return state
+
     def drawn(self, state: Any) -> tuple[Bits, ...]:
         """The body of a tracker's state in each camera's picture of half the size; empty if there is none, or with one camera."""
         return ()
@@ -107,9 +115,13 @@ class TrackedSubject(ABC):
         """Status of a frame without a state: `lost` or `absent`."""
         return "absent"
 
+    def landmarks(self, poses: Array) -> Array:
+        """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
+        return self.body.points(poses)
+
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""
-        return self.body.points(pose[None])[0]
+        return self.landmarks(pose[None])[0]
 
     @cached_property
     def joint_columns(self) -> list[int]:

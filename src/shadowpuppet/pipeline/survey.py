@@ -14,7 +14,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.calibration.agreement import agreement
 from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, ShadowPuppetWarning
 from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.footage import FIRST, LOOKED_AT, CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, Look, RigLook, Survey
@@ -107,10 +107,11 @@ def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
     return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
 
 
-def _clutter_warnings(left_out: Sequence[str]) -> list[str]:
+def _clutter_warnings(left_out: Sequence[str]) -> list[Caution]:
     if not left_out:
         return []
-    return [f"{'; '.join(left_out)}: taken for clutter, not for the person, and left out of the silhouettes"]
+    return [Caution(f"{'; '.join(left_out)}: taken for clutter, not for the person, and left out of the silhouettes",
+                    "clutter beside the person was left out: see the overlay", NOTED)]
 
 
 def brief_length(footage: Footage, options: Options) -> int:
@@ -126,7 +127,7 @@ def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (Scen
     footage = rig.footage[0]
     film = survey_film(footage, options, hint=hints[0])
     look = _look(footage, film)
-    if look.refusal:
+    if look.refusal and not options.anyway:
         return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
     clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
     return Survey(rig, (film.silhouettes,), (clean,), _first_people(film.sample, clean), look)
@@ -145,7 +146,7 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     sample, camera = film.sample, footage.camera
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
-        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.film().count,
+        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.count,
         looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
         plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
         refusal=_doubted(film.silhouettes) or film.values["quality"].refusal(), **film.values,
@@ -161,18 +162,20 @@ def _doubted(silhouettes: Silhouettes) -> str | None:
     return None if silhouettes.recovered is None else silhouettes.recovered.doubt
 
 
-def _recovery_doubts(names: Sequence[str], silhouettes: Sequence[Silhouettes]) -> list[str]:
+def _recovery_doubts(names: Sequence[str], silhouettes: Sequence[Silhouettes]) -> list[Caution]:
     """What to know of scenes that were recovered from the films of the cameras `names`."""
     found = {name: each.recovered for name, each in zip(names, silhouettes) if each.recovered is not None}
-    said = [f"camera {name!r}: {scene.doubt}" for name, scene in found.items() if scene.doubt]
+    said = [Caution(f"camera {name!r}: {scene.doubt}", f"camera {name!r}: empty scene not recovered; film it", RUINOUS)
+            for name, scene in found.items() if scene.doubt]
     hidden = {name: float(scene.covered.mean()) for name, scene in found.items() if not scene.doubt}
     if not hidden:
         return said
     of = f" of {', '.join(hidden)}" if len(names) > 1 else ""
     never = (f"up to {100 * max(hidden.values()):.1f} % of the picture was never seen without the person, and counts as person in every "
              "frame; ") if any(hidden.values()) else ""  # fmt: skip
-    return [*said, f"no picture of the empty scene{of}: it was recovered from the film; {never}what touches the person and has like "
-            "colours may be taken for it; look at the silhouettes, or give background/<camera>.mp4 or --background"]
+    return [*said, Caution(f"no picture of the empty scene{of}: it was recovered from the film; {never}what touches the person and has "
+                           "like colours may be taken for it; look at the silhouettes, or give background/<camera>.mp4 or --background",
+                           "no picture of the empty scene: film one, give --background", NOTED)]
 
 
 def known_scale(footage: Footage) -> str:
@@ -182,22 +185,30 @@ def known_scale(footage: Footage) -> str:
     return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
 
 
-def _doubts(look: Look, footage: Footage) -> list[str]:
-    doubts, subject = [], footage.recording.subject
+def _doubts(look: Look, footage: Footage) -> list[Caution]:
+    doubts, subject = list[Caution](), footage.recording.subject
     if not look.calibrated:
-        doubts.append(f"no calibration: the camera is taken for level, with a field of view of {look.fov:.0f} degrees and no distortion; "
-                      "depths and the world's axes are as good as that; give a calibration.toml")
+        doubts.append(Caution(f"no calibration: the camera is taken for level, with a field of view of {look.fov:.0f} degrees and no "
+                              "distortion; depths and the world's axes are as good as that; give a calibration.toml",
+                              "camera not calibrated: depths are rough; give --calibration", NOTED))
     if subject.height is None and subject.distance is None:
-        doubts.append(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give --height")
+        doubts.append(Caution(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
+                              "--height", "height not known, so no length is: give --height", HARMFUL))
     elif subject.distance is None and not footage.recording.references:
-        doubts.append("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as wrong as "
-                      "that; measure it and give --distance, or take references")
+        doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
+                              "wrong as that; measure it and give --distance, or take references",
+                              "distance not known: measure it, give --distance", NOTED))
     if look.jitter * look.rate > UNEVEN:
-        doubts.append(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are kept")
+        doubts.append(Caution(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are "
+                              "kept", "frames come unevenly: their own times are kept", NOTED))
     if look.exact_overlap is not None and look.exact_overlap < GOOD:
-        doubts.append(f"the silhouettes overlap the ready ones in masks/ by {look.exact_overlap:.2f} only: try another "
-                      "--silhouette.method, or --masks")
+        doubts.append(_unlike_ready(look.exact_overlap))
     return [*doubts, *_poor(look.condition)]
+
+
+def _unlike_ready(overlap: float) -> Caution:
+    return Caution(f"the silhouettes overlap the ready ones in masks/ by {overlap:.2f} only: try another --silhouette.method, or --masks",
+                   "silhouettes differ from those in masks/: use --masks", HARMFUL)
 
 
 # Several cameras
@@ -249,25 +260,26 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     return look.agreement.refusal()
 
 
-def _rig_doubts(look: RigLook) -> list[str]:
+def _rig_doubts(look: RigLook) -> list[Caution]:
     doubts = list(look.agreement.doubts())
     rates = np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
     if np.ptp(rates) > RATES * rates.min():
         listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
-        doubts.append(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets a "
-                      "second, and a camera without a picture of a moment is left out of it; film at one rate")
+        doubts.append(Caution(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets "
+                              "a second, and a camera without a picture of a moment is left out of it; film at one rate",
+                              "films have different rates: film at one", NOTED))
     elif ends and max(ends.values()) - min(ends.values()) > LENGTHS:
         listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
-        doubts.append(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml when "
-                      "each began")
+        doubts.append(Caution(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml "
+                              "when each began", "films differ in length: begun together? see [start]", NOTED))
     for camera in look.cameras:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
-            doubts.append(f"camera {camera.name!r}: the silhouettes overlap the ready ones in masks/ by {camera.exact_overlap:.2f} only: "
-                          "try another --silhouette.method, or --masks")
+            doubts.append(_unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
         warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *camera.quality.warnings())
-        doubts += [f"camera {camera.name!r}: {warning}" for warning in warnings]
-        doubts += [f"camera {camera.name!r}: {why}" for why in [camera.quality.refusal()] if why]
+        doubts += [warning.about(f"camera {camera.name!r}") for warning in warnings]
+        doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
+                   for why in [camera.quality.refusal()] if why]
     return doubts
 
 
@@ -286,7 +298,7 @@ def condition_of(silhouettes: Silhouettes, sample: Sample, masks: Sequence[Seque
                           masks)
 
 
-def _poor(condition: FilmCondition | None) -> tuple[str, ...]:
+def _poor(condition: FilmCondition | None) -> tuple[Caution, ...]:
     return () if condition is None else condition.warnings()
 
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from warnings import warn
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.jit import is_compiled
+from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.person import fit_monocular
@@ -25,9 +29,11 @@ from shadowpuppet.pipeline.progress import (
     Listener,
     StageTimer,
     Summary,
+    add_left_out,
     evaluated,
     generators,
     json_text,
+    left_out_metrics,
     set_aside,
     timings,
     tracked,
@@ -40,9 +46,12 @@ from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
 from shadowpuppet.pipeline.survey import survey_camera, survey_rig
+from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -50,6 +59,8 @@ __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_r
 
 LOOKS_AGAIN = 3
 """Greatest number of times that a recording is surveyed again because of what the fitted body leaves unexplained."""
+CHECKPOINT_SECONDS, CHECKPOINT_COST = 1.0, 50.0
+"""Least time from one checkpoint to the next: in seconds, and over the time that it takes to write one."""
 
 
 class Kind(NamedTuple):
@@ -83,26 +94,29 @@ class Prepared(NamedTuple):
 
     def check(self) -> TrackedSubject:
         """The fitted person. Raises `TrackingError` if tracking is hopeless."""
-        self.survey.check()
-        assert self.subject is not None
+        if self.subject is None:
+            raise TrackingError(f"{self.look.recording}: {self.look.refusal}; --anyway tries it")
         return self.subject
 
 
 @one_blas_thread()
-def look_at(recording: str | Path, options: Options | None = None) -> Look | RigLook:
+def look_at(recording: str | Path, options: Options | None = None, listener: Listener | None = None) -> Look | RigLook:
     """Examine a recording as `track_recording` does before tracking. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
     kind = kind_of(rig)
-    return prepare(generators(options)[0], rig, options, kind).look if kind.look_fits else kind.survey(rig, options).look
+    if kind.look_fits:
+        return prepare(generators(options)[0], rig, options, kind, listener=listener).look
+    return kind.survey(rig, options).look
 
 
 @one_blas_thread()
-def fit_person(recording: str | Path, file: str | Path, options: Options | None = None) -> tuple[TrackedSubject, Look | RigLook]:
+def fit_person(recording: str | Path, file: str | Path, options: Options | None = None,
+               listener: Listener | None = None) -> tuple[TrackedSubject, Look | RigLook]:
     """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
     rig = open_rig(recording, options)
-    prepared = prepare(generators(options)[0], rig, options, kind_of(rig))
+    prepared = prepare(generators(options)[0], rig, options, kind_of(rig), listener=listener)
     subject = prepared.check()
     write_person(file, subject.person)
     return subject, prepared.look
@@ -110,10 +124,13 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
 
 @one_blas_thread()
 def track_recording(recording: str | Path, folder: str | Path, options: Options | None = None,
-                    listener: Listener | None = None, cache: SilhouetteCache | None = None) -> Summary:
+                    listener: Listener | None = None, cache: SilhouetteCache | None = None, *, resume: bool = False) -> Summary:
     """Track a recording (a folder, or a film with `Options.fov`) of one camera or several into a run folder.
 
     `cache` keeps silhouettes for the next run of the same recording; a run that used them has `kept_silhouettes` in metrics.json.
+    `resume`: an earlier run in the folder, of the same recording, settings and versions, goes on from its last checkpoint, which is made
+    about every second; the look and the silhouettes before are made again, and the result is that of a run that was never broken off. A
+    folder without a checkpoint is tracked from the first frame; a complete run raises `io.run.CompleteRun`.
 
     In addition to the files that `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the cameras)
     and, if asked for, overlay.mp4. An interrupted run keeps the frames tracked so far. The same options, films and machine give the same
@@ -121,7 +138,7 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     """
     options = options or Options()
     rig = open_rig(recording, options)
-    return run(rig, kind_of(rig), folder, options, listener or Listener(), cache)
+    return run(rig, kind_of(rig), folder, options, listener or Listener(), cache, resume=resume)
 
 
 def kind_of(rig: Rig) -> Kind:
@@ -129,11 +146,15 @@ def kind_of(rig: Rig) -> Kind:
     return MULTIVIEW if rig.is_multiview else MONOCULAR
 
 
-def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None) -> Prepared:
+def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
+            listener: Listener | None = None) -> Prepared:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
+    listener = listener or Listener()
+    listener.begin(f"looking at {len(rig.footage)} film{'s' if rig.is_multiview else ''}")
     survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
-    if survey.look.refusal is not None:
+    if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
+    listener.begin("measuring the person" if is_compiled() else "compiling, once (a minute or two), and measuring the person")
     subject = kind.fit(rng, survey, options)
     for _ in range(LOOKS_AGAIN):
         again = _looked_again(survey, subject, options, kind)
@@ -155,24 +176,26 @@ def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kin
     return again if more and again.look.refusal is None else None
 
 
-def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None) -> Summary:
+def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None,
+        resume: bool = False) -> Summary:
     """Survey, fit, track and evaluate; see `track_recording`."""
     for_look, for_track = generators(options)
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
-            "truth": recording.truth and recording.truth.resolve()}
-    with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as writer:
-        listener.begin("looking")
+            "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
+    with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume) as writer:
         start = time.perf_counter()
-        prepared = prepare(for_look, rig, options, kind, cache)
+        prepared = prepare(for_look, rig, options, kind, cache, listener)
         writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
-        _write_beside(writer.folder, prepared)
+        _check_cutoff(options, prepared.look.rate)
         _track(writer, prepared, kind, options, listener, for_track, cache)
+        _smooth(writer, prepared.check(), options, listener)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
+    metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
     warn_of_losses(written.motion)
     warn_of_left_out(metrics.get("left_out", []))
     warn_of_set_aside(metrics.get("set_aside", []))
@@ -187,18 +210,76 @@ def _write_beside(folder: Path, prepared: Prepared) -> None:
     write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
 
 
+def _check_cutoff(options: Options, rate: float) -> None:
+    """Raise `SettingsError` before tracking if the frame rate does not allow the filter's cut-off."""
+    if options.smoothing[0] == "butterworth" and np.isfinite(rate):
+        check_cutoff(options.cutoff, rate / options.every)
+
+
+def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
+    """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
+    method, gaps = options.smoothing
+    if method == "off" and gaps == 0:
+        writer.info["smoothing"] = {"method": "off"}
+        return
+    listener.begin("smoothing")
+    start, columns = time.perf_counter(), subject.joint_columns
+    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps,
+                              options.facing == "away")
+    try:
+        found = smoother(writer.motion)
+    except (SettingsError, np.linalg.LinAlgError) as error:
+        warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
+        writer.info["smoothing"] = {"method": "off"}
+        return
+    turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
+    if len(turned):
+        warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
+             "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
+    writer.revise(found.motion)
+    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
+    writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
+
+
 def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
     """A frame set with the images of cameras that stand still."""
     images = (None if image is None else each.steadied(image) for each, image in zip(silhouettes, seen.images))
     return seen._replace(images=tuple(images))
 
 
+class Carried(NamedTuple):
+    """What a frame needs of those before it: what a checkpoint keeps. Silhouettes, and cameras set aside, follow from the film."""
+
+    look: str
+    """The text of look.json."""
+    generator: Mapping[str, Any]
+    """State of the random generator."""
+    state: Any
+    """The tracker's; None while there is no person."""
+    before: Any
+    """What the doubt about the next frame needs."""
+    left_out: tuple[LeftOut | None, ...]
+
+
+def _resumed(writer: RunWriter, prepared: Prepared, rng: np.random.Generator) -> tuple[Carried, list[MotionFrame]]:
+    """Where a run begins: at the start, or after the frames of its checkpoint. Raises `ShadowPuppetError` if the look is another one."""
+    subject, look = prepared.check(), json_text(prepared.look)
+    carried, frames = writer.resumed((*subject.state_types, Carried, LeftOut)) or (Carried(look, {}, None, None, ()), [])
+    if carried.look != look:
+        raise ShadowPuppetError(f"{writer.folder}: the run there cannot go on: its look.json differs from what the recording gives now")
+    if carried.generator:
+        rng.bit_generator.state = carried.generator
+    return carried, frames
+
+
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
            cache: SilhouetteCache | None) -> None:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
-    subject, survey, timer, state, before, count = prepared.check(), prepared.survey, StageTimer(), None, None, 0
-    watch = RigWatch(len(survey.rig.footage))
-    left_out = LeftOut([footage.view.camera for footage in survey.rig.footage])
+    subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
+    (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
+    writer.begin()
+    _write_beside(writer.folder, prepared)
+    watch, count, due = RigWatch(len(survey.rig.footage)), len(earlier), 0.0
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
@@ -211,21 +292,29 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
             if survey.rig.is_multiview:
                 frames = (seen._replace(masks=watch(seen.time, seen.masks)) for seen in frames)
+            for found, seen in zip(earlier, frames):
+                watch.tracked(subject.drawn(found))
+                if overlay is not None:
+                    overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
             observed = stack.enter_context(closing(subject.observations(frames)))
             for seen, observation, seconds in timer.each("wait", observed):
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
                     watch.tracked(subject.drawn(state))
-                left_out.add(seen.time, subject.left_out(state))
+                left_out = add_left_out(left_out, seen.time, subject.left_out(state))
                 with timer.time("doubt"):
                     found, before = motion_frame(subject, seen.time, state, observation, before)
                 with timer.time("write"):
                     writer.write(found)
                     if overlay is not None:
                         overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
+                    if (now := time.perf_counter()) >= due:
+                        writer.checkpoint(Carried(look, rng.bit_generator.state, subject.kept(state), before, left_out))
+                        due = time.perf_counter() + max(CHECKPOINT_SECONDS, CHECKPOINT_COST * (time.perf_counter() - now))
                 count += 1
                 listener.advance(count)
     finally:
-        writer.metrics |= timings(timer, kind.stages, count, time.perf_counter() - began)
-        writer.metrics |= left_out.metrics() | set_aside(watch.intervals, survey.rig.names)
+        writer.metrics |= timings(timer, kind.stages, count - len(earlier), time.perf_counter() - began)
+        writer.metrics |= left_out_metrics(left_out, [footage.view.camera for footage in survey.rig.footage])
+        writer.metrics |= set_aside(watch.intervals, survey.rig.names)

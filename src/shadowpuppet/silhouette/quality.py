@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask
-from shadowpuppet.errors import SilhouetteError
+from shadowpuppet.errors import HARMFUL, NOTED, Caution, SilhouetteError
 
 MIN_AREA = 0.003
 """Least share of the picture that a person must cover for limbs to be wide enough (15 pixels high of 240)."""
@@ -77,44 +77,53 @@ class MaskQuality:
                     "or the camera moved since the background was taken; take it again, or leave it out: the film then serves")
         return None
 
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Caution, ...]:
         """What harms tracking, and the remedy, a sentence each; none if there is a refusal."""
         return () if self.refusal() else (*self._incomplete(), *self._unsteady(), *self._unclean())
 
-    def _incomplete(self) -> Iterator[str]:
+    def _incomplete(self) -> Iterator[Caution]:
         if self.empty:
-            yield (f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
-                   "person is out of the picture, or does not differ from the background; cut the film, or set another method")
+            yield Caution(f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
+                          "person is out of the picture, or does not differ from the background; cut the film, or set another method",
+                          f"nobody seen in {self._share(self.empty)} of frames: cut them",
+                          HARMFUL if self.empty > 0.3 * self.frames else NOTED)
         if self.full:
-            yield (f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
-                   f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure")
+            yield Caution(f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
+                          f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure",
+                          f"light or camera changed at frame {self.first_full}: --end {self.first_full}f", HARMFUL)
         for side in ("left", "right", "top"):
             if self.border[side] > WARN_CONTACT:
-                yield (f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
-                       "is partly outside the picture, and what is outside is guessed; step back, or turn the camera")
+                yield Caution(f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
+                              "is partly outside the picture, and what is outside is guessed; step back, or turn the camera",
+                              f"person is cut off at the {side}: step back", HARMFUL)
         if 0 < self.area < MIN_AREA:
-            yield (f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
-                   "camera with more pixels")
+            yield Caution(f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
+                          "camera with more pixels", "person is too small in the picture: go nearer", HARMFUL)
 
-    def _unsteady(self) -> Iterator[str]:
+    def _unsteady(self) -> Iterator[Caution]:
         remedy = ("the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
+        short = "parts of the person vanish: film the empty scene"
         if self.area_jumps > WARN_JUMPS:
-            yield (f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
-                   f"frames, as parts are lost and found: {remedy}")
+            yield Caution(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
+                          f"frames, as parts are lost and found: {remedy}", short, HARMFUL)
         elif self.area_change > WARN_AREA_CHANGE:
-            yield f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}"
+            yield Caution(f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}", short,
+                          HARMFUL)
         if self.flicker > WARN_FLICKER:
-            yield (f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
-                   "a lamp's flicker, or silhouettes that are not cleaned; use more light, or the setting clean")
+            yield Caution(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
+                          "a lamp's flicker, or silhouettes that are not cleaned; use more light, or the setting clean",
+                          "outlines flicker: use more light", HARMFUL)
 
-    def _unclean(self) -> Iterator[str]:
+    def _unclean(self) -> Iterator[Caution]:
         if self.speck_area > WARN_SPECK_AREA:
-            yield (f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
-                   "noise, shadow or another person; use the setting clean, or keep others out of the picture")
+            yield Caution(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
+                          "noise, shadow or another person; use the setting clean, or keep others out of the picture",
+                          "noise, shadows or others beside the person: keep them out", HARMFUL)
         if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
-            yield (f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
-                   "background, or noise; try another method, or other clothes")
+            yield Caution(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
+                          "background, or noise; try another method, or other clothes",
+                          "silhouettes have holes: wear other colours than the background", HARMFUL)
 
     def _share(self, frames: int) -> str:
         return _percent(frames / self.frames)

@@ -57,8 +57,8 @@ def _scaled(frames: FrameSource, size: Size) -> FrameSource:
     smaller = size[0] <= frames.size[0] and size[1] <= frames.size[1]
     how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
 
-    def read() -> Iterator[Frame]:
-        for time, image in frames:
+    def read(begin: float) -> Iterator[Frame]:
+        for time, image in frames.read(begin):
             yield Frame(time, np.asarray(cv2.resize(image, size, interpolation=how), np.uint8))
 
     return replace(frames, size=size, read=read)

@@ -35,7 +35,7 @@ def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
     stated_rate = capture.get(cv2.CAP_PROP_FPS)
     ready, size = [capture], size_of(first)  # opening takes a second: the first reader continues with this capture
 
-    def read() -> Iterator[Frame]:
+    def read(_: float) -> Iterator[Frame]:
         return _frames(ready.pop() if ready else open_device(number, rate)[0], number, grey, size)
 
     return FrameSource(f"camera:{number}", size, stated_rate if stated_rate > 0 else math.nan, None, math.nan, read)

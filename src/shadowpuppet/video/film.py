@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, reason
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, reason
 from shadowpuppet.threads import thread_limit
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
@@ -51,8 +51,8 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
 
     step = 1 / (mean_rate if math.isfinite(mean_rate) else rate or ASSUMED_RATE)
 
-    def read() -> Iterator[Frame]:
-        return _frames(path, film, step, grey, rate)
+    def read(begin: float) -> Iterator[Frame]:
+        return _frames(path, film, step, grey, rate, begin)
 
     film = FrameSource(str(path), size, rate or mean_rate, count, duration, read)
     return film
@@ -66,17 +66,19 @@ def tells_times(path: Path) -> bool:
     return True  # damaged; reported elsewhere
 
 
-def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None) -> Iterator[Frame]:
+def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, begin: float) -> Iterator[Frame]:
     clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
     with opened(path) as (container, stream):
         try:
             for frame in decoded(container, stream):
-                before, time, image = clock.last, clock(frame), convert(frame)
+                before, time = clock.last, clock(frame)
                 shown = n / rate if rate else time
-                check_size(path, n, shown, image, film.size)
                 if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
                     _say(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
-                yield Frame(shown, image)
+                if shown >= begin:
+                    image = convert(frame)
+                    check_size(path, n, shown, image, film.size)
+                    yield Frame(shown, image)
                 longest, n = max(longest, time - before), n + 1
         except Break as cause:
             broken = str(cause)
@@ -117,6 +119,7 @@ def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     import av.error
 
     try:
+        check_regular(path)
         # "file:" and the white list: a name with a colon is no protocol, and a play list cannot open other files or addresses.
         container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (OSError, av.error.FFmpegError) as error:

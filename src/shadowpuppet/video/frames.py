@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +18,8 @@ Image = NDArray[np.uint8]
 Size = tuple[int, int]
 """Width and height, pixels."""
 
+ROUNDING = 1e-6
+"""Rounding error of a time, seconds."""
 ASSUMED_RATE = 30.0
 """Frames/s if neither the source nor the caller states times."""
 
@@ -41,11 +45,20 @@ class FrameSource:
     """Number of frames; None if the container does not state it."""
     duration: float
     """Seconds; NaN if the container does not state it."""
-    read: Callable[[], Iterator[Frame]] = field(repr=False)
+    read: Callable[[float], Iterator[Frame]] = field(repr=False)
+    """The frames from a time on (s); earlier ones are passed over without making their pictures."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Read from the start."""
-        return self.read()
+        return self.read(0.0)
+
+    def between(self, begin: float, end: float) -> FrameSource:
+        """The frames from `begin` on and before `end`, seconds, at the same times."""
+
+        def read(first: float) -> Iterator[Frame]:
+            return takewhile(lambda frame: frame.time < end - ROUNDING, self.read(max(first, begin - ROUNDING)))
+
+        return replace(self, count=None, duration=math.nan, read=read)
 
 
 def size_of(image: Image) -> Size:

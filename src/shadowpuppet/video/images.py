@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, choices, reason
+from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, choices, reason
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
@@ -24,6 +24,7 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
     import cv2
 
     try:
+        check_regular(Path(path))
         data = np.frombuffer(Path(path).read_bytes(), np.uint8)  # cv2.imread cannot open every name on every system
         image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) if data.size else None
     except OSError as error:
@@ -63,7 +64,7 @@ def check_image(path: Path, image: Image) -> None:
 def open_picture(path: Path, grey: bool) -> FrameSource:
     """A picture as a source of one frame."""
     size = size_of(read_image(path, grey))
-    return FrameSource(str(path), size, math.nan, 1, math.nan, lambda: iter([Frame(0.0, read_image(path, grey))]))
+    return FrameSource(str(path), size, math.nan, 1, math.nan, lambda _: iter([Frame(0.0, read_image(path, grey))]))
 
 
 def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
@@ -72,11 +73,13 @@ def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
     size, n = size_of(read_image(paths[0], grey)), len(paths)
     mean_rate = float((n - 1) / times[-1]) if n > 1 else math.nan
 
-    def read() -> Iterator[Frame]:
+    def read(begin: float) -> Iterator[Frame]:
         if assumed:
             warnings.warn(f"{folder}: no timestamps.txt in it and no rate given: {ASSUMED_RATE:g} frames/s are assumed",
                           ShadowPuppetWarning, stacklevel=2)
         for i, (time, path) in enumerate(zip(times.tolist(), paths)):
+            if time < begin:
+                continue
             image = read_image(path, grey)
             check_size(path, i, time, image, size)
             yield Frame(time, image)

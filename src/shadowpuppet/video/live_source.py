@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, VideoError
 from shadowpuppet.video import IMAGE_SUFFIXES, FrameSource, Image, Size, camera_number, open_frames
 from shadowpuppet.video.camera_device import open_device, pictures
 from shadowpuppet.video.film import tells_times
 from shadowpuppet.video.frames import size_of
+from shadowpuppet.video.moments import span_of
 from shadowpuppet.video.network_stream import SCHEMES, open_stream, without_secrets
 
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
@@ -51,14 +52,19 @@ class Feed:
     """Pictures as they come, until the source ends. Raises `VideoError` if it cannot be opened or breaks off."""
 
 
-def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0) -> Feed:
+def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0, start: str | None = None,
+              end: str | None = None) -> Feed:
     """Open a camera (its number, or `camera:N`), a network address (http, rtsp, tcp, udp, ...), or a film or folder of pictures.
 
-    A film is played at its own times, `speed` times as fast; `rate` (frames/s) replaces them, and is requested from a camera.
-    Raises `VideoError` if nothing can be read, or a film has no times and no rate is given.
+    A film is played at its own times, `speed` times as fast, from `start` to `end` (as in `moments`); `rate` (frames/s) replaces its times,
+    and is requested from a camera. Raises `VideoError` if nothing can be read, or a film has no times and no rate is given;
+    `SettingsError` for a span that the source does not have.
     """
     number = int(source) if str(source).isdecimal() else camera_number(source)
     scheme = ADDRESS.match(str(source))
+    if (number is not None or scheme is not None) and (start, end) != (None, None):
+        raise SettingsError(f"start, end: found {start or end} and the live source {without_secrets(str(source))}, expected them with a "
+                            "film only")
     if number is not None:
         return _camera(number, rate)
     if scheme is not None and scheme[1].lower() not in SCHEMES:
@@ -66,7 +72,9 @@ def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.
                          "a camera, or a film")
     if scheme is not None:
         return _stream(str(source))
-    return film_feed(_timed(Path(str(source)), rate), speed)
+    film = _timed(Path(str(source)), rate)
+    begin, last = span_of(start, end, film.rate, film.count / film.rate if film.count else film.duration)
+    return film_feed(film.between(begin, last), speed)
 
 
 def _camera(number: int, rate: float | None) -> Feed:

@@ -48,7 +48,7 @@ def cameras(draw) -> Camera:
     return Camera(name, size, matrix, lens, T, fisheye, draw(st.booleans()))
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(cameras(), min_size=1, max_size=3, unique_by=lambda c: c.name))
 def test_what_is_written_is_read(tmp_path, rig):
     write_calibration(tmp_path / "c.toml", rig)

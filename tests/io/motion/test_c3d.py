@@ -11,6 +11,8 @@ from vicon import DEC, INTEL, MIPS, c3d
 
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.motion.c3d import read_c3d
+from shadowpuppet.io.motion.c3d_writer import write_c3d
+from shadowpuppet.motion.motion import JointTable
 
 PLACES = np.array([[[10.0, -20.5, 1800.25], [1, 2, 3]], [[11.0, -21.5, 1801.25], [np.nan] * 3], [[12.0, -22.5, 1802.25], [4, 5, 6]]])
 NAMES = ["LFEP", "RFEP"]
@@ -93,6 +95,35 @@ def test_long_recordings_tell_their_frames_in_32_bits(tmp_path):
         table = read(tmp_path, c3d(["A"], places, **more))
         assert len(table.times) == 70_000
         assert table.positions[-1, 0, 0] == pytest.approx(70.0)
+
+
+@pytest.mark.parametrize("processor", [INTEL, MIPS])
+def test_where_the_parameters_do_not_say_where_the_data_begin_the_header_does(tmp_path, processor):
+    content = bytearray(c3d(NAMES, PLACES, processor=processor))
+    at = content.index(b"DATA_START") + 14
+    assert any(content[at : at + 2])
+    content[at : at + 2] = b"\0\0"
+    np.testing.assert_allclose(read(tmp_path, bytes(content)).positions, PLACES / 1000, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["köln", "手"])
+def test_labels_are_utf_8_or_of_older_programs(tmp_path, name):
+    table = JointTable(np.zeros(1), (name,), np.ones((1, 1, 3)))
+    write_c3d(tmp_path / "a.c3d", table)
+    assert read_c3d(tmp_path / "a.c3d").names == (name,)
+    content = c3d(["koln"], np.ones((1, 1, 3))).replace(b"koln", "köln".encode("latin-1"))
+    assert read(tmp_path, content).names == ("köln",)
+
+
+def test_more_frames_and_names_than_a_byte_or_two_can_tell_are_written(tmp_path):
+    names = tuple(f"p{n}" for n in range(300))
+    few = JointTable(np.arange(2) / 50, names, np.arange(1800.0).reshape(2, 300, 3) / 1000 + 0.001)
+    long = JointTable(np.arange(70_000) / 50, ("a",), np.arange(210_000.0).reshape(70_000, 1, 3) / 1e5 + 0.001)
+    for table in (few, long):
+        write_c3d(tmp_path / "a.c3d", table)
+        found = read_c3d(tmp_path / "a.c3d")
+        assert found.names == table.names
+        np.testing.assert_allclose(found.positions, table.positions, atol=1e-6)
 
 
 def test_frames_that_are_missing_are_told(tmp_path):

@@ -30,6 +30,8 @@ def read(tmp_path, text: str) -> JointTable:
 @pytest.mark.parametrize("text", [
     TEXT,
     TEXT.replace("\n", "\r\n"),
+    TEXT.replace("PathFileType\t4\t", "PathFileType  4  "),
+    TEXT.replace("DataRate\tCameraRate\t", "DataRate\t\tCameraRate\t").replace("\tUnits", "\t\tUnits"),
     TEXT.replace("Z2\n\n", "Z2\n"),
     TEXT.replace("\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n", ""),
     TEXT.replace("left_hand\t\t\n", "left_hand\n").replace("1e3\n", "1e3\t\n"),

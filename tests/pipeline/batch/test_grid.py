@@ -135,7 +135,7 @@ def test_files_are_told_from_the_grids_folder_on(written, tmp_path):
     ("speed = 3", "unknown setting 'speed'"),
     ("[grid", "not valid TOML"),
     (f"[grid]\nheight = {[1 + n / 1000 for n in range(500)]}\ndistance = {[1 + n / 1000 for n in range(500)]}",
-     "grid: found 250000 combinations, expected at most 100000"),
+     "grid: found 250000 combinations, expected at most 10000"),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_grid_is_said_with_file_and_field(written, text, said):
     path = written(text)

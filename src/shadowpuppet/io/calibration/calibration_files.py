@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetError, choices, reason
+from shadowpuppet.errors import CalibrationError, ShadowPuppetError, check_regular, choices, reason
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration.bouguet import read_bouguet
 from shadowpuppet.io.calibration.draft import Draft, Drafts
@@ -67,7 +68,9 @@ def _ends(path: Path, *endings: str) -> bool:
     return path.suffix.lower() in endings
 
 
-QUALISYS = Format("Qualisys (.qca.txt)", lambda path, text: "<calibration" in text and "<camera" in text, read_qualisys)
+QUALISYS_TAGS = re.compile(r"<calibration[\s>].*<cameras?[\s>]", re.DOTALL)
+"""OpenCV's files have tags that begin so: `<calibration_time>`, `<camera_matrix>`."""
+QUALISYS = Format("Qualisys (.qca.txt)", lambda path, text: QUALISYS_TAGS.search(text) is not None, read_qualisys)
 VICON = Format("Vicon (.xcp)", lambda path, text: "<Cameras" in text or _ends(path, ".xcp"), read_vicon)
 EASYMOCAP = Format("EasyMocap (intri.yml, extri.yml)",
                    lambda path, text: path.stem in ("intri", "extri") and _ends(path, *SUFFIXES), read_opencv)
@@ -97,6 +100,7 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
     return examine_calibration(path, unit, up, sizes).cameras
 
 
+@np.errstate(all="ignore")  # impossible numbers are refused where they are checked
 def examine_calibration(path: str | Path, unit: str | None = None, up: str | None = None,
               sizes: Callable[[str], tuple[int, int] | None] | None = None) -> Calibration:
     """As `read_calibration`; also returns format, unit and remarks."""
@@ -131,6 +135,7 @@ def format_of(path: Path) -> Format:
                                    "with EasyMocap's intri.yml and extri.yml, or one with a .cal or OpenCV file a camera")
         return EASYMOCAP if any(file.stem in ("intri", "extri") for file in files_of(path)) else OPENCV
     try:
+        check_regular(path)
         with path.open("rb") as file:
             head = file.read(HEAD_BYTES)
     except OSError as error:

@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -43,9 +44,13 @@ class Table:
         return times
 
     def _place(self, name: str) -> int:
-        if name not in self.columns:
+        if name not in self._places:
             raise FormatError(f"{self.path}: no column {name!r}; columns there: {shorten(self.columns)}")
-        return self.columns.index(name)
+        return self._places[name]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: n for n, name in reversed([*enumerate(self.columns)])}
 
     def _row(self, i: int, places: list[int]) -> list[float]:
         return [number(self.path, self.lines[i], self.columns[place], self.rows[i][place]) for place in places]

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
+from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular, reason
 
 TEXT_LIMIT = 1_000_000_000
 """Greatest size of a table or motion, bytes; a longer one would not fit into memory as numbers."""
-TOML_LIMIT = 10_000_000
-"""Greatest size of a calibration or settings file, bytes, so that a film given by mistake is not read."""
+TOML_LIMIT = 2_000_000
+"""Greatest size of a calibration or settings file, bytes: what is longer takes many seconds to be parsed, or is a film given by mistake."""
+
+DEEPEST = 20
+"""Greatest number of parts of a dotted key of TOML; the parser's memory grows with the square of them."""
+TOO_DEEP = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""", re.ASCII)
 
 
 def read_text(path: Path) -> str:
@@ -30,6 +35,9 @@ def read_text(path: Path) -> str:
 def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any]:
     """The tables of a TOML file. Raises `error` if it is missing, too long or not TOML."""
     text = read_limited(Path(path), TOML_LIMIT, error, "a TOML file")
+    if (found := TOO_DEEP.search(text)) is not None:
+        line = text.count("\n", 0, found.start()) + 1
+        raise error(f"{path}: line {line}: found a key of more than {DEEPEST} parts, expected fewer")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as problem:
@@ -39,6 +47,7 @@ def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any
 def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: str, kind_if_long: str = "") -> str:
     """The text of a UTF-8 file of at most `limit` bytes. Raises `error`, which names the `kind` of file that is expected."""
     try:
+        check_regular(path)
         if path.stat().st_size > limit:
             raise error(f"{path}: found {path.stat().st_size} bytes, expected {kind_if_long or kind} of at most {limit}")
         return path.read_text("utf-8-sig")

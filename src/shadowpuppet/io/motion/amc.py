@@ -110,6 +110,7 @@ def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
     return Capture(skeleton, root[:, :3] * skeleton.unit, euler(skeleton.root_order, angle * root[:, 3:]), angles)
 
 
+@np.errstate(all="ignore")  # impossible numbers are refused where they are checked
 def read_mocap(path: str | Path, skeleton: str | Path | None = None) -> Capture:
     """Read an AMC file with its skeleton: an ASF file, by default the one in the same folder.
 

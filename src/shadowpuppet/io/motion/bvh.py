@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
 from warnings import warn
@@ -19,8 +20,10 @@ CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zr
 """Kinds of channels; a joint has any of them in any order."""
 END = "_end"
 """Suffix of the names of end sites."""
-BLOCK = 4096
-"""Frames computed at once, to limit memory."""
+BLOCK = 100_000
+"""Joints of frames computed at once, to limit memory."""
+MOST_PLACES = 4_000_000
+"""Greatest number of joints of all frames, unless the file has as many numbers: joints without channels cost the file nothing."""
 MAX_JOINTS = 10_000
 
 
@@ -53,8 +56,9 @@ class Bvh:
         """All joints and end sites in the file's unit and axes, times from 0. Raises `FormatError` for an impossible name."""
         places = np.empty((len(self.values), len(self.nodes), 3))
         added = [self._is_added(n) for n in range(len(self.nodes))]
-        for start in range(0, len(self.values), BLOCK):
-            places[start : start + BLOCK] = self._placed(*self._local(self.values[start : start + BLOCK], added))
+        block = max(BLOCK // len(self.nodes), 1)
+        for start in range(0, len(self.values), block):
+            places[start : start + block] = self._placed(*self._local(self.values[start : start + block], added))
         with errors_named(self.path):
             return JointTable(np.arange(len(places), dtype=float) * self.step, unique_names([node.name for node in self.nodes]), places)
 
@@ -83,7 +87,7 @@ class Bvh:
                 turns[:, n] = turns[:, node.parent] @ turns[:, n]
         return shifts
 
-    @property
+    @cached_property
     def _columns(self) -> list[list[int]]:
         """Columns of `values` of each node."""
         ends = np.cumsum([len(node.channels) for node in self.nodes]).tolist()
@@ -112,7 +116,11 @@ def read_bvh(path: str | Path) -> Bvh:
         raise FormatError(f"{path}: found no line MOTION, expected a BVH file: HIERARCHY, joints, MOTION, frames")
     nodes = _hierarchy(_Words(path, lines[:motion]))
     step, first = _header(path, lines, motion)
-    return Bvh(path, nodes, step, _values(path, lines, first, sum(len(node.channels) for node in nodes)))
+    values = _values(path, lines, first, sum(len(node.channels) for node in nodes))
+    if len(nodes) * len(values) > max(MOST_PLACES, 2 * values.size):
+        raise FormatError(f"{path}: found {len(nodes)} joints in {len(values)} frames of {values.shape[1]} channels, expected those of a "
+                          "person")
+    return Bvh(path, nodes, step, values)
 
 
 class _Words:

@@ -15,7 +15,7 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetWarning, choices, reason
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning, check_regular, choices, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named
@@ -96,6 +96,7 @@ def read_c3d(path: str | Path) -> JointTable:
 def read_header(path: Path) -> C3d:
     """Read a file's header and parameters. Raises `FormatError`."""
     try:
+        check_regular(path)
         size = path.stat().st_size
         with path.open("rb") as file:
             head = file.read(BYTES)
@@ -125,7 +126,7 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
         values = known.numbers(name)
         return float(values[0]) if len(values) else otherwise
 
-    points, block = (int(told(name, value)) & 0xFFFF for name, value in (("POINT:USED", points), ("POINT:DATA_START", block)))
+    points, block = (int(told(name, value)) & 0xFFFF or value for name, value in (("POINT:USED", points), ("POINT:DATA_START", block)))
     scale = told("POINT:SCALE", _float(head[12:16], processor))
     rate = told("POINT:RATE", _float(head[20:24], processor))
     if not (math.isfinite(scale) and scale != 0) or not 0 < rate < 1e6 or not points or not block:
@@ -215,12 +216,19 @@ def _value(section: bytes, at: int, processor: int) -> Any:
         raise ValueError(total)
     if kind == CHAR:
         width = shape[0] if shape else 1
-        text = raw.decode("latin-1")
-        return [text[n : n + width].strip(" \0\t") for n in range(0, len(text), width)] if width else []
+        return [_text(raw[n : n + width]).strip(" \0\t") for n in range(0, len(raw), width)] if width else []
     if kind == FLOAT and processor == DEC:
         return _from_dec(np.frombuffer(raw, "<u4"))
     order = ">" if processor == MIPS else "<"
     return np.frombuffer(raw, f"{order}{ {BYTE: 'u1', INT: 'i2', FLOAT: 'f4'}[kind]}").astype(float)
+
+
+def _text(raw: bytes) -> str:
+    """Text of newer programs is UTF-8, of others Latin-1."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
 
 
 def _float(raw: bytes, processor: int) -> float:

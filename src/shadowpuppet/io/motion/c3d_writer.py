@@ -32,7 +32,8 @@ Angles = Mapping[str, tuple[str, Array]]
 """Units and values (T,) by name."""
 
 
-def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None) -> None:
+def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None,
+              smoothing: str = "") -> None:
     """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, one value per frame.
 
     The file has a constant rate: missing frames become unknown; frames at a varying rate are resampled, with a warning. Raises
@@ -43,6 +44,7 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
         table: the joints; an unknown one gets the residual -1.
         spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 for None or NaN.
         angles: unit and values (T,) of each angle; NaN if unknown.
+        smoothing: how the motion was smoothed, written as PROCESSING:SMOOTHING; empty if unknown.
     """
     path, angles = Path(path), angles or {}
     bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= MAX_LETTERS]
@@ -57,7 +59,7 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
     data = np.concatenate([_points(places.reshape(count, points, 3), deviations).reshape(count, -1), analog], 1).astype("<f4")
     blocks, section = 0, b""
     while True:  # the parameters state where the data begins, which depends on their length
-        section = _section(_groups(table.names, angles, rate, count, 2 + blocks), blocks)
+        section = _section(_groups(table.names, angles, rate, count, 2 + blocks, smoothing), blocks)
         if len(section) <= blocks * BYTES:
             break
         blocks = -(-len(section) // BYTES)
@@ -93,7 +95,8 @@ def _header(points: int, analog: int, count: int, start: int, rate: float) -> by
     return head.ljust(BYTES, b"\0")
 
 
-def _groups(names: Sequence[str], angles: Angles, rate: float, count: int, start: int) -> dict[str, list[Parameter]]:
+def _groups(names: Sequence[str], angles: Angles, rate: float, count: int, start: int,
+            smoothing: str) -> dict[str, list[Parameter]]:
     end = (count & 0xFFFF, count >> 16)
     point = [_whole("USED", len(names)), _whole("FRAMES", min(count, 0xFFFF)), _whole("DATA_START", start), _real("SCALE", -1.0),
              _real("RATE", rate), _real("LONG_FRAMES", count), *_words("LABELS", names), *_words("DESCRIPTIONS", [" "] * len(names)),
@@ -106,7 +109,8 @@ def _groups(names: Sequence[str], angles: Angles, rate: float, count: int, start
                    ("SCALE", FLOAT, (used,), np.ones(used, "<f4").tobytes()), ("OFFSET", INT, (used,), np.zeros(used, "<i2").tobytes())]
     trial = [("ACTUAL_START_FIELD", INT, (2,), struct.pack("<2H", 1, 0)), ("ACTUAL_END_FIELD", INT, (2,), struct.pack("<2H", *end)),
              _real("CAMERA_RATE", rate)]
-    return {"POINT": point, "ANALOG": analog, "TRIAL": trial, "MANUFACTURER": [_word("SOFTWARE", "shadowpuppet")]}
+    done = {"PROCESSING": [_word("SMOOTHING", smoothing)]} if smoothing else {}
+    return {"POINT": point, "ANALOG": analog, "TRIAL": trial, "MANUFACTURER": [_word("SOFTWARE", "shadowpuppet")], **done}
 
 
 def _whole(name: str, value: int) -> Parameter:

@@ -26,11 +26,12 @@ MIN_ROTATION = 1e-7
 """Difference of rotation matrices from the identity below which a joint is not animated."""
 
 
-def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
+def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str = "") -> None:
     """Write a skinned mesh and its animation: metres, Y up, times from 0.
 
     Unknown frames have no keys: the puppet's scale is 0 there, which hides it, and `extras.unknown` of the animation lists them as pairs
-    of seconds, from and to; a warning says so. Raises `ShadowPuppetError` if no frame is known or the file cannot be written.
+    of seconds, from and to; a warning says so. `smoothing`: how the motion was smoothed, written to `asset.extras`. Raises
+    `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
     path, known = Path(path), np.flatnonzero(animation.known)
     if not len(known):
@@ -45,7 +46,7 @@ def write_glb(path: str | Path, animation: Animation, mesh: Mesh) -> None:
     motion = _motion(buffer, animation, known)
     joints = _nodes(animation, int(known[0]))
     content = {
-        "asset": {"version": "2.0", "generator": "shadowpuppet"},
+        "asset": {"version": "2.0", "generator": "shadowpuppet", **({"extras": {"smoothing": smoothing}} if smoothing else {})},
         "scene": 0, "scenes": [{"nodes": [0, 1]}],
         "nodes": [{"name": "puppet", "mesh": 0, "skin": 0}, *joints],
         "meshes": [{"name": "puppet", "primitives": [primitive]}],

@@ -37,6 +37,7 @@ TO_Z_UP = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0),
 """Rotations from worlds in which another axis is up."""
 
 
+@np.errstate(all="ignore")  # impossible numbers become unknown, or are refused where they are checked
 def read_motion(path: str | Path, rate: float | None = None, own_names: bool = False, unit: float | None = None) -> JointTable:
     """Read joints from a motion file (ending in `READABLE`; .amc needs its .asf in the same folder), in metres, Z up.
 
@@ -65,6 +66,7 @@ READERS = {".c3d": read_c3d, ".csv": read_joints, ".npz": read_npz, ".parquet": 
 """Readers of the formats that state their unit."""
 
 
+@np.errstate(all="ignore")
 def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
     """Read the ground truth of a run: joints by our names, metres; joints named in `known` (the run's) are kept, too.
 

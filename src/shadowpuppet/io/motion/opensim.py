@@ -153,8 +153,9 @@ class Coordinates(NamedTuple):
     """Each coordinate's values (T,), rad or metres."""
 
 
-def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> None:
+def write_mot(path: str | Path, times: Array, values: Mapping[str, Array], smoothing: str = "") -> None:
     """Write coordinates (T,), rad or metres, as a MOT file. Frames with an unknown coordinate are left out: OpenSim has no gaps.
+    `smoothing`: how the motion was smoothed, a line of the header.
 
     Raises `ShadowPuppetError` if no frame is known or the file cannot be written.
     """
@@ -164,7 +165,8 @@ def write_mot(path: str | Path, times: Array, values: Mapping[str, Array]) -> No
     if not len(table) or not values:
         raise ShadowPuppetError(f"{path}: found no frame in which all of {len(values)} coordinates are known, expected one at least")
     sizes = [f"nRows={len(table)}", f"nColumns={table.shape[1]}"]
-    head = [path.stem, "version=1", *sizes, "inDegrees=yes", "endheader", "\t".join(["time", *values])]
+    note = [f"smoothing={smoothing}"] if smoothing else []
+    head = [path.stem, "version=1", *sizes, "inDegrees=yes", *note, "endheader", "\t".join(["time", *values])]
     rows = ("\t".join(f"{value + 0.0:.6f}" for value in row) for row in table.round(6).tolist())
     write_whole(path, "\n".join([*head, *rows, ""]))
 

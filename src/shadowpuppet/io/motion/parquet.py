@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular
+from shadowpuppet.io.files.npz import most_unpacked
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.motion.table import Columns, column_joints, joint_columns
@@ -20,17 +21,20 @@ METADATA = {"made by": "shadowpuppet", "units": "seconds; metres in the world, Z
 """Metadata of every file."""
 
 
-def write_parquet(path: str | Path, columns: Columns) -> None:
-    """Write columns; null for NaN. Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
-    write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()})
+def write_parquet(path: str | Path, columns: Columns, smoothing: str = "") -> None:
+    """Write columns; null for NaN. `smoothing`: how the motion was smoothed, metadata of the file.
+
+    Raises `ShadowPuppetError` if pyarrow is missing or the file cannot be written."""
+    write_lists(path, {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()},
+                {"smoothing": smoothing} if smoothing else {})
 
 
-def write_lists(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns, each with values of one type or None. Raises the errors of `write_parquet`."""
+def write_lists(path: str | Path, columns: Mapping[str, Any], facts: Mapping[str, str] | None = None) -> None:
+    """Write columns, each with values of one type or None, and `facts` as metadata. Raises the errors of `write_parquet`."""
     arrow, parquet = _arrow(path)
     arrays = {name: arrow.array(column, from_pandas=True) for name, column in columns.items()}
     out = io.BytesIO()
-    parquet.write_table(arrow.table(arrays).replace_schema_metadata(METADATA), out)
+    parquet.write_table(arrow.table(arrays).replace_schema_metadata(METADATA | dict(facts or {})), out)
     write_whole(Path(path), out.getvalue())
 
 
@@ -42,6 +46,7 @@ def read_parquet(path: str | Path) -> JointTable:
     path = Path(path)
     arrow, parquet = _arrow(path)
     try:
+        check_regular(path)
         with path.open("rb") as file:
             source = parquet.ParquetFile(file)
             columns = tuple(source.schema_arrow.names)
@@ -49,6 +54,9 @@ def read_parquet(path: str | Path) -> JointTable:
                 raise FormatError(f"{path}: no column 'time'; columns there: {shorten(columns)}")
             names = column_joints(path, columns)
             wanted = ["time", *joint_columns(names)]
+            if source.metadata.num_rows * len(wanted) * 8 > most_unpacked(path):
+                raise FormatError(f"{path}: found {source.metadata.num_rows} rows of {len(wanted)} columns, expected at most "
+                                  f"{most_unpacked(path)} bytes of them in a file of this size")
             table = source.read(wanted)
             values = np.stack([table.column(name).cast(arrow.float64()).to_numpy() for name in wanted], 1)
     except FormatError:

@@ -40,7 +40,8 @@ def column_joints(path: Path, columns: Sequence[str]) -> tuple[str, ...]:
     """The joints to which columns belong, in order. Raises `FormatError` if there is none, or one lacks a column."""
     stems = list(dict.fromkeys(column[:-2] for column in columns if column.endswith(AXES)))
     names = tuple(stem for stem in stems if not stem.endswith(SD))
-    missing = [column for column in joint_columns(names) if column not in columns]
+    known = set(columns)
+    missing = [column for column in joint_columns(names) if column not in known]
     if missing:
         raise FormatError(f"{path}: no column {missing[0]!r}, expected _x, _y and _z of every joint")
     if not names:
@@ -110,18 +111,46 @@ def run_rows(frame: MotionFrame) -> tuple[list[str], list[str]]:
     return row, [*time, *cells(angles)]
 
 
+def write_raw(path: Path, joints: Path, angles: Path) -> None:
+    """Write the rows of joints.csv and angles.csv side by side. Degrees of freedom are named with their unit, `chest_x [rad]`, so that none
+    is taken for a joint's. A line at a time; raises `OSError`."""
+    with (path.open("w", encoding="utf-8", newline="") as out, joints.open(encoding="utf-8", newline="") as left,
+          angles.open(encoding="utf-8", newline="") as right):  # fmt: skip
+        names = next(right).rstrip("\n").split(",")[1:]
+        out.write(csv_line([*next(left).rstrip("\n").split(","), *(f"{name} [{dof_unit(name.removesuffix(SD))}]" for name in names)]))
+        for one, two in zip(left, right):
+            out.write(one.rstrip("\n") + two[two.index(",") :])
+
+
+def read_raw(path: str | Path, body_name: str) -> Motion:
+    """The motion in a run's raw.csv, as it was tracked. Raises `FormatError`, naming file, line and column."""
+    table = read_table(Path(path))
+    joints, dofs = column_joints(table.path, table.columns), [name for name in table.columns if name.endswith(("[rad]", "[m]"))]
+    own = [name for name in dofs if not name.rpartition(" ")[0].endswith(SD)]
+    others = [name for name in dofs if name not in own]
+    if len(own) != len(others):
+        raise FormatError(f"{table.path}: found {len(own)} degrees of freedom and {len(others)} standard deviations, expected as many")
+    series: dict[str, Any] = _of_joints(table, joints) | {"poses": table.numbers(own), "pose_sd": table.numbers(others)}
+    with errors_named(table.path):
+        return Motion(body_name=body_name, dof_names=tuple(name.rpartition(" ")[0] for name in own), joint_names=joints, **series)
+
+
 def read_run_tables(joints: Table, angles: Table, frames: int, body_name: str) -> Motion:
     """The first `frames` frames of joints.csv and angles.csv. Raises `ShadowPuppetError`, `FormatError` naming line and column."""
     names = column_joints(joints.path, joints.columns)
     dofs = tuple(name for name in angles.columns if name != "time" and not name.endswith(SD))
-    series: dict[str, Any] = {
-        "times": joints.times(), "status": _statuses(joints, "status"), "limb_status": _limb_statuses(joints, names),
-        "cost": joints.numbers(["cost"])[:, 0],
-        "overlap": joints.numbers(["overlap"])[:, 0], "joints": _joints(joints, names), "joint_sd": _joints(joints, names, SD),
-        "poses": angles.numbers(dofs), "pose_sd": angles.numbers([f"{name}{SD}" for name in dofs]),
-    }
+    deviations = angles.numbers([f"{name}{SD}" for name in dofs])
+    series: dict[str, Any] = _of_joints(joints, names) | {"poses": angles.numbers(dofs), "pose_sd": deviations}
     series = {name: values[:frames] for name, values in series.items()}
     return Motion(body_name=body_name, dof_names=dofs, joint_names=names, **series)
+
+
+def _of_joints(table: Table, names: Sequence[str]) -> dict[str, Any]:
+    """The fields of a `Motion` that joints.csv has."""
+    joints = tuple(names)
+    return {"times": table.times(), "status": _statuses(table, "status"), "limb_status": _limb_statuses(table, joints),
+            "cost": table.numbers(["cost"])[:, 0], "overlap": table.numbers(["overlap"])[:, 0], "joints": _joints(table, joints),
+            "joint_sd": _joints(table, joints, SD)}
 
 
 def _limb_statuses(table: Table, joints: Sequence[str]) -> np.ndarray:

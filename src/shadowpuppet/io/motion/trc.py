@@ -25,9 +25,10 @@ def read_trc(path: str | Path) -> JointTable:
     """
     path = Path(path)
     lines = [re.split("\t", line) for line in read_text(path).splitlines()]
-    if len(lines) < 4 or lines[0][0].strip() != "PathFileType" or lines[3][0].strip() != "Frame#":
+    if len(lines) < 4 or lines[0][0].split()[:1] != ["PathFileType"] or lines[3][0].strip() != "Frame#":
         raise FormatError(f"{path}: found no TRC header, expected lines that begin with PathFileType, DataRate, a number, Frame#")
-    header = dict(zip((key.strip() for key in lines[1]), (value.strip() for value in lines[2])))
+    keys, said = ([cell.strip() for cell in line if cell.strip()] for line in lines[1:3])  # some files have doubled tabs there
+    header = dict(zip(keys, said))
     names, scale = _markers(path, header, lines[3]), _scale(path, header)
     columns = ["Frame#", "Time", *(f"{name} {axis}" for name in names for axis in "XYZ")]
     start = 5 if len(lines) > 4 and not lines[4][0].strip() else 4  # X1 Y1 Z1 ..., which some files lack

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import socket
 import threading
 import time
 from http import HTTPStatus
@@ -13,7 +15,17 @@ from urllib.parse import urlsplit
 
 from shadowpuppet.live.display.drawing import drawn, jpeg
 from shadowpuppet.live.display.view import COMMANDS, Display, View
-from shadowpuppet.network import address_family, is_loopback, is_own_host, open_browser, open_page, page_headers, shown_host
+from shadowpuppet.network import (
+    MAX_CONNECTIONS,
+    REQUEST_SECONDS,
+    address_family,
+    is_loopback,
+    is_own_host,
+    open_browser,
+    open_page,
+    page_headers,
+    shown_host,
+)
 
 PORT = 8600
 """Default port; another free one if it is taken."""
@@ -100,8 +112,23 @@ class _Server(ThreadingHTTPServer):
     allow_reuse_address = False
 
     def __init__(self, display: WebDisplay, listen: str, port: int) -> None:
+        self._free = threading.Semaphore(MAX_CONNECTIONS)
         self.display, self.loopback, self.address_family = display, is_loopback(listen), address_family(listen)
         super().__init__((listen, port), _Handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer in a thread of its own, or close the connection if there are `MAX_CONNECTIONS` already."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer, in the thread."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore connections that a browser closed."""
@@ -111,6 +138,27 @@ class _Handler(BaseHTTPRequestHandler):
     server: _Server  # pyright: ignore[reportIncompatibleVariableOverride]
     server_version, sys_version = "shadowpuppet", ""
     timeout = 30
+
+    def handle_one_request(self) -> None:
+        """Answer one request; the connection is closed if it has not come within `REQUEST_SECONDS`, however slowly it comes."""
+        self._ending = threading.Timer(REQUEST_SECONDS, self._end)
+        self._ending.daemon = True
+        self._ending.start()
+        try:
+            super().handle_one_request()
+        finally:
+            self._ending.cancel()
+
+    def parse_request(self) -> bool:
+        """Read the request's headers."""
+        try:
+            return super().parse_request()
+        finally:
+            self._ending.cancel()
+
+    def _end(self) -> None:
+        with contextlib.suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Log nothing."""

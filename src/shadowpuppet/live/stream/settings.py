@@ -18,7 +18,7 @@ class OutletSettings:
     websocket: str | None = None
     """Serve JSON by WebSocket at [HOST:]PORT, by default to programs on this machine only; 0.0.0.0 lets others in."""
     origin: str | None = None
-    """Origins of web pages that may use the WebSocket, separated by commas (https://example.org); pages of this machine always may."""
+    """Origins of web pages that may use the WebSocket, separated by commas (https://example.org); * for all. Programs need none."""
     lsl: str | None = None
     """Name of the stream of the lab streaming layer (LSL)."""
     lsl_scope: Literal["machine", "link", "site"] = "machine"

@@ -12,11 +12,19 @@ from typing import Any, Self
 from shadowpuppet.errors import SettingsError, reason
 from shadowpuppet.live.stream.json_messages import beginning, framed
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
-from shadowpuppet.network import address_family, are_origins_allowed, is_loopback, is_own_host, shown_host
+from shadowpuppet.network import (
+    MAX_CONNECTIONS,
+    REQUEST_SECONDS,
+    address_family,
+    are_origins_allowed,
+    is_loopback,
+    is_own_host,
+    shown_host,
+    silent_logger,
+)
 
 SEND_BUFFER = 16384
 """Bytes buffered for a slow client, a few frames; after those it gets the newest frame."""
-MAX_CLIENTS = 32
 CLOSE_SECONDS = 1.0
 """Limit for closing all connections."""
 
@@ -27,7 +35,7 @@ class WebSocketOutlet(Outlet):
     name = "websocket"
 
     def __init__(self, host: str, port: int, origins: Sequence[str] = ()) -> None:
-        """`origins`: origins of web pages that may connect (https://example.org), * for all; programs and local pages always may.
+        """`origins`: origins of web pages that may connect (https://example.org), * for all; programs that are no page always may.
 
         Raises `SettingsError` if the address or port is not available, or the library is missing.
         """
@@ -99,9 +107,9 @@ class WebSocketOutlet(Outlet):
     async def _serve(self) -> None:
         from websockets.asyncio.server import serve
 
-        quiet = {"compression": None, "server_header": None, "logger": _silent_logger()}
+        quiet = {"compression": None, "server_header": None, "logger": silent_logger("shadowpuppet.websocket")}
         server = await serve(self._follow, sock=self._socket, process_request=self._check, max_size=1024, max_queue=1,
-                             write_limit=SEND_BUFFER, open_timeout=5, close_timeout=CLOSE_SECONDS / 2, **quiet)
+                             write_limit=SEND_BUFFER, open_timeout=REQUEST_SECONDS, close_timeout=CLOSE_SECONDS / 2, **quiet)
         await self._over.wait()
         self._changed.set()
         closing = asyncio.ensure_future(self._closed(server))
@@ -163,8 +171,8 @@ class WebSocketOutlet(Outlet):
         if not is_own_host(headers, self.loopback):
             return "this is served under the machine's own address only"
         if not are_origins_allowed(headers, self.origins):
-            return "pages of other sites may not listen; --origin lets one"
-        return "too many listen already" if self._clients >= MAX_CLIENTS else ""
+            return "pages may not listen unless their origin is given: --origin"
+        return "too many listen already" if self._clients >= MAX_CONNECTIONS else ""
 
 
 def _listening(host: str, port: int) -> socket.socket:
@@ -175,13 +183,3 @@ def _listening(host: str, port: int) -> socket.socket:
                             "free port") from None
     found.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)  # inherited by connections
     return found
-
-
-def _silent_logger() -> Any:
-    """A logger without output: clients that break off are no problem of the session."""
-    import logging
-
-    logger = logging.getLogger("shadowpuppet.websocket")
-    logger.addHandler(logging.NullHandler())
-    logger.propagate = False
-    return logger

@@ -26,7 +26,7 @@ from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.pipeline.options import PATHS, make_options, settings_in
 from shadowpuppet.settings import merged
 
-MAX_RUNS = 100_000
+MAX_CASES, MAX_RUNS = 10_000, 100_000
 """Greatest number of combinations, and of seeds; more are taken for a mistake."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}")
 """Name of a case; it becomes part of a folder's name."""
@@ -85,8 +85,8 @@ def make_grid(settings: Mapping[str, Any] | None = None, *, cases: Mapping[str, 
     chosen_seeds = seeds if seeds is not None else seed
     named = _table(cases or {}, f"{source}: case") or {DEFAULT_CASE: {}}
     lists = [list(_choices(f"{source}: grid.{name}", name, listed)) for name, listed in _flat(_table(grid or {}, f"{source}: grid"))]
-    if (count := math.prod(map(len, lists)) * len(named)) > MAX_RUNS:
-        raise SettingsError(f"{source}: grid: found {count} combinations, expected at most {MAX_RUNS}")
+    if (count := math.prod(map(len, lists)) * len(named)) > MAX_CASES:
+        raise SettingsError(f"{source}: grid: found {count} combinations, expected at most {MAX_CASES}")
     made = [_case(source, name, table, common, chosen) for name, table in named.items() for chosen in product(*lists)]
     _check_flags(dict(_flat(flags or {})), made)
     return Grid(tuple(made), None if chosen_seeds is None else seeds_of(chosen_seeds, f"{source}: seeds"))
@@ -130,7 +130,7 @@ def _beside(path: Path, name: str, value: object) -> object:
 
 def _choices(place: str, name: str, listed: object) -> Iterator[tuple[str, Any]]:
     """Pairs of a setting's name and each of its values in the grid."""
-    if not isinstance(listed, list) or not listed:
+    if not isinstance(listed, list) or not 0 < len(listed) <= MAX_CASES:
         raise SettingsError(f"{place}: found {shown(listed)[:80]}, expected a list of values to be tried")
     if name == "seed":
         raise SettingsError(f"{place}: found {shown(listed)[:80]}, expected seeds = ... at the top of the file")

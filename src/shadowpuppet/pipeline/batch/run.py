@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, reason, shown
+from shadowpuppet.io.files.lock import LOCK, locked
 from shadowpuppet.io.files.plain import for_toml
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
@@ -23,8 +24,8 @@ from shadowpuppet.pipeline.batch.tasks import Task, Track, make_tasks
 from shadowpuppet.pipeline.batch.workers import BatchListener, InProcess, LocalProcesses, Outcome, WorkerPool
 from shadowpuppet.threads import usable_cores
 
-LOCK, FAILURES = ".lock", "failed"
-"""File that is locked while a batch works; folder of tracebacks of runs that failed because of a bug."""
+FAILURES = "failed"
+"""Folder of tracebacks of runs that failed because of a bug."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,27 +178,11 @@ def _claimed(out: Path) -> Iterator[None]:
             raise ShadowPuppetError(f"{out}: found {shorten(names, 60)} in it but no {PLAN}, expected a new or empty folder, or that of an "
                                     "earlier batch, which goes on")
         (out / RUNS).mkdir(exist_ok=True)
-        lock = (out / LOCK).open("w")
     except OSError as error:
         raise ShadowPuppetError(f"{out}: cannot be written ({reason(error)})") from None
-    with lock:
-        _lock(lock.fileno(), out)
+    with locked(out, "batch"):
         _clean(out)
         yield
-
-
-def _lock(file: int, out: Path) -> None:
-    """Lock a file as long as it is open, if the system supports that."""
-    try:
-        import fcntl
-    except ImportError:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise ShadowPuppetError(f"{out}: found another batch at work in it, expected a folder for each; wait, or choose another") from None
-    except OSError:
-        return  # a file system without locks
 
 
 def _clean(out: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -167,7 +168,7 @@ def _elsewhere(folder: Path) -> Iterator[Path]:
     except ShadowPuppetError:
         return  # the run reports the error
     texts = [value for of in (said, *(t for t in said.values() if isinstance(t, dict))) for value in of.values() if isinstance(value, str)]
-    yield from (path for text in texts if text and "\0" not in text and (path := folder / text).exists() and path != folder)
+    yield from (path for text in texts if text and os.path.exists(path := folder / text) and path != folder)
 
 
 def _names(paths: Sequence[Path]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
 from shadowpuppet.silhouette.correction.frame_correction import Corrected, Correction
 from shadowpuppet.silhouette.correction.motion_blur import blurred_share
@@ -64,44 +65,50 @@ class FilmCondition:
         """Whether most of a frame is copied from the last."""
         return self.copied is not None and self.copied > COPIED
 
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Caution, ...]:
         """What harms the silhouettes, and the remedy, a sentence each."""
         return (*self._movement(), *self._light(), *self._noise(), *self._blur())
 
-    def _movement(self) -> Iterator[str]:
+    def _movement(self) -> Iterator[Caution]:
         remedy = "its frames are shifted back, and what they do not show of the scene is guessed"
         if self.moved_since is not None:
             when = "throughout" if self.moved_frames == 1 else f"from about {self.moved_since:.1f} s on"
-            yield f"the camera is up to {self.moved:.1f} pixels from where it saw the empty scene, {when}: {remedy}; fix the tripod"
+            yield Caution(f"the camera is up to {self.moved:.1f} pixels from where it saw the empty scene, {when}: {remedy}; fix the "
+                          "tripod", f"camera moved by {self.moved:.0f} pixels: fix the tripod", NOTED)
         elif self.moved:
-            yield (f"the camera moves by up to {self.moved:.1f} pixels, in {100 * self.moved_frames:.0f} % of the frames: {remedy}; "
-                   "fix the tripod")
+            yield Caution(f"the camera moves by up to {self.moved:.1f} pixels, in {100 * self.moved_frames:.0f} % of the frames: {remedy}; "
+                          "fix the tripod", f"camera shakes by {self.moved:.0f} pixels: fix the tripod", NOTED)
         if self.unmatched > WARN_UNMATCHED:
-            yield (f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth of the "
-                   "picture, is covered, or films another place; take the empty scene again")
+            yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth "
+                          "of the picture, is covered, or films another place; take the empty scene again",
+                          "the empty scene is another place's: film it again", RUINOUS)
 
-    def _light(self) -> Iterator[str]:
+    def _light(self) -> Iterator[Caution]:
         least, most = self.gain
         if max(1 / least, most) > WARN_GAIN:
-            yield (f"the film's light is {least:.2f} to {most:.2f} times the empty scene's: this is followed up to about 1.4; "
-                   "fix exposure and white balance, or take the empty scene again")
+            yield Caution(f"the film's light is {least:.2f} to {most:.2f} times the empty scene's: this is followed up to about 1.4; "
+                          "fix exposure and white balance, or take the empty scene again",
+                          "light changes too much: fix exposure and white balance", HARMFUL)
 
-    def _noise(self) -> Iterator[str]:
+    def _noise(self) -> Iterator[Caution]:
         lasts = self.change is not None and self.change < STEADY * self.noise
         if lasts and self.noise > WARN_COMPRESSION and self.compressed:
-            yield (f"the film is compressed too much (its pixels are {self.noise:.1f} grey levels off the empty scene): outlines are "
-                   "blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality")
+            yield Caution(f"the film is compressed too much (its pixels are {self.noise:.1f} grey levels off the empty scene): outlines "
+                          "are blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality",
+                          "film is compressed too much: use a higher quality", HARMFUL)
         elif lasts and self.noise > WARN_ERROR:
-            yield (f"the film differs from its empty scene by {self.noise:.1f} grey levels in light that no smooth change explains: "
-                   "clothes like the background are missed; take the empty scene again in this light")
+            yield Caution(f"the film differs from its empty scene by {self.noise:.1f} grey levels in light that no smooth change explains: "
+                          "clothes like the background are missed; take the empty scene again in this light",
+                          "light differs from the empty scene's: film that again", HARMFUL)
         elif self.noise > WARN_NOISE:
-            yield (f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use more "
-                   "light, or less gain of the camera")
+            yield Caution(f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use "
+                          "more light, or less gain of the camera", "film is noisy: use more light", HARMFUL)
 
-    def _blur(self) -> Iterator[str]:
+    def _blur(self) -> Iterator[Caution]:
         if self.blur is not None and self.blur > WARN_BLUR and not self.compressed:
-            yield (f"moving limbs are blurred ({100 * self.blur:.0f} % of what they reach or leave within two frames is half limb, half "
-                   "background): they look too wide, or vanish; use a shorter exposure with more light")
+            yield Caution(f"moving limbs are blurred ({100 * self.blur:.0f} % of what they reach or leave within two frames is half limb, "
+                          "half background): they look too wide, or vanish; use a shorter exposure with more light",
+                          "moving limbs are blurred: use a shorter exposure", HARMFUL)
 
 
 class _State(NamedTuple):

@@ -92,7 +92,7 @@ def _pythons() -> Iterator[tuple[str, str]]:
     yield sys.executable, ".".join(map(str, sys.version_info[:3]))
     for name in OTHERS:
         path = shutil.which(name)
-        answer = path and _run([path, "-c", "import sys; print('.'.join(map(str, sys.version_info[:3])))"])
+        answer = path and _run([path, "-I", "-c", "import sys; print('.'.join(map(str, sys.version_info[:3])))"])
         if path and answer and answer.returncode == 0:  # pyenv has launchers of versions that it does not start
             yield path, answer.stdout.strip()
 
@@ -139,7 +139,7 @@ def _done(command: list[str], script: Script, what: str, remedy: str) -> None:
 
 
 def _works(python: Path) -> bool:
-    answer = _run([str(python), "-c", ""]) if python.exists() else None
+    answer = _run([str(python), "-I", "-c", ""]) if python.exists() else None
     return answer is not None and answer.returncode == 0
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import SilhouetteError, choices, reason
+from shadowpuppet.errors import SilhouetteError, check_regular, choices, reason
 
 SHIPPED = Path(__file__).parent / "scripts"
 """Folder of the scripts that come with the package."""
@@ -57,6 +57,7 @@ def find_script(name: str) -> Script:
 def read_script(path: Path, name: str) -> Script:
     """The script in a file. Raises `SilhouetteError` if it cannot be read or its inline metadata are wrong."""
     try:
+        check_regular(path)
         if path.stat().st_size > LONGEST:
             raise SilhouetteError(f"{path}: found {path.stat().st_size} bytes, expected a Python script of at most {LONGEST}")
         text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")

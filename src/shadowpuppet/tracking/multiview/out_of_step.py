@@ -99,7 +99,7 @@ class StepWatch:
             self._seen.popleft()
 
     def _told(self, now: Seen, camera: int, mask: Bits) -> Array:
-        """What a silhouette tells of each lag, late and early: by how much the other body explains it better, by how much the bodies differ,
+        """What a silhouette tells of each lag, late and early: by how much the other body explains it better and by how much bodies differ,
         both over its area, and what the other body leaves unexplained, times the difference (3, 2 x LAGS)."""
         told, area = np.zeros((3, 2, len(LAGS))), count(mask)
         drawn = now.drawn[camera]

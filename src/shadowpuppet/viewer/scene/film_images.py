@@ -74,8 +74,8 @@ class FilmImages:
 
     def _is_within(self, time: float) -> bool:
         """Whether a time is within the recording."""
-        end = self.footage.recording.duration
-        return time >= 0 and (end is None or time < end)
+        begin, end = self.footage.recording.begin, self.footage.recording.duration
+        return time >= begin and (end is None or time < end)
 
     @cached_property
     def _silhouettes(self) -> Silhouettes:

@@ -47,7 +47,7 @@ def frame_times(footage: Sequence[Footage]) -> Array:
     count = footage[n].count
     if count is None:  # unknown length: read the whole film once
         return np.array([shot.time for shot in footage[n].frames(ready=False)])
-    return np.arange(max(count, 1)) / rates[n]
+    return footage[n].recording.begin + np.arange(max(count, 1)) / rates[n]
 
 
 def _truth(recording: Recording) -> tuple[tuple[Figure, ...], tuple[str, ...]]:

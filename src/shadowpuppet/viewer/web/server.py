@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import gc
 import io
 import socket
 import threading
@@ -13,7 +14,18 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
-from shadowpuppet.network import address_family, is_loopback, is_own_host, is_same_origin, open_page, page_headers, shown_host
+from shadowpuppet.network import (
+    MAX_CONNECTIONS,
+    REQUEST_SECONDS,
+    address_family,
+    is_loopback,
+    is_own_host,
+    is_same_origin,
+    open_page,
+    page_headers,
+    shown_host,
+    silent_logger,
+)
 
 if TYPE_CHECKING:
     import viser
@@ -24,6 +36,8 @@ POLICY = ("default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' '
           "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; connect-src 'self' data: blob:; "
           "base-uri 'none'; form-action 'none'")  # fmt: skip
 """Content security policy of the page: a browser fetches only what the page contains, or what comes from its own server."""
+MAX_MESSAGE = 1_000_000
+"""Greatest size of a message from a page, bytes."""
 HEADERS = page_headers(POLICY)
 _starting = threading.Lock()
 _leaving: dict[viser.ViserServer, Callable[[], None]] = {}
@@ -90,7 +104,9 @@ def guarded(loopback: bool) -> Iterator[Callable[[], bool]]:
 
     def serve(handler: Any, *args: Any, process_request: Any = None, **more: Any) -> Any:
         seen.append(True)
-        return plain(handler, *args, process_request=_asking(process_request, loopback), **more)
+        clients = _Clients(handler)
+        limits = {"max_size": MAX_MESSAGE, "open_timeout": REQUEST_SECONDS, "logger": silent_logger("shadowpuppet.viewer")}
+        return plain(clients, *args, process_request=_asking(process_request, loopback, clients), **more | limits)
 
     library.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
     try:
@@ -99,13 +115,33 @@ def guarded(loopback: bool) -> Iterator[Callable[[], bool]]:
         library.serve = plain
 
 
-def _asking(answer: Any, loopback: bool) -> Any:
+class _Clients:
+    """A handler of WebSocket connections that counts them, and gives their memory back when they are gone."""
+
+    def __init__(self, handler: Any) -> None:
+        self.handler, self.number = handler, 0
+
+    async def __call__(self, connection: Any) -> None:
+        self.number += 1
+        try:
+            await self.handler(connection)
+        except Exception:  # of a message that is none: the connection is closed, and nothing is printed
+            with contextlib.suppress(Exception):
+                await connection.close(1002)
+        finally:
+            self.number -= 1
+            gc.collect()  # what viser keeps of a client refers to itself
+
+
+def _asking(answer: Any, loopback: bool, clients: _Clients) -> Any:
     """A request handler that refuses foreign requests, passes the others to `answer`, and adds `HEADERS` to its responses."""
     from http import HTTPStatus
 
     def asking(connection: Any, request: Any) -> Any:
         if not (is_own_host(request.headers, loopback) and is_same_origin(request.headers)):
             return connection.respond(HTTPStatus.FORBIDDEN, "this page is served under the machine's own address, and to itself only\n")
+        if clients.number >= MAX_CONNECTIONS:
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open already\n")
         response = None if answer is None else answer(connection, request)
         if response is not None:
             for name, value in HEADERS.items():

@@ -1,0 +1,153 @@
+"""Files of every format that the package reads, for `fuzz_readers.py`, made by its own writers and the tests'; and their readers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "support"))
+
+import acclaim
+import biovision
+import calibrations
+import motions
+import runs
+import vicon
+
+from shadowpuppet.body.models import MODELS, average_sizes
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.io.calibration.calibration_files import examine_calibration, write_calibration
+from shadowpuppet.io.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from shadowpuppet.io.export import export_run
+from shadowpuppet.io.humaneva import read_sync
+from shadowpuppet.io.intervals import read_intervals
+from shadowpuppet.io.motion.amc import read_mocap
+from shadowpuppet.io.motion.motion_files import read_motion, read_truth
+from shadowpuppet.io.motion.opensim import read_mot
+from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.io.person import Person, read_person, write_person
+from shadowpuppet.io.prior import read_prior, write_prior
+from shadowpuppet.io.recording import read_recording
+from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline.batch.grid import read_grid
+from shadowpuppet.pipeline.options import make_options, options_text, read_options
+from shadowpuppet.silhouette.external import script
+from shadowpuppet.silhouette.external.script import read_script
+from shadowpuppet.synthetic import demo_spec, read_spec, spec_text
+from shadowpuppet.video.images import read_image, write_image
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "calibration": examine_calibration,
+    "pair": lambda path: examine_calibration(path.parent),
+    "person": read_person,
+    "prior": read_prior,
+    "recording": lambda path: read_recording(path.parent),
+    "run": lambda path: read_run(path.parent),
+    "tables": lambda path: read_run(path.parent),
+    "intervals": read_intervals,
+    "joints": read_joints,
+    "motion": read_motion,
+    "truth": read_truth,
+    "skeleton": lambda path: read_mocap(path.parent / "01_01.amc"),
+    "mot": read_mot,
+    "sync": read_sync,
+    "options": lambda path: make_options(read_options(path), str(path)),
+    "grid": read_grid,
+    "spec": read_spec,
+    "script": lambda path: read_script(path, "made"),
+    "checkpoint": lambda path: read_checkpoint(path.parent, [MotionFrame]),
+    "image": read_image,
+}
+"""By name; each reads one of the files in the folder of that name."""
+GRID = """seeds = "0:3"
+preset = "liu2011"
+[grid]
+"tracker.arm.particles" = [10, 20]
+[case.drs]
+tracker.resampling = "deterministic"
+[case.srs]
+tracker.resampling = "stratified"
+"""
+RECORDING = """rate = 25.0
+duration = 0.1
+unit = "m"
+up = "z"
+[subject]
+height = 1.78
+distance = 2.5
+[start]
+cam0 = 0.04
+[video]
+cam0 = "film"
+"""
+
+
+def of(name: str, folder: Path) -> list[Path]:
+    """The files of a reader, of those that `write` wrote into a folder."""
+    whole = {"run": ("*",), "tables": ("*.csv", "run.toml"), "recording": ("recording.toml",), "checkpoint": ("*.npz",)}
+    return sorted(path for pattern in whole.get(name, ("*",)) for path in (folder / name).glob(pattern) if path.is_file())
+
+
+def write(folder: Path) -> None:
+    """Write all files into a folder, those of each reader into one of its name."""
+    rng, made = np.random.default_rng(1), calibrations.cameras(2)
+    for name in READERS:
+        (folder / name).mkdir(parents=True)
+    _calibrations(folder, made)
+    for body in MODELS:
+        write_person(folder / "person" / f"{body}.toml", Person(average_sizes(body, 1.78), 1.78, "made", "some text"))
+    write_prior(folder / "prior" / "prior.npz", motions.prior(rng, names=tuple("abcdef"), rate=25.0))
+    run = runs.make_run(folder / "made", frames=6, lost=(2,), spread=True)
+    for name in ("run", "tables"):
+        for path in run.iterdir():
+            (folder / name / path.name).write_bytes(path.read_bytes())
+    (folder / "tables" / "motion.npz").unlink()
+    (folder / "intervals" / "intervals.csv").write_bytes((run / "intervals.csv").read_bytes())
+    _motions(folder, run, rng)
+    (folder / "sync" / "a.ofs").write_text("82\n61\n2.001\n5 6 7\n")
+    (folder / "options" / "all.toml").write_text(options_text(make_options({})))
+    (folder / "options" / "some.toml").write_text('preset = "liu2011"\nheight = 1.8\n[tracker.arm]\nparticles = 30\n')
+    (folder / "grid" / "grid.toml").write_text(GRID)
+    (folder / "spec" / "spec.toml").write_text(spec_text(demo_spec()))
+    scripts = Path(script.__file__).parent / "scripts"
+    for path in scripts.glob("*.py"):
+        (folder / "script" / path.name).write_bytes(path.read_bytes())
+    frame = MotionFrame(0.1, "tracked", rng.random(4), np.asfortranarray(rng.random((3, 3))))
+    write_checkpoint(folder / "checkpoint", Checkpoint(1, (frame, {"a": None, "b": True}, np.float64(2))))
+    for ending in ("png", "jpg", "bmp"):
+        write_image(folder / "image" / f"a.{ending}", rng.integers(0, 255, (12, 16, 3), np.uint8))
+
+
+def _calibrations(folder: Path, made: list[Camera]) -> None:
+    for name, path in calibrations.write_all(folder, made).items():
+        file = next(path.iterdir()) if path.is_dir() and name != "easy" else path
+        if file.is_file():
+            (folder / "calibration" / file.name).write_bytes(file.read_bytes())
+    for name in ("intri.yml", "extri.yml"):
+        (folder / "pair" / name).write_bytes((folder / "easy" / name).read_bytes())
+    place = folder / "recording"
+    write_calibration(place / "calibration.toml", made)
+    (place / "film").mkdir()
+    for n in range(3):
+        write_image(place / "film" / f"{n}.png", np.full((made[0].size[1], made[0].size[0]), 9 * n, np.uint8))
+    (place / "recording.toml").write_text(RECORDING.replace("cam0", made[0].name))
+
+
+def _motions(folder: Path, run: Path, rng: np.random.Generator) -> None:
+    for path in export_run(run, ["c3d", "trc", "csv", "npz", "bvh", "mot", "parquet"], folder / "exported"):
+        goal = "mot" if path.suffix == ".mot" else "motion"
+        (folder / goal / path.name).write_bytes(path.read_bytes())
+        if path.suffix in (".trc", ".csv"):
+            (folder / "joints" / path.name).write_bytes(path.read_bytes())
+            (folder / "truth" / path.name).write_bytes(path.read_bytes())
+    (folder / "motion" / "other.bvh").write_text(biovision.person())
+    labels, places = ("LSHO", "RSHO", "LELB", "C7"), rng.random((5, 4, 3)) * 1000
+    for processor in (vicon.INTEL, vicon.DEC, vicon.MIPS):
+        for scale in (-1.0, 0.1):
+            (folder / "motion" / f"{processor}{scale}.c3d").write_bytes(vicon.c3d(labels, places, processor=processor, scale=scale))
+    acclaim.write(folder / "skeleton")
+    acclaim.write(folder / "motion")

@@ -1,0 +1,1 @@
+"""A verdict on a recording before it is tracked, and on a run after that."""

@@ -1,0 +1,66 @@
+"""The verdict on a finished run, from what it states of itself: frames lost, width of the intervals, doubtful limbs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.motion.limbs import DOUBTFUL
+from shadowpuppet.motion.metrics import LOST_ERROR
+from shadowpuppet.motion.motion import Motion
+from shadowpuppet.pipeline.look import Look, RigLook
+from shadowpuppet.pipeline.verdict.verdict import Verdict, verdict_of
+
+MOSTLY_LOST = 0.5
+"""Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
+OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, 0.4
+"""Shares of frames, lost and with a doubtful limb, above which a run is doubtful."""
+WIDE, FAR = {1: 0.105, 2: 0.06}, {1: 0.125, 2: 0.09}
+"""Expected joint errors (m) above which a run is doubtful, and bad; for one camera, and for two or more."""
+MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
+"""Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
+
+
+def verdict_of_run(look: Look | RigLook, motion: Motion) -> Verdict:
+    """The verdict on a run of a recording, from what the look found and what the run states of itself."""
+    cameras = len(look.cameras) if isinstance(look, RigLook) else 1
+    return verdict_of([*_cautions(motion, cameras), *look.doubts])
+
+
+def lost_share(motion: Motion) -> float:
+    """Share of the frames with a person that are lost; 0 without such frames."""
+    present = np.count_nonzero(motion.status != "absent")
+    return float(np.count_nonzero(motion.status == "lost") / present) if present else 0.0
+
+
+def expected_error(motion: Motion) -> float:
+    """Mean joint error, metres, that the stated standard deviations lead one to expect, a lost joint counted as 0.5 m; not a number where
+    none is stated."""
+    present = motion.status != "absent"
+    lengths = MEAN_DISTANCE * np.sqrt((motion.joint_sd[present] ** 2).sum(2))
+    if not np.isfinite(lengths).any():
+        return np.nan
+    return float(np.where(np.isfinite(lengths), lengths, LOST_ERROR).mean())
+
+
+def _cautions(motion: Motion, cameras: int) -> Iterator[Caution]:
+    if not (motion.status != "absent").any():
+        yield Caution("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
+        return
+    lost, kind = lost_share(motion), min(cameras, 2)
+    if lost > OFTEN_LOST:
+        short = f"person lost in {100 * lost:.0f} % of frames: see --overlay"
+        yield Caution(short, short, RUINOUS if lost > MOSTLY_LOST else HARMFUL)
+    error = expected_error(motion)
+    if error > WIDE[kind]:
+        short = f"joints may be off by {1000 * error:.0f} mm on average"
+        yield Caution(short, short, RUINOUS if error > FAR[kind] else HARMFUL)
+    shares = {limb: float(np.isin(motion.limb_status[:, n], DOUBTFUL).mean()) for n, limb in enumerate(motion.limbs)}
+    for limb, share in sorted(shares.items(), key=lambda item: -item[1]):
+        short = f"{limb.replace('_', ' ')} doubtful in {100 * share:.0f} % of frames"
+        if share > OFTEN_DOUBTFUL:
+            yield Caution(short, short, HARMFUL)
+        elif share > OFTEN_LOST:
+            yield Caution(short, short, NOTED)

@@ -1,0 +1,119 @@
+"""Verdicts on recordings and on runs: the word, the reasons, their order and their length."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from shadowpuppet.calibration.agreement import Agreement
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.motion.limbs import limbs_of
+from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
+from shadowpuppet.pipeline.look import Look
+from shadowpuppet.pipeline.verdict.of_run import expected_error, lost_share, verdict_of_run
+from shadowpuppet.pipeline.verdict.verdict import verdict_of, verdict_of_look
+from shadowpuppet.silhouette.correction.condition import FilmCondition
+from shadowpuppet.silhouette.quality import MaskQuality
+
+JOINTS = ("pelvis", "left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
+QUALITY = MaskQuality(frames=40, area=0.1, area_change=0.0, area_jumps=0.0, flicker=0.0, specks=0.0, speck_area=0.0, holes=0.0,
+                      hole_area=0.0, border=dict.fromkeys(("left", "top", "right", "bottom"), 0.0), empty=0, full=0)
+LOOK = Look(recording="film", camera="cam", size=(320, 240), worked_size=(320, 240), fov=60.0, calibrated=True, frames=100, looked_at=100,
+            rate=25.0, jitter=0.0, scale="height 1.80 m", background="film", key="both", area=0.1, plain_area=None, exact_overlap=None,
+            exact_overlap_plain=None, quality=QUALITY)
+
+
+def caution(weight: int, name: str = "x") -> Caution:
+    return Caution(f"a sentence on {name}", name, weight)
+
+
+@pytest.mark.parametrize(("weights", "word"), [((), "good"), ((NOTED,) * 5, "good"), ((NOTED, HARMFUL), "doubtful"),
+                                               ((HARMFUL, RUINOUS, NOTED), "bad")])
+def test_the_heaviest_reason_decides(weights, word):
+    assert verdict_of(caution(weight) for weight in weights).word == word
+
+
+def test_reasons_are_the_three_heaviest_each_once():
+    verdict = verdict_of([caution(NOTED, "a"), caution(HARMFUL, "b"), caution(HARMFUL, "c"), caution(RUINOUS, "d"), caution(HARMFUL, "b")])
+    assert verdict.reasons == ("d", "b", "c")
+
+
+def test_a_caution_is_its_sentence_and_survives_copies():
+    made = Caution("long and whole", "short", HARMFUL)
+    for same in (made, copy.deepcopy(made), copy.copy(made)):
+        assert (same, same.short, same.weight) == ("long and whole", "short", HARMFUL)
+    about = made.about("camera 'a'")
+    assert (about, about.short, about.weight) == ("camera 'a': long and whole", "camera 'a': short", HARMFUL)
+
+
+def test_a_recording_that_cannot_be_tracked_is_bad():
+    assert verdict_of_look(replace(LOOK, refusal="nobody is in it")) == ("bad", ("nobody is in it",))
+    assert verdict_of_look(LOOK).word == "good"
+
+
+def all_cautions() -> list[Caution]:
+    """Those of the worst silhouettes, film and cameras."""
+    worst = replace(QUALITY, area=0.001, area_change=1.0, area_jumps=1.0, flicker=1.0, specks=9.0, speck_area=1.0, holes=9.0, hole_area=1.0,
+                    border=dict.fromkeys(QUALITY.border, 1.0), empty=9, full=9, first_empty=3, first_full=7)
+    numbers = dict.fromkeys((field.name for field in fields(FilmCondition)), 50.0)
+    film = FilmCondition(**{**numbers, "gain": (0.3, 3.0), "moved_since": None, "change": None, "copied": None})
+    apart = Agreement(names=("a", "b", "c", "d"), apart=(1.0, 1.0, 50.0, 1.0), pairs=((None,) * 4,) * 4, limit=10.0, height=1.8)
+    return [*worst.warnings(), *film.warnings(), *replace(film, moved_since=1.0, change=1.0, copied=1.0).warnings(), *apart.doubts(),
+            *replace(apart, apart=(50.0,) * 4).doubts(), *replace(apart, remedy="say so").doubts()]
+
+
+def test_every_reason_has_at_most_ten_words():
+    cautions = all_cautions()
+    assert len(cautions) > 15
+    for each in cautions:
+        assert 3 <= len(each.short.split()) <= 10, each.short
+        assert len(each.split()) > len(each.short.split()) or each == "say so"
+        assert each.weight in (NOTED, HARMFUL, RUINOUS)
+
+
+def motion(sd: float, *, statuses: str = "tttttttttt", doubtful: int = 0) -> Motion:
+    """Ten frames: tracked, lost or absent, with one standard deviation; the left arm doubtful in the first ones."""
+    built = MotionBuilder("cardbox", ("x",), JOINTS)
+    for n, letter in enumerate(statuses):
+        status = {"t": "tracked", "l": "lost", "a": "absent"}[letter]
+        if status != "tracked":
+            built.append(MotionFrame(float(n), status))
+            continue
+        limbs = ["uncertain" if limb == "left_arm" and n < doubtful else "tracked" for limb in limbs_of(JOINTS)]
+        built.append(MotionFrame(float(n), status, np.zeros(1), np.zeros((7, 3)), joint_sd=np.full((7, 3), sd), limb_status=limbs))
+    return built.build()
+
+
+def test_errors_that_intervals_lead_one_to_expect_are_met_by_draws():
+    rng = np.random.default_rng(2)
+    drawn = np.linalg.norm(rng.normal(size=(100_000, 3)) * 0.05, axis=1).mean()
+    assert expected_error(motion(0.05)) == pytest.approx(drawn, rel=0.01)
+    assert expected_error(motion(0.0, statuses="tttttttttl")) == pytest.approx(0.05)  # a lost joint counts as half a metre
+    assert expected_error(motion(0.05, statuses="ttttttttaa")) == pytest.approx(drawn, rel=0.01)
+
+
+@pytest.mark.parametrize(("run", "word", "reason"), [
+    (motion(0.03), "good", None),
+    (motion(0.03, statuses="tttttttlaa"), "doubtful", "person lost in 12 % of frames: see --overlay"),
+    (motion(0.03, statuses="ttlllaaaaa"), "bad", "person lost in 60 % of frames: see --overlay"),
+    (motion(0.03, statuses="aaaaaaaaaa"), "bad", "nobody was seen: film the empty scene and the person"),
+    (motion(0.03, doubtful=2), "good", "left arm doubtful in 20 % of frames"),
+    (motion(0.03, doubtful=8), "doubtful", "left arm doubtful in 80 % of frames"),
+    (motion(0.3), "bad", "joints may be off by 479 mm on average")])
+def test_runs_are_judged_by_what_they_state(run, word, reason):
+    verdict = verdict_of_run(LOOK, run)
+    assert verdict.word == word
+    assert verdict.reasons[:1] == (() if reason is None else (reason,))
+
+
+def test_frames_without_a_person_are_not_lost():
+    assert lost_share(motion(0.03, statuses="tllaaaaaaa")) == pytest.approx(2 / 3)
+    assert lost_share(motion(0.03, statuses="aaaaaaaaaa")) == 0
+
+
+def test_what_the_look_found_is_among_the_reasons():
+    verdict = verdict_of_run(replace(LOOK, doubts=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
+    assert verdict == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))
