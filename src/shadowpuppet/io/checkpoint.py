@@ -51,7 +51,7 @@ def frame_bytes(frame: MotionFrame) -> bytes:
     `ShadowPuppetError` for more than `MODES` modes."""
     if len(frame.modes) > MODES:
         raise ShadowPuppetError(f"modes: found {len(frame.modes)} in a frame, expected {MODES} at most")
-    modes = np.full((MODES, 2 + np.size(frame.joints)), np.nan)
+    modes = np.full((MODES, 2 + np.asarray(frame.joints).size), np.nan)
     for row, mode in zip(modes, frame.modes):
         row[:] = [LIMBS.index(mode.limb), mode.weight, *mode.joints.ravel()]
     statuses = [STATUSES.index(each) for each in (frame.status, *(frame.limb_status or ()))]

@@ -86,7 +86,7 @@ class MultiviewSubject(TrackedSubject):
 
     def drawn(self, state: TrackerState | MotionFrame | None) -> tuple[Bits, ...]:
         """The body of a state in each camera's picture of half the size; empty if it is lost or absent."""
-        if state is None or state.status in BLANK:
+        if state is None or state.pose is None or state.status in BLANK:
             return ()
         return tuple(picture.draw(np.asarray(state.pose)) for picture in self.tracker.views.pictures)
 
