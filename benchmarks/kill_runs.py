@@ -20,10 +20,11 @@ from pathlib import Path
 import numpy as np
 import smallest
 
+from shadowpuppet.errors import PERSON_LOST
 from shadowpuppet.threads import child_environment
 
 KINDS = {"one": (smallest.ONE, ("--tracker.cycles", "1")), "several": (smallest.RING, ("--multiview.particles", "8"))}
-SAME = ("joints.csv", "angles.csv", "intervals.csv", "run.toml", "look.json", "person.toml", "calibration.toml")
+SAME = ("joints.csv", "raw.csv", "angles.csv", "intervals.csv", "run.toml", "look.json", "person.toml", "calibration.toml")
 """Files that must be equal."""
 MOST_AT_ONCE = 8
 """Greatest number of frames from one kill to the next."""
@@ -72,7 +73,7 @@ def kill_often(rng: np.random.Generator, recording: Path, folder: Path, flags: t
             time.sleep(rng.random() * 0.05)
             child.kill()
         code = child.wait()
-        if code == 0:
+        if code in (0, PERSON_LOST):
             return kills
         if code > 0:
             raise SystemExit(f"the run ended with code {code}")

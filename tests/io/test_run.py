@@ -493,6 +493,19 @@ def test_revised_frames_replace_those_written_and_raw_csv_keeps_them(tmp_path):
     assert not (tmp_path / "run" / "raw.csv").exists()
 
 
+def test_a_run_killed_among_its_revised_tables_is_read_as_tracked(tmp_path):
+    """One table is revised, the other not: the motion as tracked is whole."""
+    with writer(tmp_path / "run") as run:
+        for i in range(5):
+            run.write(a_frame(i))
+        raw = run.motion
+        run.revise(dataclasses.replace(raw, joints=raw.joints + 1, poses=raw.poses + 1))
+    info = (tmp_path / "run" / "run.toml").read_text()
+    (tmp_path / "run" / "run.toml").write_text(info.replace("complete = true", "complete = false"))
+    (tmp_path / "run" / "motion.npz").unlink()
+    assert_same(read_run(tmp_path / "run").motion, raw, 1e-6)
+
+
 def test_a_revision_that_cannot_be_written_leaves_the_tables(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")

@@ -78,7 +78,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
         _show_run(folder, metrics)
     if lost_share(motion) <= MOSTLY_LOST:
         return 0
-    print(f"the person is lost: {'; '.join(metrics['verdict']['reasons'])}", file=sys.stderr)
+    print(f"the person is lost: {'; '.join(metrics.get('verdict', {}).get('reasons', ()))}", file=sys.stderr)
     return PERSON_LOST
 
 
@@ -207,8 +207,8 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
     files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv", "intervals.csv")
-    verdict = verdict_table(Verdict(metrics["verdict"]["word"], tuple(metrics["verdict"]["reasons"])))
-    show(verdict, metrics_table(metrics), *errors, pairs([("speed", speed), files]))
+    said = [verdict_table(Verdict(found["word"], tuple(found["reasons"])))] if (found := metrics.get("verdict")) else []
+    show(*said, metrics_table(metrics), *errors, pairs([("speed", speed), files]))
 
 
 def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:

@@ -34,7 +34,7 @@ from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
 from shadowpuppet.io.files.text import errors_named, read_limited, read_toml, write_whole
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
-from shadowpuppet.io.motion.table import read_run_tables, run_headers, run_rows, write_raw
+from shadowpuppet.io.motion.table import read_raw, read_run_tables, run_headers, run_rows, write_raw
 from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
 
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
@@ -280,8 +280,12 @@ def read_run(folder: str | Path) -> Run:
         raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it")
     info = read_toml(folder / "run.toml", FormatError)
     _check_info(folder / "run.toml", info)
-    whole = (folder / "motion.npz").exists()
-    motion = read_motion_npz(folder / "motion.npz") if whole else _read_tables(folder, info["body"], cut=not info["complete"])
+    if (folder / "motion.npz").exists():
+        motion = read_motion_npz(folder / "motion.npz")
+    elif not info["complete"] and (folder / RAW).exists():  # killed while its tables were revised
+        motion = read_raw(folder / RAW, info["body"])
+    else:
+        motion = _read_tables(folder, info["body"], cut=not info["complete"])
     return Run(folder, motion, info, _read_metrics(folder / "metrics.json"))
 
 
