@@ -82,7 +82,7 @@ class StepWatch:
         self._verdicts.append(self._verdict())
 
     def _compare(self, now: Seen) -> None:
-        """Add what a frame set tells."""
+        """Add what a frame set shows."""
         fade = np.exp((self._seen[-1].seconds - now.seconds) / MEMORY) if self._seen else 1.0
         for sums in (self._gain, self._change, self._misfit):
             sums *= fade
@@ -90,28 +90,28 @@ class StepWatch:
             if mask is None:  # without a picture, or set aside for another reason
                 self._gain[n] = self._change[n] = self._misfit[n] = 0
             else:
-                told = self._told(now, n, mask)
-                kept = np.clip((MOST - told[1]) / np.maximum(self._change[n], 1e-9), 0, 1)
-                self._gain[n], self._change[n] = kept * self._gain[n] + told[0], kept * self._change[n] + told[1]
-                self._misfit[n] = kept * self._misfit[n] + told[2]
+                found = self._evidence(now, n, mask)
+                kept = np.clip((MOST - found[1]) / np.maximum(self._change[n], 1e-9), 0, 1)
+                self._gain[n], self._change[n] = kept * self._gain[n] + found[0], kept * self._change[n] + found[1]
+                self._misfit[n] = kept * self._misfit[n] + found[2]
         self._seen.append(now)
         while now.seconds - self._seen[0].seconds > LAGS[-1] + PACE:
             self._seen.popleft()
 
-    def _told(self, now: Seen, camera: int, mask: Bits) -> Array:
-        """What a silhouette tells of each lag, late and early: by how much the other body explains it better and by how much bodies differ,
+    def _evidence(self, now: Seen, camera: int, mask: Bits) -> Array:
+        """What a silhouette shows of each lag, late and early: by how much the other body explains it better and by how much bodies differ,
         both over its area, and what the other body leaves unexplained, times the difference (3, 2 x LAGS)."""
-        told, area = np.zeros((3, 2, len(LAGS))), count(mask)
+        found, area = np.zeros((3, 2, len(LAGS))), count(mask)
         drawn = now.drawn[camera]
         for k, lag in enumerate(LAGS):
             then = self._at(now.seconds - lag)
             if then is None or not area or (own := then.masks[camera]) is None:
                 continue
             left = np.array([count(mask ^ then.drawn[camera]), count(own ^ drawn)]) / area
-            told[0, :, k] = np.array([count(mask ^ drawn), count(own ^ then.drawn[camera])]) / area - left
-            told[1, :, k] = count(drawn ^ then.drawn[camera]) / area
-            told[2, :, k] = left * told[1, :, k]
-        return told.reshape(3, -1)
+            found[0, :, k] = np.array([count(mask ^ drawn), count(own ^ then.drawn[camera])]) / area - left
+            found[1, :, k] = count(drawn ^ then.drawn[camera]) / area
+            found[2, :, k] = left * found[1, :, k]
+        return found.reshape(3, -1)
 
     def _at(self, seconds: float) -> Seen | None:
         """The frame set nearest to a time (s); None if none is within a frame's time."""
