@@ -82,8 +82,12 @@ class Caution(str):
         """How it is copied."""
         return Caution, (str(self), self.short, self.weight)
 
+    def at_most(self, weight: int) -> Caution:
+        """The same caution, with this weight if its own is greater."""
+        return Caution(str(self), self.short, min(self.weight, weight))
+
     def about(self, what: str) -> Caution:
-        """The same doubt about one camera or file, which both forms name first."""
+        """The same caution about one camera or file, which both forms name first."""
         return Caution(f"{what}: {self}", f"{what}: {self.short}", self.weight)
 
 
