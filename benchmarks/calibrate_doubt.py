@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
@@ -27,6 +27,7 @@ import smallest
 from doubt_runs import BUILD, MADE, Tracked, collect, read_runs
 from faults import into_page
 
+from shadowpuppet.evaluation.interval_coverage import rank_histogram
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR
@@ -92,11 +93,15 @@ MOST = 15000
 SCALE = 100.0
 """Factor on scores (m), for the optimiser's tolerances."""
 LEAST = {"constant": 0.7, "distance": 1.0}
-"""Least factors: made recordings know neither the doubt in where a joint is in a body, nor that in the distance."""
+LEAST_SEVERAL = {"constant": 0.4}
+"""Least factors with one camera and with several: made recordings know neither the doubt in where a joint is in a body, nor that in the
+distance. Several cameras fit the body to the person's surface, and so show most of the first."""
 SILENT = 0.005
 """Share of the joints that may be over `FAR_ERROR` off in a limb that is vouched for."""
 NEAR = 0.1
 """Error (m) below which a doubtful joint is a false alarm."""
+RANKS = 20
+"""Number of bars of the picture of ranks."""
 PARTS = 3
 """Number of parts of the recordings; each is tested with the factors of the others."""
 NEGLIGIBLE = 0.02
@@ -114,8 +119,9 @@ Factors = dict[str, dict[int, Array]]
 
 def fit_all(runs: Sequence[Errors]) -> Factors:
     """Factors of all groups that occur; the world's two level axes (several cameras) share theirs."""
-    least = np.array([LEAST.get(name, 0.0) for name in runs[0].names])
-    axes, out = [(0,), (1,), (2,)] if "distance" in runs[0].names else [(0, 1), (2,)], dict[str, dict[int, Array]]()
+    alone = "distance" in runs[0].names
+    least = np.array([(LEAST if alone else LEAST_SEVERAL).get(name, 0.0) for name in runs[0].names])
+    axes, out = [(0,), (1,), (2,)] if alone else [(0, 1), (2,)], dict[str, dict[int, Array]]()
     for group, tied in product(GROUPS, axes):
         own = [run for run in runs if group_of(run.joint) == group and run.axis in tied]
         if own:
@@ -229,19 +235,39 @@ def limb_table(tested: Sequence[LimbJoint]) -> str:
     return "\n".join(lines)
 
 
+def mode_table(runs: Sequence[Tracked]) -> str:
+    """How often the truth is nearest to places of an arm by their stated weight, as Markdown."""
+    weights, nearest = np.concatenate([run.modes for run in runs]).T
+    lines = ["| stated weight | places | mean weight, % | the truth is nearest, % |", "|---|" + "---:|" * 3]
+    for low, high in pairwise(WEIGHTS):
+        own = (weights >= low) & (weights < high)
+        if own.any():
+            lines.append(f"| {100 * low:.0f} to {100 * min(high, 1):.0f} % | {own.sum()} | {100 * weights[own].mean():.0f} | "
+                         f"{100 * nearest[own].mean():.0f} |")
+    return "\n".join(lines)
+
+
+WEIGHTS = (0.05, 0.15, 0.25, 0.35, 0.5, 0.65, 0.8, 1.01)
+"""Limits of the rows of `mode_table`."""
+
+
 def draw(path: Path, joints: Sequence[Tested], limbs: Sequence[LimbJoint]) -> None:
-    """Calibration curve and, by kind of limb, false alarms over silence (PNG)."""
+    """Calibration curve, ranks of the truth in the stated distributions and, by kind of limb, false alarms over silence (PNG)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from scipy.stats import norm
 
-    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2)
+    left, middle, right = figure.subplots(1, 3)
     stated, share = np.linspace(0.05, 0.99, 40), np.concatenate([np.abs(each.run.errors) / each.sd for each in joints])
     left.plot([0, 100], [0, 100], color="0.7", linewidth=1)
     left.plot(100 * stated, [100 * (share <= norm.ppf(0.5 + part / 2)).mean() for part in stated])
     left.set(xlabel="stated interval, %", ylabel="true positions in it, %", title="Calibration")
+    ranks = rank_histogram(np.concatenate([each.run.errors for each in joints]), np.concatenate([each.sd for each in joints]), RANKS)
+    middle.bar(100 * (np.arange(RANKS) + 0.5) / RANKS, 100 * ranks, width=95 / RANKS)
+    middle.axhline(100 / RANKS, color="0.7", linewidth=1)
+    middle.set(xlabel="place of the truth in the stated distribution, %", ylabel="true positions, %", title="Ranks")
     for kind in dict.fromkeys(each.kind for each in limbs):
         own = [each for each in limbs if each.kind == kind]
         errors, radius = (np.concatenate([getattr(each, name) for each in own]) for name in ("errors", "radius"))
@@ -304,6 +330,10 @@ def main() -> None:
             print(f"\n{kind}, {title}\n\n{text}", flush=True)
             if args.markdown:
                 into_page(args.markdown, f"{kind}, {title}", text)
+        if any(len(run.modes) for run in runs):
+            print(f"\n{mode_table(runs)}", flush=True)
+            if args.markdown:
+                into_page(args.markdown, f"{kind}, modes", mode_table(runs))
         if args.markdown:
             draw(args.markdown.parent / "assets" / f"doubt_{kind}.png", joints, limbs)
         factors = fit_all(errors_of(runs))

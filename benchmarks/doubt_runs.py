@@ -15,7 +15,7 @@ from spoiled import SPOILS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.motion.motion import BLANK, JointTable
+from shadowpuppet.motion.motion import BLANK, JointTable, Mode
 from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
@@ -102,6 +102,23 @@ class Tracked:
     """Of shape (T, L, 3), metres."""
     errors: Array
     """Truth less estimate (T, L, 3), metres; not a number where there is none."""
+    modes: Array
+    """Of every place of an arm in every frame, the estimate and its modes (N, 2): the stated weight, and 1 if the truth is nearest."""
+
+
+def mode_rows(modes: Sequence[Mode], points: Array, truth: Array, names: Sequence[str]) -> list[tuple[float, float]]:
+    """Rows of `Tracked.modes` of a frame with landmarks `points` (L, 3), all in the world, by true elbow and wrist, `truth` (L, 3). Arms
+    with a single place have none."""
+    found = []
+    for limb in dict.fromkeys(mode.limb for mode in modes):
+        own = [mode for mode in modes if mode.limb == limb]
+        ends = [names.index(limb.replace("arm", joint)) for joint in ("elbow", "wrist")]
+        places = np.stack([points[ends], *(np.where(np.isfinite(mode.joints[ends]), mode.joints[ends], points[ends]) for mode in own)])
+        far = np.linalg.norm(places - truth[ends], axis=2).max(1)
+        if np.isfinite(far).all():
+            weights = [1 - sum(mode.weight for mode in own), *(mode.weight for mode in own)]
+            found += [(weight, float(n == far.argmin())) for n, weight in enumerate(weights)]
+    return found
 
 
 def track_monocular(path: Path) -> Iterator[Tracked]:
@@ -109,18 +126,21 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
     case, options = Case.read(path), make_options({})
     picture = case.person(options, np.random.default_rng(0)).picture(case.camera, options.tracker.body)
     names, rate = picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
-    turn = case.camera.T_camera_world[:3, :3]
+    turn, truth = case.camera.T_camera_world[:3, :3], _places(case.truth, names)
     for n, (fault, spoil) in enumerate(FAULTS.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
         tracker = MonocularTracker(picture, options.tracker)
         doubt, state, before, rows, poses = MonocularDoubt(tracker), None, None, [], []
-        for seconds, mask in zip(case.times.tolist(), masks):
+        modes = list[tuple[float, float]]()
+        for n, (seconds, mask) in enumerate(zip(case.times.tolist(), masks)):
             state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask)
             found, before = doubt.evidence(state, mask, seconds, before)
             rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
-        errors = _errors(case.truth, names, picture.points_world(np.array(poses))) @ turn.T
-        yield Tracked(path.name, fault, names, {name: np.array([row[name] for row in rows]) for name in rows[0]}, errors)
+            modes += mode_rows(found.modes, picture.points_world(poses[-1][None])[0], truth[n], names)
+        errors = (truth[: len(poses)] - picture.points_world(np.array(poses))) @ turn.T
+        components = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        yield Tracked(path.name, fault, names, components, errors, np.array(modes).reshape(-1, 2))
 
 
 ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
@@ -154,10 +174,10 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
             found, before = doubt.evidence(state, observation.points, masks, seconds, before)
             rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
-        errors = _errors(at_times(truth, np.array(times)), names, subject.body.points(np.array(poses)))
+        errors = _places(at_times(truth, np.array(times)), names) - subject.body.points(np.array(poses))
         some = next(row for row in rows if row is not None)
         components = {name: np.array([np.zeros((len(names), 3)) if row is None else row[name] for row in rows]) for name in some}
-        yield Tracked(path.name, fault, names, components, errors)
+        yield Tracked(path.name, fault, names, components, errors, np.empty((0, 2)))
 
 
 def make_ring(path: Path) -> None:
@@ -169,11 +189,10 @@ def make_ring(path: Path) -> None:
         done.touch()
 
 
-def _errors(truth: JointTable, names: Sequence[str], points: Array) -> Array:
-    """Truth less estimates (T, L, 3), which start with the truth's first frame."""
-    known = [truth.positions[: len(points), truth.names.index(name)] if name in truth.names else np.full((len(points), 3), np.nan)
-             for name in names]
-    return np.stack(known, 1) - points
+def _places(truth: JointTable, names: Sequence[str]) -> Array:
+    """True places (T, L, 3) of the landmarks; not a number for those without."""
+    nowhere = np.full((len(truth.times), 3), np.nan)
+    return np.stack([truth.positions[:, truth.names.index(name)] if name in truth.names else nowhere for name in names], 1)
 
 
 def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
@@ -185,7 +204,8 @@ def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for run in TRACK[kind](path):
             np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
-                                names=list(run.components), components=np.stack(list(run.components.values()), 3).astype(np.float32))
+                                modes=run.modes, names=list(run.components),
+                                components=np.stack(list(run.components.values()), 3).astype(np.float32))
         (folder / "done").touch()
     return sorted(folder.glob("*.npz"))
 
@@ -201,5 +221,5 @@ def read_runs(files: Iterable[Path]) -> list[Tracked]:
     for file in files:
         data = np.load(file, allow_pickle=False)
         components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
-        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"]))
+        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"], data["modes"]))
     return found

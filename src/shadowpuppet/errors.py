@@ -78,12 +78,16 @@ class Caution(str):
         made.short, made.weight = short, weight
         return made
 
-    def __getnewargs__(self) -> tuple[str, str, int]:
-        """What `__new__` takes, for copies."""
-        return str(self), self.short, self.weight
+    def __reduce__(self) -> tuple[type[Caution], tuple[str, str, int]]:
+        """How it is copied."""
+        return Caution, (str(self), self.short, self.weight)
+
+    def at_most(self, weight: int) -> Caution:
+        """The same caution, with this weight if its own is greater."""
+        return Caution(str(self), self.short, min(self.weight, weight))
 
     def about(self, what: str) -> Caution:
-        """The same doubt about one camera or file, which both forms name first."""
+        """The same caution about one camera or file, which both forms name first."""
         return Caution(f"{what}: {self}", f"{what}: {self.short}", self.weight)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.evaluation.interval_coverage import LEVELS, coverage
+from shadowpuppet.evaluation.interval_coverage import LEVELS, coverage, rank_histogram
 
 
 def test_the_widths_are_those_of_a_normal_distribution():
@@ -36,3 +36,14 @@ def test_only_where_both_are_known_counts():
     assert found is not None
     assert (found["count"], found["joints"]["neck"]["count"], found["joints"]["head"]["count"]) == (9, 3, 6)
     assert coverage(delta, np.full_like(sd, np.nan), ("neck", "head")) is None
+
+
+@pytest.mark.parametrize(("stated", "shift", "highest"), [(0.5, 0, {0, 9}), (2.0, 0, {4, 5}), (1.0, 2.0, {9}), (1.0, -2.0, {0})])
+def test_ranks_of_the_truth_are_even_only_if_the_stated_distribution_is_right(rng, stated, shift, highest):
+    sd = rng.uniform(0.01, 0.05, 20000)
+    drawn = sd * rng.standard_normal(len(sd))
+    np.testing.assert_allclose(rank_histogram(drawn, sd), 0.1, atol=0.01)
+    wrong = rank_histogram(drawn + shift * sd, stated * sd)
+    assert set(np.argsort(-wrong)[: len(highest)].tolist()) == highest
+    assert wrong.sum() == pytest.approx(1)
+    assert wrong.max() > 0.13

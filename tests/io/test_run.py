@@ -21,7 +21,7 @@ from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.intervals import IntervalWriter, read_intervals
 from shadowpuppet.io.motion.table import read_joints, read_raw
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.motion.motion import STATUSES, Motion, MotionFrame
+from shadowpuppet.motion.motion import STATUSES, Mode, Motion, MotionFrame
 
 DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand")
 INFO = {"recording": Path("recordings/demo"), "method": "monocular", "preset": None, "seed": 3,
@@ -402,7 +402,9 @@ def test_intervals_hold_nine_tenths_around_each_joint(tmp_path):
     for bound, side in ((found.low, -1), (found.high, 1)):
         np.testing.assert_allclose(bound, motion.joints[stated] + side * 1.645 * motion.joint_sd[stated], atol=5.1e-7)
     lines = (folder / "intervals.csv").read_text().splitlines()
-    assert lines[0] == "time,joint,x_low,x_high,y_low,y_high,z_low,z_high"
+    assert lines[0] == "time,joint,mode,weight,x,y,z,x_low,x_high,y_low,y_high,z_low,z_high"
+    np.testing.assert_allclose(found.places[:, :, 0], motion.joints[stated], atol=5.1e-7)
+    assert (found.weights == 1).all()
     assert [line.split(",")[:2] for line in lines[1:]] == [[f"{t / 15:.6f}", name] for t in stated for name in JOINTS]
     with pytest.raises(FormatError, match=r"intervals\.csv: no joints"):
         read_joints(folder / "intervals.csv")  # bounds are nobody's places
@@ -421,17 +423,37 @@ def test_intervals_of_joints_of_any_name(tmp_path, name):
     assert np.isnan(found.high[1, 0]).all()
 
 
+def test_other_places_follow_their_joint_with_their_weights(tmp_path):
+    writer, none = IntervalWriter(["neck", "left_elbow", "left_hand"]), [np.nan] * 3
+    modes = [Mode("left_arm", 0.25, np.array([none, none, [7.0, 8, 9]])),
+             Mode("left_arm", 0.15, np.array([none, [4.0, 5, 6], [1.0, 2, 3]]))]
+    frame = MotionFrame(0.5, "tracked", joints=np.ones((3, 3)), joint_sd=np.full((3, 3), 0.1), modes=modes)
+    (tmp_path / "a.csv").write_text(writer.header() + writer.lines(frame) + writer.lines(frame._replace(time=1.0, modes=())), "utf-8")
+    found = read_intervals(tmp_path / "a.csv")
+    np.testing.assert_allclose(found.weights[0], [[1, 0, 0], [0.85, 0, 0.15], [0.6, 0.25, 0.15]])
+    np.testing.assert_allclose(found.weights[1], [[1, 0, 0]] * 3)
+    np.testing.assert_allclose(found.places[0, 2], [[1, 1, 1], [7, 8, 9], [1, 2, 3]])
+    np.testing.assert_allclose(found.places[0, 1, 2], [4, 5, 6])  # mode 2 of the hand and that of the elbow are one posture
+    assert np.isnan(found.places[0, 1, 1]).all()
+    np.testing.assert_allclose(found.high[0], 1.1645)
+
+
 @pytest.mark.parametrize(("row", "said"), [
-    ("0.1,neck,1,0,0,0,0,0", "line 3, column 'x_low': found 1, expected at most the 0 of 'x_high'"),
-    ("0.1,neck,0,0,0,0,0,zero", "line 3, column 'z_high': found 'zero', expected a number or nothing"),
-    ("0.0,neck,0,0,0,0,0,0", "line 3, column 'joint': found 'neck' twice at 0 s, expected each joint once"),
-    ("-1,neck,0,0,0,0,0,0", "line 3, column 'time': found -1, expected seconds that do not decrease"),
-    (",neck,0,0,0,0,0,0", "line 3, column 'time': found no number, expected seconds"),
-    ("0.1,neck,0", "line 3: found 3 cells, expected 8"),
+    ("0.1,neck,0,1,0,0,0,1,0,0,0,0,0", "line 3, column 'x_low': found 1, expected at most the 0 of 'x_high'"),
+    ("0.1,neck,0,1,0,0,0,0,0,0,0,0,zero", "line 3, column 'z_high': found 'zero', expected a number or nothing"),
+    ("0.0,neck,0,1,0,0,0,0,0,0,0,0,0", "line 3, column 'joint': found mode 0 of 'neck' twice at 0 s, expected each once"),
+    ("0.1,neck,0.5,1,0,0,0,0,0,0,0,0,0", "line 3, column 'mode': found 0.5, expected 0 for the estimate, 1, 2"),
+    ("0.1,neck,,1,0,0,0,0,0,0,0,0,0", "line 3, column 'mode': found no number, expected 0 for the estimate"),
+    ("0.1,neck,1e9,1,0,0,0,0,0,0,0,0,0", "line 3, column 'mode': found 1e.09, expected 0 for the estimate"),
+    ("0.1,neck,0,1.5,0,0,0,0,0,0,0,0,0", "line 3, column 'weight': found 1.5, expected 0 to 1"),
+    ("0.1,neck,0,,0,0,0,0,0,0,0,0,0", "line 3, column 'weight': found nothing, expected 0 to 1"),
+    ("-1,neck,0,1,0,0,0,0,0,0,0,0,0", "line 3, column 'time': found -1, expected seconds that do not decrease"),
+    (",neck,0,1,0,0,0,0,0,0,0,0,0", "line 3, column 'time': found no number, expected seconds"),
+    ("0.1,neck,0", "line 3: found 3 cells, expected 13"),
 ])
 def test_malformed_intervals_are_said(tmp_path, row, said):
     path = tmp_path / "intervals.csv"
-    path.write_text(f"{IntervalWriter([]).header()}0.0,neck,0,0,0,0,0,0\n{row}\n")
+    path.write_text(f"{IntervalWriter([]).header()}0.0,neck,0,1,0,0,0,0,0,0,0,0,0\n{row}\n")
     with pytest.raises(FormatError, match=rf"intervals\.csv: {said}"):
         read_intervals(path)
 

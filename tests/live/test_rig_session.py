@@ -13,10 +13,13 @@ from follower import followed
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
-from shadowpuppet.live.rig_capture import NewestSet
+from shadowpuppet.live.rig_capture import NewestSet, SnapshotSet
+from shadowpuppet.live.rig_session import RigSession
 from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
 from shadowpuppet.live.run import run_live
 from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.timing import Timing
+from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.capture import Newest
 from shadowpuppet.video.live_source import Snapshot
@@ -81,6 +84,32 @@ def test_films_of_several_cameras_are_played_as_if_live(recording, films, quick,
     kept = sorted(path.name for path in (tmp_path / "run" / "recording" / "video").iterdir())
     assert kept == ["cam1.mp4", "cam2.mp4", "cam3.mp4", "cam4.mp4"]
     assert len(made.images(tmp_path / "run" / "recording" / "video" / "cam3.mp4")) == len(run.motion)
+
+
+def test_a_camera_that_freezes_is_set_aside_by_name_and_taken_back():
+    cameras, now = made_rig.cameras(), [0.0]
+    subject = followed(cameras)
+    scene = [[np.full((*camera.size[::-1], 3), 90, np.uint8)] for camera in cameras]
+    session = RigSession(Options(), SETTINGS, np.random.default_rng(0), lambda: now[0], Timing(20.0), full=tuple(cameras), scene=scene,
+                         watchdogs=tuple(CameraWatchdog(camera.name, camera.size, live=False) for camera in cameras))
+    session._begin_tracking(subject)
+
+    def masks(frame: int):
+        pose = np.zeros(len(subject.body.skeleton.dofs))
+        pose[:3] = 0.1 * np.sin(frame), 0, 0.9
+        return [picture.mask(pose) for picture in subject.pictures]
+
+    messages = []
+    for n in range(24):
+        seen = masks(n)
+        seen[1] = masks(5)[1] if 5 < n < 18 else seen[1]
+        session._masks = lambda shot, images, seen=seen: tuple(seen)
+        now[0] = n / 20
+        outcome = session.step(SnapshotSet(now[0], tuple(each[0] for each in scene), number=n))
+        assert outcome.frame is not None
+        messages.append(outcome.view.message)
+    assert messages[4] == messages[-1] == ""
+    assert messages[14] == f"set aside: {cameras[1].name} (frozen)"
 
 
 def test_what_is_several(recording, films):

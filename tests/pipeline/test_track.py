@@ -10,6 +10,7 @@ import pytest
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.evaluation.interval_coverage import rank_histogram
 from shadowpuppet.geometry import align
 from shadowpuppet.io.intervals import read_intervals
 from shadowpuppet.io.motion.table import read_joints, read_raw
@@ -41,6 +42,8 @@ def test_most_true_positions_are_within_the_intervals_and_few_wrong_joints_are_v
     own, theirs = ([of.index(name) for name in names] for of in (motion.joint_names, truth.names))
     off = motion.joints[:, own] - truth.positions[: len(motion)][:, theirs]
     assert 0.8 < np.mean(np.abs(off) < 1.645 * motion.joint_sd[:, own]) <= 1
+    tails = rank_histogram(-off.ravel(), motion.joint_sd[:, own].ravel(), bins=20)[[0, -1]]
+    assert tails.max() < 0.2, "more than one true position in five is in the lowest or highest twentieth of what is stated for it"
     vouched = motion.limb_status[:, [motion.limbs.index(limb_of(name)) for name in names]] == "tracked"
     assert np.mean(vouched & (np.linalg.norm(off, axis=2) > 0.3)) < 0.01
     assert vouched.mean() > 0.3

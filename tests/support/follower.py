@@ -10,6 +10,7 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.errors import NOTED, Caution
 from shadowpuppet.io.person import Person
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
+from shadowpuppet.tracking.multiview.observation import BodyInViews
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.particle_filter import Particles
 
@@ -28,6 +29,7 @@ class Follower:
 
     def __init__(self, body, cameras) -> None:
         self.body, self.cameras, self.calls = body, tuple(cameras), []
+        self.views = BodyInViews(body, ())  # an upright body is no measure of whether cameras are in step
 
     def start(self, rng, points, masks) -> Standing:
         self.calls.append("start")

@@ -33,7 +33,7 @@ def test_a_camera_that_freezes_is_set_aside_by_name_and_taken_back():
     assert not any(any(row) for row in found[:8])
     assert not any(any(row) for row in found[25:])
     assert all(row == (False, True, False) for row in found[11:25])
-    (interval,) = frozen.intervals
+    (interval,) = frozen.aside.intervals
     assert (interval.camera, interval.why) == (1, "frozen")
     assert interval.begin <= 11 / RATE < interval.end == pytest.approx(24 / RATE)
     assert interval.frames == round((interval.end - interval.begin) * RATE) + 1
@@ -55,7 +55,7 @@ def test_a_camera_whose_picture_turns_black_is_set_aside_at_once_and_named():
     for n in range(12):
         masks = [person(n), person(n), np.ones((60, 80), bool) if 4 <= n < 8 else person(n)]
         assert (watch(n / RATE, masks)[2] is None) == (4 <= n < 8)
-    (interval,) = watch.intervals
+    (interval,) = watch.aside.intervals
     assert (interval.camera, interval.why, interval.frames) == (2, "blind", 4)
 
 

@@ -28,6 +28,18 @@ def coverage(delta: Array, sd: Array, names: Sequence[str]) -> dict[str, Any] | 
     return {**_shares(z, sd), "joints": joints}
 
 
+def rank_histogram(delta: Array, sd: Array, bins: int = 10) -> Array:
+    """Share (bins,) of the true values in each of as many parts of their stated distributions, all equally likely if these are right.
+
+    The probability integral transform (Dawid 1984), for normal distributions: of errors `delta` (N,), truth less estimate, and their
+    standard deviations `sd` (N,). Raised at the ends: too narrow; in the middle: too wide; on one side: the estimates are off to the other.
+    """
+    from scipy.stats import norm
+
+    places = norm.cdf(delta / sd)
+    return np.histogram(places, np.linspace(0, 1, bins + 1))[0] / max(len(places), 1)
+
+
 def _shares(z: Array, sd: Array) -> dict[str, float]:
     known = np.isfinite(z)
     values = z[known]

@@ -11,12 +11,15 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, reason
+from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.nested import read_nested, write_nested
-from shadowpuppet.motion.motion import STATUSES, MotionFrame
+from shadowpuppet.motion.limbs import LIMBS
+from shadowpuppet.motion.motion import STATUSES, Mode, MotionFrame
 
 STATE, FRAMES = "checkpoint.npz", "checkpoint.frames"
+MODES = 6
+"""Greatest number of modes of a frame: three of each arm."""
 
 
 class Checkpoint(NamedTuple):
@@ -44,15 +47,21 @@ def read_checkpoint(folder: Path, types: Iterable[type]) -> Checkpoint | None:
 
 
 def frame_bytes(frame: MotionFrame) -> bytes:
-    """A frame as `MotionBuilder.append` returns it: numbers and arrays, then the indices of its statuses."""
+    """A frame as `MotionBuilder.append` returns it: numbers and arrays, its modes, then the indices of its statuses. Raises
+    `ShadowPuppetError` for more than `MODES` modes."""
+    if len(frame.modes) > MODES:
+        raise ShadowPuppetError(f"modes: found {len(frame.modes)} in a frame, expected {MODES} at most")
+    modes = np.full((MODES, 2 + np.asarray(frame.joints).size), np.nan)
+    for row, mode in zip(modes, frame.modes):
+        row[:] = [LIMBS.index(mode.limb), mode.weight, *mode.joints.ravel()]
     statuses = [STATUSES.index(each) for each in (frame.status, *(frame.limb_status or ()))]
-    parts = ([frame.time, frame.cost, frame.overlap], frame.pose, frame.pose_sd, frame.joints, frame.joint_sd, statuses)
+    parts = ([frame.time, frame.cost, frame.overlap], frame.pose, frame.pose_sd, frame.joints, frame.joint_sd, modes, statuses)
     return np.concatenate([np.asarray(part, float).ravel() for part in parts]).tobytes()
 
 
 def read_frames(folder: Path, number: int, dofs: int, joints: int, limbs: int) -> list[MotionFrame]:
     """The first `number` frames of a run. Raises `FormatError` if there are fewer."""
-    path, width = folder / FRAMES, 4 + 2 * dofs + 6 * joints + limbs
+    path, width = folder / FRAMES, 4 + 2 * dofs + 6 * joints + MODES * (2 + 3 * joints) + limbs
     try:
         values = np.fromfile(path, float, number * width)
     except OSError as error:
@@ -63,10 +72,12 @@ def read_frames(folder: Path, number: int, dofs: int, joints: int, limbs: int) -
 
 
 def _frame(row: Array, dofs: int, joints: int) -> MotionFrame:
-    head, pose, pose_sd, places, places_sd, statuses = np.split(row, np.cumsum([3, dofs, dofs, 3 * joints, 3 * joints]))
+    sizes = [3, dofs, dofs, 3 * joints, 3 * joints, MODES * (2 + 3 * joints)]
+    head, pose, pose_sd, places, places_sd, others, statuses = np.split(row, np.cumsum(sizes))
+    modes = [Mode(LIMBS[int(each[0])], float(each[1]), each[2:].reshape(joints, 3)) for each in others.reshape(MODES, -1) if each[0] >= 0]
     status, *limbs = (STATUSES[int(each)] for each in statuses)
     return MotionFrame(float(head[0]), status, pose, places.reshape(joints, 3), pose_sd, places_sd.reshape(joints, 3), float(head[1]),
-                       float(head[2]), tuple(limbs))
+                       float(head[2]), tuple(limbs), modes)
 
 
 def open_frames(folder: Path, frames: Sequence[MotionFrame]) -> BinaryIO:

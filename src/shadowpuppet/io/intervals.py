@@ -1,8 +1,14 @@
-"""Writes and reads the 90 % intervals of a run's joints, intervals.csv: one row for each joint of a frame whose accuracy is stated."""
+"""Writes and reads the 90 % intervals of a run's joints and the other places where they may be, intervals.csv.
+
+A row for each joint of a frame whose accuracy is stated, with mode 0: the estimate, and bounds between which the joint is with 90 %,
+whatever its mode. After it a row for each other place that the pictures allow (an arm before or behind the body may look the same): mode 1,
+2, ..., without bounds. Rows of one limb with the same time and mode belong to one posture. Weights of a joint's rows add up to 1.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,17 +17,20 @@ import numpy as np
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import Table, csv_line, read_table
-from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.motion.motion import Mode, MotionFrame
 
 HALF_WIDTH = 1.645
 """Half the width of a 90 % interval, in standard deviations."""
+PLACE = ("weight", "x", "y", "z")
 BOUNDS = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
 """Columns of bounds; no joint's columns are named so."""
-HEADER = ("time", "joint", *BOUNDS)
+MOST_MODES = 100
+"""Number of modes that a file may have: more is no file of intervals."""
+HEADER = ("time", "joint", "mode", *PLACE, *BOUNDS)
 
 
 class Intervals(NamedTuple):
-    """Bounds of joints over time: each of a joint's coordinates is between them with a probability of 90 %."""
+    """Joints over time: bounds of their coordinates, each with a probability of 90 %, and the M places where they may be."""
 
     times: Array
     """Seconds, of shape (T,)."""
@@ -31,6 +40,10 @@ class Intervals(NamedTuple):
     """World, metres, of shape (T, J, 3); not a number where none is stated."""
     high: Array
     """Likewise."""
+    weights: Array
+    """Probability of each place, of shape (T, J, M); 0 where there is none."""
+    places: Array
+    """World, metres, of shape (T, J, M, 3), the estimate first; not a number where there is none."""
 
 
 class IntervalWriter:
@@ -38,8 +51,9 @@ class IntervalWriter:
 
     def __init__(self, names: Iterable[str]) -> None:
         """`names`: of the joints, J of them."""
-        numbers = ",".join(["%.6f"] * len(BOUNDS))
-        self._cells = [f"{csv_line([name])[:-1].replace('%', '%%')},{numbers}\n" for name in names]
+        cells = [csv_line([name])[:-1].replace("%", "%%") for name in names]
+        self._estimate = [f"{cell},0,%.3f,{','.join(['%.6f'] * 9)}\n" for cell in cells]
+        self._other = [f"{cell},%d,%.3f,%.6f,%.6f,%.6f{',' * len(BOUNDS)}\n" for cell in cells]
 
     def header(self) -> str:
         """The first line."""
@@ -49,11 +63,25 @@ class IntervalWriter:
         """The lines of a frame as `MotionBuilder.append` returns it; none of joints without a standard deviation."""
         joints, reach = np.asarray(frame.joints), HALF_WIDTH * np.asarray(frame.joint_sd)
         bounds = np.stack([joints - reach, joints + reach], 2).reshape(-1, len(BOUNDS))
-        stated = np.flatnonzero(np.isfinite(bounds).all(1))
-        if not len(stated):
-            return ""
-        template = "".join(f"{frame.time:.6f},{self._cells[j]}" for j in stated)
-        return template % tuple(bounds[stated].ravel().tolist())
+        others, time = _by_joint(frame.modes), f"{frame.time:.6f},"
+        template, values = "", list[float]()
+        for j in np.flatnonzero(np.isfinite(bounds).all(1)).tolist():
+            own = others.get(j, [])
+            template += time + self._estimate[j] + "".join(time + self._other[j] for _ in own)
+            values += [1 - sum(weight for _, weight, _ in own), *joints[j].tolist(), *bounds[j].tolist()]
+            for mode, weight, place in own:
+                values += [mode, weight, *place]
+        return template % tuple(values)
+
+
+def _by_joint(modes: Iterable[Mode]) -> dict[int, list[tuple[int, float, list[float]]]]:
+    """Number, weight and place (3,) of the other places of each joint, by its index; numbers count from 1 in each limb."""
+    found = dict[int, list[tuple[int, float, list[float]]]]()
+    for _, own in groupby(modes, key=lambda each: each.limb):
+        for number, mode in enumerate(own, 1):
+            for j in np.flatnonzero(np.isfinite(mode.joints).all(1)).tolist():
+                found.setdefault(j, []).append((number, mode.weight, mode.joints[j].tolist()))
+    return found
 
 
 def read_intervals(path: str | Path, cut: bool = False) -> Intervals:
@@ -63,25 +91,39 @@ def read_intervals(path: str | Path, cut: bool = False) -> Intervals:
     """
     table = read_table(Path(path), cut)
     bounds, joints, every = table.numbers(BOUNDS), np.array(table.texts("joint"), str), table.numbers(["time"])[:, 0]
-    _check(table, every, joints, bounds)
+    modes, places = table.numbers(["mode"])[:, 0], table.numbers(PLACE)
+    _check(table, every, joints, modes, bounds)
+    _check_weights(table, places[:, 0])
     times, frame = np.unique(every, return_inverse=True)
-    names = tuple(dict.fromkeys(joints.tolist()))
-    placed = np.full((len(times), len(names), len(BOUNDS)), np.nan)
-    placed[frame.ravel(), [names.index(name) for name in joints]] = bounds
-    return Intervals(times, names, placed[..., 0::2], placed[..., 1::2])
+    names, number = tuple(dict.fromkeys(joints.tolist())), int(modes.max(initial=0)) + 1
+    where = frame.ravel(), [names.index(name) for name in joints], modes.astype(int)
+    placed = np.full((len(times), len(names), number, len(PLACE) + len(BOUNDS)), np.nan)
+    placed[where] = np.concatenate([places, bounds], axis=1)
+    low, high = placed[:, :, 0, len(PLACE) :: 2], placed[:, :, 0, len(PLACE) + 1 :: 2]
+    return Intervals(times, names, low, high, np.nan_to_num(placed[..., 0]), placed[..., 1 : len(PLACE)])
 
 
-def _check(table: Table, times: Array, joints: np.ndarray, bounds: Array) -> None:
-    """Raise `FormatError` for the first row with an impossible time or bound, or of a joint that was there before."""
-    seen = set[tuple[float, str]]()
-    for n, (line, time, joint) in enumerate(zip(table.lines, times.tolist(), joints.tolist())):
+def _check_weights(table: Table, weights: Array) -> None:
+    """Raise `FormatError` for the first row whose weight (R,) is no probability."""
+    for n in np.flatnonzero(~((weights >= 0) & (weights <= 1))):
+        found = "nothing" if np.isnan(weights[n]) else f"{weights[n]:g}"
+        raise FormatError(f"{table.path}: line {table.lines[n]}, column 'weight': found {found}, expected 0 to 1")
+
+
+def _check(table: Table, times: Array, joints: np.ndarray, modes: Array, bounds: Array) -> None:
+    """Raise `FormatError` for the first row with an impossible time, mode or bound, or of a joint's mode that was there before."""
+    seen = set[tuple[float, str, float]]()
+    for n, (line, time, joint, mode) in enumerate(zip(table.lines, times.tolist(), joints.tolist(), modes.tolist())):
         where = f"{table.path}: line {line}"
         if time != time or (n and time < times[n - 1]):
             raise FormatError(f"{where}, column 'time': found {'no number' if time != time else f'{time:g}'}, expected seconds that do "
                               "not decrease")
-        if (time, joint) in seen:
-            raise FormatError(f"{where}, column 'joint': found {joint!r} twice at {time:g} s, expected each joint once")
-        seen.add((time, joint))
+        if mode not in range(MOST_MODES):
+            raise FormatError(f"{where}, column 'mode': found {'no number' if mode != mode else f'{mode:g}'}, expected 0 for the estimate, "
+                              "1, 2, ... for other places")
+        if (time, joint, mode) in seen:
+            raise FormatError(f"{where}, column 'joint': found mode {mode:g} of {joint!r} twice at {time:g} s, expected each once")
+        seen.add((time, joint, mode))
         for k in np.flatnonzero(bounds[n, 0::2] > bounds[n, 1::2]):
             (low, high), (least, greatest) = BOUNDS[2 * k : 2 * k + 2], bounds[n, 2 * k : 2 * k + 2]
             raise FormatError(f"{where}, column {low!r}: found {least:g}, expected at most the {greatest:g} of {high!r}")

@@ -2,7 +2,7 @@
 
     joints.csv     time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1), <limb>_status
     angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
-    intervals.csv  time, joint, x_low, x_high, y_low, y_high, z_low, z_high (m, world): 90 % bounds, a row for each joint of a frame
+    intervals.csv  time, joint, mode, weight, x, y, z, x_low, x_high, y_low, ... (m, world): 90 % bounds, and other places (`io.intervals`)
     motion.npz     the fields of `Motion`, arrays only
     raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
@@ -35,7 +35,7 @@ from shadowpuppet.io.files.text import errors_named, read_limited, read_toml, wr
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
 from shadowpuppet.io.motion.table import read_raw, read_run_tables, run_headers, run_rows, write_raw
-from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
+from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
 
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
 RAW = "raw.csv"
@@ -94,6 +94,8 @@ class RunWriter:
         self.info = for_toml(plain(info, "info")) | {"body": body_name, "versions": versions()}
         self._motion = MotionBuilder(body_name, dof_names, joint_names)
         self._intervals = IntervalWriter(joint_names)
+        self._modes = dict[float, Sequence[Mode]]()
+        """Other places of limbs, by time: a motion does not keep them."""
         self._tables: Sequence[BinaryIO] = ()
         self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
         self._before: list[MotionFrame] | None = None
@@ -157,6 +159,7 @@ class RunWriter:
         """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self.begin()
         kept = self._motion.append(frame)
+        self._modes[kept.time] = kept.modes
         with self._system_errors():
             _append(self._tables, run_rows(kept), self._intervals.lines(kept), checkpoint.frame_bytes(kept))
             for table in self._tables:
@@ -180,7 +183,7 @@ class RunWriter:
                     tables = [stack.enter_context((self.folder / part).open("wb")) for part in parts[1:]]
                     _append(tables, run_headers(builder.joint_names, builder.dof_names), self._intervals.header())
                     for frame in revised.frames():
-                        kept = builder.append(frame)
+                        kept = builder.append(frame._replace(modes=self._modes.get(frame.time, ())))
                         _append(tables, run_rows(kept), self._intervals.lines(kept))
                 for table in self._tables:
                     table.close()
@@ -213,6 +216,7 @@ class RunWriter:
             self._tables = tables if self._resume is None else [*tables, checkpoint.open_frames(self.folder, self._before or [])]
             _append(self._tables, run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header())
             for kept in self._before or []:
+                self._modes[kept.time] = kept.modes
                 _append(self._tables, run_rows(kept), self._intervals.lines(kept))
             for table in self._tables:
                 table.flush()

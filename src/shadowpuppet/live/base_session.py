@@ -22,6 +22,7 @@ from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 GONE = 2.0
@@ -66,6 +67,8 @@ class LiveSession(ABC):
     def __post_init__(self) -> None:
         """Set the state before the first picture."""
         self._began, self._lost_since, self._new, self._state, self._before = np.nan, np.nan, False, None, None
+        self._watch: RigWatch | None = None
+        """Which of several cameras are set aside."""
         self._measured: Callable[[], Any] = lambda: None
 
     # Input
@@ -172,8 +175,10 @@ class LiveSession(ABC):
     def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
         assert self.subject is not None
         masks = self._masks(shot, images)
-        observation = self.subject.observe(masks)
+        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks))
         self._state = self.subject.next_state(self.rng, self._state, observation)
+        if self._watch is not None:
+            self._watch.tracked(self.subject.drawn(self._state))
         seconds = shot.captured - self._began if shot.shown is None else shot.shown
         frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
         now = self.clock()

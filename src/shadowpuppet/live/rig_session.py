@@ -24,9 +24,10 @@ from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.subject import average_body
+from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey import OPENED, OPENING
 from shadowpuppet.silhouette import learn_background
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 STEP_IN = "step in between the cameras and move a little"
@@ -151,6 +152,10 @@ class RigSession(LiveSession):
             self._begin_tracking(found)
         return Outcome(self._view(images))
 
+    def _begin_tracking(self, subject: TrackedSubject) -> None:
+        super()._begin_tracking(subject)
+        self._watch = RigWatch(len(self.full))
+
     def _scaled(self, shot: SnapshotSet) -> tuple[Image, ...]:
         return tuple(map(scaled, shot.images, self._worked))
 
@@ -158,6 +163,7 @@ class RigSession(LiveSession):
         return tuple(segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images))
 
     def _forget_time(self) -> None:
+        self._watch = None if self._watch is None else RigWatch(len(self.full))
         for collector in self._collectors:
             collector.wait()
         self._first.clear()
@@ -170,10 +176,16 @@ class RigSession(LiveSession):
         found = frame or MotionFrame(0.0, self.phase)
         return {"image": overlay_grid(FrameSet(found.time, images, masks or (None,) * len(images)), found, pictures)}
 
+    def _aside(self) -> str:
+        """Which cameras are set aside, and why; empty if none is."""
+        present = {} if self._watch is None else self._watch.present
+        names = ", ".join(f"{self.watchdogs[n].name} ({why})" for n, why in sorted(present.items()))
+        return f"set aside: {names}" if names else ""
+
     def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
         if self.phase == "learning":
             slowest = max(self._collectors, key=lambda collector: collector.left)
             return slowest.message, slowest.left
         if self.phase == "tracking":
-            return "the body does not fit any more: measure anew" if self._gone else "", None
+            return "the body does not fit any more: measure anew" if self._gone else self._aside(), None
         return self._hint if self.phase == "waiting" else "measuring: one moment", None

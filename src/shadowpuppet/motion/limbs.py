@@ -12,6 +12,7 @@ DOUBTFUL = ("uncertain", "predicted")
 ARM, LEG = ("shoulder", "elbow", "wrist", "hand", "fist"), ("hip", "knee", "ankle", "heel", "toe")
 
 
+@cache
 def limb_of(joint: str) -> str:
     """The limb that a joint, such as `left_elbow`, belongs to."""
     side, _, name = joint.partition("_")

@@ -54,6 +54,17 @@ class JointTable:
         return JointTable(self.times[chosen], self.names, self.positions[chosen])
 
 
+class Mode(NamedTuple):
+    """Another place where a limb may be: one that the pictures allow, too."""
+
+    limb: str
+    """Such as `left_arm`."""
+    weight: float
+    """Probability that it is the right one."""
+    joints: Array
+    """World, metres, of shape (J, 3); not a number for joints that have no other place."""
+
+
 class MotionFrame(NamedTuple):
     """One frame of a motion; fields that are left out are unknown."""
 
@@ -75,6 +86,8 @@ class MotionFrame(NamedTuple):
     """Intersection over union of model and silhouette, 0..1."""
     limb_status: Sequence[str] | None = None
     """Of `STATUSES`, one for each of the K limbs that the joints belong to (`motion.limbs`); without: as the frame's."""
+    modes: Sequence[Mode] = ()
+    """Other places of limbs; of one limb's they and the estimate are alternatives. They go to intervals.csv only."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -32,6 +32,7 @@ from shadowpuppet.silhouette.boundary import disc
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
+from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
@@ -72,7 +73,7 @@ class MonocularSubject(TrackedSubject):
     fit: SizeFit
     """Sizes and place, and how they were found."""
     tracker: MonocularTracker
-    state_types = (State, Particles, Unexplained, Before)
+    state_types = (State, Particles, Unexplained, Before, Trail)
 
     @classmethod
     def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str, rate: float) -> MonocularSubject:
@@ -114,6 +115,10 @@ class MonocularSubject(TrackedSubject):
     def left_out(self, state: State | None) -> tuple[Mask | None, ...]:
         """The pixels (H, W) that a state leaves out of the silhouette; None for none."""
         return (None,) if state is None else (left_out(state.unexplained),)
+
+    def kept(self, state: State | None) -> State | None:
+        """A state without its observation."""
+        return None if state is None else state._replace(observation=None)
 
     def doubt(self, state: State, observation: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a mask."""

@@ -16,20 +16,21 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.camera.rasterize import Bits, Picture
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.motion.motion import JointTable, MotionFrame
+from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
 from shadowpuppet.pipeline.learn_prior import familiar
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet
-from shadowpuppet.pipeline.subject import Observed, TrackedSubject
+from shadowpuppet.pipeline.subject import Observed, TrackedSubject, TrackerState
 from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
+from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -54,7 +55,7 @@ class MultiviewSubject(TrackedSubject):
 
     tracker: MultiviewTracker
     hull: VisualHull
-    state_types = (MultiviewState, Particles, Unexplained, Before)
+    state_types = (MultiviewState, Particles, Unexplained, Before, Trail)
 
     def observe(self, masks: Sequence[Mask | None]) -> HullObservation:
         """Surface points of the visual hull of the masks, and the masks."""
@@ -82,6 +83,12 @@ class MultiviewSubject(TrackedSubject):
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""
         return () if state is None else tuple(map(left_out, state.unexplained))
+
+    def drawn(self, state: TrackerState | MotionFrame | None) -> tuple[Bits, ...]:
+        """The body of a state in each camera's picture of half the size; empty if it is lost or absent."""
+        if state is None or state.pose is None or state.status in BLANK:
+            return ()
+        return tuple(picture.draw(np.asarray(state.pose)) for picture in self.tracker.views.pictures)
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""

@@ -24,7 +24,7 @@ from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.silhouette.cleanup import bounding_window
-from shadowpuppet.tracking.frozen import CameraWatch
+from shadowpuppet.tracking.frozen import Interval
 
 Item = TypeVar("Item")
 STAGES = ("decode", "segment", "wait", "hull", "track", "doubt", "write")
@@ -169,10 +169,10 @@ def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
              ShadowPuppetWarning, stacklevel=3)
 
 
-def set_aside(watch: CameraWatch, names: Sequence[str]) -> dict[str, Any]:
+def set_aside(intervals: Iterable[Interval], names: Sequence[str]) -> dict[str, Any]:
     """The entry `set_aside` of metrics.json, none if no camera was: camera, why, number of frames, times of the first and last (s)."""
     found = [{"camera": names[each.camera], "why": each.why, "frames": each.frames, "from_s": round(each.begin, 3),
-              "to_s": round(each.end, 3)} for each in watch.intervals]
+              "to_s": round(each.end, 3)} for each in sorted(intervals, key=lambda each: each.begin)]
     return {"set_aside": found} if found else {}
 
 
@@ -181,7 +181,9 @@ def warn_of_set_aside(found: Sequence[Mapping[str, Any]]) -> None:
     if found:
         when = "; ".join(f"camera {one['camera']!r}, {one['why']} from {one['from_s']:.1f} to {one['to_s']:.1f} s" for one in found)
         warn(f"cameras were set aside for a time ({when}): frozen is a picture that does not change while the person moves in others, "
-             "blind one of which nearly all is silhouette, as when it turns black", ShadowPuppetWarning, stacklevel=3)
+             "blind one of which nearly all is silhouette, as when it turns black; late or early one that shows what the others showed, or "
+             "will show, at another time: are its frames complete, and is its start in recording.toml right?",
+             ShadowPuppetWarning, stacklevel=3)
 
 
 def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:

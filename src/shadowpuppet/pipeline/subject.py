@@ -15,6 +15,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import Caution
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
@@ -102,6 +103,14 @@ class TrackedSubject(ABC):
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
         return ()
 
+    def kept(self, state: Any) -> Any:
+        """A tracker's state without what the next frame does not need."""
+        return state
+
+    def drawn(self, state: Any) -> tuple[Bits, ...]:
+        """The body of a tracker's state in each camera's picture of half the size; empty if there is none, or with one camera."""
+        return ()
+
     def unfound(self, observation: Any) -> str:
         """Status of a frame without a state: `lost` or `absent`."""
         return "absent"
@@ -128,8 +137,9 @@ def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | 
     if state.status in BLANK:
         return MotionFrame(seconds, state.status, cost=state.cost, overlap=state.overlap), None
     joints, (doubt, before) = subject.points(state.pose)[subject.joint_columns], subject.doubt(state, observation, seconds, before)
+    modes = [mode._replace(joints=mode.joints[subject.joint_columns]) for mode in doubt.modes]
     found = MotionFrame(seconds, state.status, state.pose, joints, doubt.pose_sd, doubt.joint_sd[subject.joint_columns],
-                        state.cost, state.overlap, doubt.limb_status)
+                        state.cost, state.overlap, doubt.limb_status, modes)
     return found, before
 
 

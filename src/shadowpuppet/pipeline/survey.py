@@ -277,7 +277,7 @@ def _rig_doubts(look: RigLook) -> list[Caution]:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(_unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
         warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *camera.quality.warnings())
-        doubts += [warning.about(f"camera {camera.name!r}") for warning in warnings]
+        doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
         doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]
     return doubts

@@ -49,7 +49,7 @@ from shadowpuppet.pipeline.survey import survey_camera, survey_rig
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.frozen import CameraWatch
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import write_frames
@@ -279,7 +279,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
     _write_beside(writer.folder, prepared)
-    watch, count, due = CameraWatch(len(survey.rig.footage)), len(earlier), 0.0
+    watch, count, due = RigWatch(len(survey.rig.footage)), len(earlier), 0.0
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
@@ -293,6 +293,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             if survey.rig.is_multiview:
                 frames = (seen._replace(masks=watch(seen.time, seen.masks)) for seen in frames)
             for found, seen in zip(earlier, frames):
+                watch.tracked(subject.drawn(found))
                 if overlay is not None:
                     overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
             observed = stack.enter_context(closing(subject.observations(frames)))
@@ -300,6 +301,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
+                    watch.tracked(subject.drawn(state))
                 left_out = add_left_out(left_out, seen.time, subject.left_out(state))
                 with timer.time("doubt"):
                     found, before = motion_frame(subject, seen.time, state, observation, before)
@@ -308,11 +310,11 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                     if overlay is not None:
                         overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
                     if (now := time.perf_counter()) >= due:
-                        writer.checkpoint(Carried(look, rng.bit_generator.state, state, before, left_out))
+                        writer.checkpoint(Carried(look, rng.bit_generator.state, subject.kept(state), before, left_out))
                         due = time.perf_counter() + max(CHECKPOINT_SECONDS, CHECKPOINT_COST * (time.perf_counter() - now))
                 count += 1
                 listener.advance(count)
     finally:
         writer.metrics |= timings(timer, kind.stages, count - len(earlier), time.perf_counter() - began)
         writer.metrics |= left_out_metrics(left_out, [footage.view.camera for footage in survey.rig.footage])
-        writer.metrics |= set_aside(watch, survey.rig.names)
+        writer.metrics |= set_aside(watch.intervals, survey.rig.names)

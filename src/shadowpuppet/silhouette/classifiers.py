@@ -83,6 +83,8 @@ class ChannelClassifier:
     noise: float = 0.0
     """Standard deviation of noise in smoothed frames beyond that of a clean film, in assumed standard deviations."""
 
+    smeared: bool = False
+    """Whether the film has lost detail to compression or focus."""
     areas: AreaColours | None = None
     """Colours averaged over areas, which are compared too; None unless the film is noisy."""
 
@@ -97,7 +99,7 @@ class ChannelClassifier:
         label = self.labels(smooth, asked)
         if self.areas is not None:
             label = with_areas(label, self.by_area.labels(self.areas.average(planes), asked))
-        return resolve_shadows(label, smooth, self.mean, self.inverse_sigma, self.noise) if resolved else label
+        return resolve_shadows(label, smooth, self.mean, self.inverse_sigma, self.noise, self.smeared) if resolved else label
 
     @cached_property
     def by_area(self) -> ChannelClassifier:

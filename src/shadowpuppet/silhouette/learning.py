@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, outline_w
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, AreaColours, ChannelClassifier, EmptyScene, edge_jitter
 from shadowpuppet.silhouette.cleanup import Window, coarse_person
+from shadowpuppet.silhouette.correction.detail import lost_detail
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
 from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -50,8 +52,10 @@ def learn_background(images: Iterable[Image], settings: SilhouetteSettings | Non
     observer = METHODS[settings.method].observer(settings) if settings.method in METHODS else None
     background = scene.learn_statistics(images, observer.add if observer is not None else lambda image: None)
     correction = Correction.of(scene.picture_of(background), settings, region)
-    frames = [correction(frame).image for frame in _sample(film, background)]
-    channels = _channel_classifier(background, frames, settings)
+    frames = plain = [correction(frame).image for frame in _sample(film, background)]
+    if settings.method != "averaging" and (detail := lost_detail(correction.scene, plain)) is not None:
+        correction, frames = replace(correction, detail=detail), [detail(frame) for frame in plain]
+    channels = _channel_classifier(background, frames, settings, plain)
     choice = _choose(background, frames, channels, settings)
     classifier = METHODS[choice.key].build(EmptyScene(background, channels, settings, observer))
     least = MIN_EDGE_CONTRAST * settings.factor / float(channels.inverse_sigma[..., 0].max())
@@ -67,15 +71,24 @@ def _sample(film: Iterable[Image] | None, background: Background) -> list[Image]
     return frames
 
 
-def _channel_classifier(background: Background, frames: list[Image], settings: SilhouetteSettings) -> ChannelClassifier:
+def _channel_classifier(background: Background, frames: list[Image], settings: SilhouetteSettings,
+                        plain: list[Image]) -> ChannelClassifier:
+    """The classifier of all channels; `plain`: the `frames` before lost detail was restored, or they themselves."""
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
-    noise = scene.measured_noise(frames, background.mean)
+    noise, smeared = scene.measured_noise(frames, background.mean), plain is not frames
+    if smeared:  # what restoring leaves has long tails: blocks of wrong colours
+        noise = noise._replace(sigma=_noise_of(plain, background, noise.smoothing))
     mean = scene.smoothed(background.mean, noise.smoothing)
     sigma = assumed_sigma(background, noise, settings.noise_floor, mean)
     areas = _area_colours(background, frames, noise, settings) if noise.grainy and background.colour else None
     return ChannelClassifier("both", mean, (1 / sigma).astype(np.float32), settings.factor, darkest, noise.smoothing,
-                             EXCESS_NOISE if noise.noisy else 0.0, areas)
+                             EXCESS_NOISE if noise.noisy else 0.0, smeared, areas)
+
+
+def _noise_of(frames: list[Image], background: Background, smoothing: float) -> NDArray[np.float64]:
+    """Noise (3,) of frames after a smoothing (pixels)."""
+    return scene.film_noise(frames, scene.smoothed(background.mean, smoothing), partial(scene.smoothed, smoothing=smoothing))
 
 
 def _area_colours(background: Background, frames: list[Image], noise: FilmNoise, settings: SilhouetteSettings) -> AreaColours:

@@ -40,7 +40,8 @@ class Segmenter:
 
     1. Check that the frame has the background's size and channels.
     2. Undo what has changed since the empty scene (`correction.frame_correction.Correction`): the camera's movement
-       (`correction.registration.Registration`), and the gain of exposure, white balance and lamps (`correction.light.Light`).
+       (`correction.registration.Registration`), the gain of exposure, white balance and lamps (`correction.light.Light`), and
+       the detail that compression has taken (`correction.detail.LostDetail`).
     3. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
        its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`).
        `averaging`, `mog2` and `knn` have comparisons of their own.

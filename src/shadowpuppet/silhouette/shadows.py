@@ -33,36 +33,57 @@ SHARP_EDGE, VERY_SHARP_EDGE = 0.3, 0.5
 MAX_EVEN_SPREAD, MAX_NEUTRAL_HUE, MIN_UNEVEN_SPREAD = 0.6, 0.4, 1.0
 """Standard deviation of brightness and difference of hue, over the assumed standard deviation, below which a part is only darkened
 background; and the deviation of brightness from which on it surely is a limb."""
+THIN = 3
+"""Number of pixels well inside a part up to which it is too thin to have a colour of its own in a film that has lost detail: codecs
+average colours over more than a hand's width."""
 OUTWARD_STEP, INWARD_STEP = 2, 1
 """Distances from an edge, pixels, between which light is compared."""
 
 
-def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float = 0.0) -> Labels:
+def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float = 0.0,
+                    smeared: bool = False) -> Labels:
     """Labels (H, W) in which `MAYBE_SHADOW` is replaced by 1, perhaps a person, or 0, background.
 
     planes, mean, inverse_sigma: smoothed Y, Cr, Cb of frame and background and the inverse standard deviation, of shape (H, W, 3).
     noise: standard deviation of the film's noise beyond that of a clean film, in those standard deviations.
+    smeared: whether the film has lost detail, so that thin parts are judged by edges and contact alone.
     """
     import cv2
 
     either = np.asarray(cv2.inRange(label, MAYBE_SHADOW, MAYBE_SHADOW), np.uint8)
-    firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
-    x, y, width, height = cv2.boundingRect(firm)
-    label = label & ~either
-    if width * height:
-        window = slice(y, y + height), slice(x, x + width)
-        number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-        limbs = _limbs(_part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma), noise)
-        if limbs.any():
-            found = np.zeros_like(label)
-            found[window] = limbs[np.asarray(parts, np.intp)]
-            label |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
+    label = _with_limbs(label & ~either, either, planes, mean, inverse_sigma, noise, smeared)
+    if smeared:  # trousers that have lost their hue are one part with their shadow on the floor, unless by their light
+        dark = np.asarray(planes[..., 0] <= MAX_LIMB_LIGHT * mean[..., 0])
+        label = _with_limbs(label, np.where(dark & (label == 0), either, 0).astype(np.uint8), planes, mean, inverse_sigma, noise, smeared)
     return label
 
 
+def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float,
+                smeared: bool) -> Labels:
+    """Labels (H, W) with 1, perhaps a person, where the pixels (H, W) that may be either, 255, are a limb's; the rest as in
+    `resolve_shadows`."""
+    import cv2
+
+    firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
+    x, y, width, height = cv2.boundingRect(firm)
+    if not width * height:
+        return label
+    window = slice(y, y + height), slice(x, x + width)
+    number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
+    sums = _part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma)
+    limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
+    if not limbs.any():
+        return label
+    found = np.zeros_like(label)
+    found[window] = limbs[np.asarray(parts, np.intp)]
+    out = label.copy()
+    out |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
+    return out
+
+
 def _limbs(sums: np.ndarray, noise: float) -> Labels:
-    """1 for each part that is a limb, else 0, of shape (K,); sums: `_part_sums` (K, 11); noise: see `resolve_shadows`."""
-    size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
+    """1 for each part that is a limb, else 0, of shape (K,); sums: `_part_sums` (K, 12); noise: see `resolve_shadows`."""
+    size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across, _ = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
     spread = np.sqrt(np.maximum(square / inner - light**2, 0)) * sigma / inner
@@ -75,15 +96,24 @@ def _limbs(sums: np.ndarray, noise: float) -> Labels:
     return ((size >= MIN_PART_PIXELS) & (light <= MAX_LIMB_LIGHT) & ((shaded & joined) | alone)).astype(np.uint8)
 
 
+def _thin_limbs(sums: np.ndarray) -> Labels:
+    """1 for each thin part with the edges or the contact of a limb, else 0, of shape (K,); sums: `_part_sums` (K, 12)."""
+    size, inner, *_, edge, along, open_edge, across, light = sums.T
+    light, touching = light / np.maximum(size, 1), along / np.maximum(edge, 1)
+    sharpness = across / np.maximum(open_edge, 1) / np.maximum(1 - light, 1e-3)
+    joined = (touching >= BROAD_CONTACT) | ((touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE))
+    return ((size >= MIN_PART_PIXELS) & (inner <= THIN) & (light <= MAX_LIMB_LIGHT) & joined).astype(np.uint8)
+
+
 @compiled(nogil=True)
 def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
-    """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 11).
+    """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 12).
 
     Columns: 0 pixels. Over pixels well inside: 1 their number, 2 light (share of the background's brightness), 3 its square, 4 and 5
     difference of Cr and Cb from the darkened background, 6 the background's brightness, 4 to 6 in standard deviations. Sides of pixels
-    on the edge: 7 their number, 8 those along the person, 9 others, 10 gain of light across those others.
+    on the edge: 7 their number, 8 those along the person, 9 others, 10 gain of light across those others. 11 light of all pixels.
     """
-    out = np.zeros((number, 11))
+    out = np.zeros((number, 12))
     height, width = label.shape
     for row in range(parts.shape[0]):
         for column in range(parts.shape[1]):
@@ -93,6 +123,7 @@ def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
             y, x, inside = row + top, column + left, 0
             light = planes[y, x, 0] / max(mean[y, x, 0], np.float32(1))
             out[part, 0] += 1
+            out[part, 11] += light
             for dy, dx in ((-1, 0), (1, 0), (0, -1), (0, 1)):
                 v, u = row + dy, column + dx
                 if 0 <= v < parts.shape[0] and 0 <= u < parts.shape[1] and parts[v, u] == part:

@@ -36,12 +36,40 @@ class Interval(NamedTuple):
     camera: int
     """Its index."""
     why: str
-    """`frozen` or `blind`."""
+    """`frozen`, `blind`, `late` or `early`."""
     begin: float
     """Seconds, of the first frame."""
     end: float
     """Seconds, of the last."""
     frames: int
+
+
+class SetAside:
+    """When cameras were set aside, and why."""
+
+    def __init__(self, number: int) -> None:
+        """For a number of cameras."""
+        self.intervals: list[Interval] = []
+        self._present: list[int | None] = [None] * number
+        """Index of the present interval of each camera."""
+
+    def note(self, seconds: float, why: Sequence[str]) -> None:
+        """Add a frame at a time (s); `why`: of each camera that is set aside, empty of others."""
+        for camera, each in enumerate(why):
+            place = self._present[camera]
+            if not each:
+                self._present[camera] = None
+            elif place is None or self.intervals[place].why != each:
+                self._present[camera] = len(self.intervals)
+                self.intervals.append(Interval(camera, each, seconds, seconds, 1))
+            else:
+                before = self.intervals[place]
+                self.intervals[place] = before._replace(end=seconds, frames=before.frames + 1)
+
+    @property
+    def present(self) -> dict[int, str]:
+        """Why cameras are set aside in the last frame, by index."""
+        return {camera: self.intervals[place].why for camera, place in enumerate(self._present) if place is not None}
 
 
 class CameraWatch:
@@ -53,11 +81,9 @@ class CameraWatch:
 
     def __init__(self, number: int) -> None:
         """For a number of cameras."""
-        self.intervals: list[Interval] = []
+        self.aside = SetAside(number)
         self._last: list[Mask | None] = [None] * number
         self._still, self._since = [0] * number, [0.0] * number
-        self._aside: list[int | None] = [None] * number
-        """Index of the present interval of each camera."""
 
     def __call__(self, seconds: float, masks: Sequence[Mask | None]) -> tuple[Mask | None, ...]:
         """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside."""
@@ -72,17 +98,5 @@ class CameraWatch:
         self._last = [last if now is None else now for now, last in zip(masks, self._last)]
         if sum(mask is not None and not one and not other for mask, one, other in zip(masks, frozen, blind)) < LEAST:
             frozen = [False] * len(frozen)
-        for n in range(len(masks)):
-            self._note(n, seconds, "blind" if blind[n] else "frozen" if frozen[n] else "")
+        self.aside.note(seconds, ["blind" if full else "frozen" if still else "" for full, still in zip(blind, frozen)])
         return tuple(None if one or other else mask for mask, one, other in zip(masks, frozen, blind))
-
-    def _note(self, camera: int, seconds: float, why: str) -> None:
-        place = self._aside[camera]
-        if not why:
-            self._aside[camera] = None
-        elif place is None or self.intervals[place].why != why:
-            self._aside[camera] = len(self.intervals)
-            self.intervals.append(Interval(camera, why, seconds, seconds, 1))
-        else:
-            before = self.intervals[place]
-            self.intervals[place] = before._replace(end=seconds, frames=before.frames + 1)

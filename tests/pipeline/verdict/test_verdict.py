@@ -45,6 +45,8 @@ def test_a_caution_is_its_sentence_and_survives_copies():
     made = Caution("long and whole", "short", HARMFUL)
     for same in (made, copy.deepcopy(made), copy.copy(made)):
         assert (same, same.short, same.weight) == ("long and whole", "short", HARMFUL)
+    assert made.at_most(NOTED).weight == NOTED
+    assert made.at_most(RUINOUS).weight == HARMFUL
     about = made.about("camera 'a'")
     assert (about, about.short, about.weight) == ("camera 'a': long and whole", "camera 'a': short", HARMFUL)
 

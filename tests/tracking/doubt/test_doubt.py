@@ -13,7 +13,7 @@ from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
 from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import PACE, STILL_ALLOWED, steps, stillness
+from shadowpuppet.tracking.doubt.steps import STILL_ALLOWED, Trail, stillness, surprise
 from shadowpuppet.tracking.doubt.variance import VarianceModel, turned, variance_model
 
 JOINTS = ("neck", "left_shoulder", "left_elbow", "left_hand", "right_knee")
@@ -112,23 +112,35 @@ def test_all_limbs_of_a_frozen_picture_are_predicted():
     assert statuses(0.1, 0.1, 0.1, 0.1, 0.1, frozen=True) == ("predicted",) * 3
 
 
-# Steps
+# Motion
 
 
-class Earlier:
-    def __init__(self, seconds: float, points: np.ndarray) -> None:
-        self.seconds, self.points = seconds, points
+def trail(places, rate: float) -> Trail:
+    """The trail of a joint at places (T, 3), and one that stands still."""
+    found = Trail()
+    for n, place in enumerate(places):
+        found = found.with_frame(n / rate, np.array([place, [0, 0, 0]], float))
+    return found
 
 
-@given(st.floats(0.01, 1), st.floats(0, 0.5))
-def test_a_step_is_measured_in_the_same_time_at_any_frame_rate(interval, speed):
-    before = Earlier(3.0, np.zeros((2, 3)))
-    now = np.array([[speed * interval, 0, 0], [0, 0, 0]])
-    np.testing.assert_allclose(steps(now, 3.0 + interval, before), [speed * PACE, 0], atol=1e-9)
+@given(st.floats(4, 120), st.floats(-3, 3), st.integers(0, 40))
+def test_an_even_motion_is_no_surprise_at_any_frame_rate(rate, speed, frames):
+    places = [[speed * n / rate, 0, 0] for n in range(frames + 1)]
+    found = surprise(np.array([places[-1], [0, 0, 0]]), frames / rate, trail(places[:-1], rate))
+    np.testing.assert_allclose(found, 0, atol=1e-9)
 
 
-def test_the_first_frame_has_no_step():
-    np.testing.assert_array_equal(steps(np.ones((2, 3)), 0.0, None), [0, 0])
+@pytest.mark.parametrize("rate", [15, 30, 60])
+def test_a_jump_is_as_surprising_at_any_frame_rate(rate):
+    found = surprise(np.array([[0.2, 0, 0], [0, 0, 0]]), 1.0, trail([[0, 0, 0]] * rate, rate))
+    np.testing.assert_allclose(found, [0.2, 0], atol=1e-9)
+
+
+def test_a_trail_keeps_what_surprise_needs_and_no_more():
+    assert len(trail([[0, 0, 0]] * 500, 100).seconds) < 20
+    assert len(trail([[0, 0, 0]] * 500, 2).seconds) == 3
+    np.testing.assert_array_equal(surprise(np.ones((2, 3)), 0.0, Trail()), [0, 0])
+    np.testing.assert_array_equal(surprise(np.ones((2, 3)), 0.1, trail([[0, 0, 0]], 10)), [0, 0])
 
 
 def test_few_repeated_pictures_are_no_fault_and_more_raise_the_doubt_to_a_bound():

@@ -8,7 +8,7 @@ import numpy as np
 import people
 import pytest
 
-from shadowpuppet.tracking.doubt.mirror import Mirrors
+from shadowpuppet.tracking.doubt.mirror import Mirrors, _weights
 from shadowpuppet.tracking.doubt.monocular import Chains, MonocularDoubt
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
@@ -44,7 +44,8 @@ def doubt(at: np.ndarray, mask: np.ndarray | None = None, before=None, seconds: 
 
 def test_the_same_frame_has_the_same_doubt_and_a_fitting_estimate_of_a_stretched_body_little():
     (one, _), (other, _) = doubt(pose()), doubt(pose())
-    assert all(np.array_equal(a, b) for a, b in zip(one, other))
+    assert all(np.array_equal(a, b) for a, b in zip(one[:3], other[:3]))
+    assert [mode.weight for mode in one.modes] == [mode.weight for mode in other.modes]
     assert one.joint_sd.shape == (len(NAMES), 3)
     assert one.pose_sd.shape == (len(pose()),)
     assert np.isfinite(one.joint_sd).all()
@@ -86,19 +87,57 @@ def test_a_silhouette_that_does_not_change_makes_all_limbs_doubtful_after_a_whil
     assert (found[-1].joint_sd >= found[0].joint_sd - 1e-12).all()
 
 
+FORWARD = {"left_shoulder_abduction": 1.1, "left_shoulder_forward": 0.5, "left_elbow_flexion": 0.3}
+MIRRORS = Mirrors(people.picture())
+
+
+def images(at: np.ndarray, mask: np.ndarray):
+    points = people.picture().points(at[None])[0]
+    return points, MIRRORS.images(at, points, Observation.of(mask))
+
+
 def test_mirror_images_are_found_within_the_joints_limits_and_count_where_the_silhouette_allows_them():
-    forward = pose(left_shoulder_abduction=1.1, left_shoulder_forward=0.5, left_elbow_flexion=0.3)
-    points = people.picture().points(forward[None])[0]
-    mirrors = Mirrors(people.picture())
-    allowed = mirrors.displacements(forward, points, tracker().observe(people.picture().mask(forward), forward))
+    forward = pose(**FORWARD)
+    points, seen = images(forward, people.picture().mask(forward))
+    allowed = seen.displacements(points)
     assert allowed[LEFT_HAND, 2] > 0.1 > 0.05 > allowed[NAMES.index("neck")].max()
     low, high = people.picture().body.skeleton.limits
-    found = mirrors.nearest(forward, points)
+    found = MIRRORS.nearest(forward, points)
     assert (found >= low - 1e-9).all()
     assert (found <= high + 1e-9).all()
-    wall = np.zeros_like(people.picture().mask(forward))
-    elsewhere = mirrors.displacements(forward, points, Observation.of(wall))
-    assert np.isfinite(elsewhere).all()
+    _, elsewhere = images(forward, np.zeros_like(people.picture().mask(forward)))
+    assert np.isfinite(elsewhere.displacements(points)).all()
+
+
+def test_an_arm_that_points_to_the_camera_may_point_away_from_it():
+    forward = pose(**FORWARD)
+    found = doubt(forward)[0].modes
+    points, world = images(forward, people.picture().mask(forward))[0], people.picture().points_world(forward[None])[0]
+    own = [mode for mode in found if mode.limb == "left_arm"]
+    assert own
+    assert [mode.weight for mode in own] == sorted((mode.weight for mode in own), reverse=True)
+    assert 0 < sum(mode.weight for mode in own) < 1
+    T = people.picture().camera.T_camera_world
+    depth = points[LEFT_HAND, 2] - points[NAMES.index("left_shoulder"), 2]
+    other = (own[0].joints[LEFT_HAND] @ T[:3, :3].T + T[:3, 3])[2] - points[NAMES.index("left_shoulder"), 2]
+    assert depth * other < 0 or abs(other - depth) > 0.1
+    assert np.linalg.norm(own[0].joints[LEFT_HAND] - world[LEFT_HAND]) > 0.1
+    assert np.isnan(own[0].joints[[NAMES.index("neck"), RIGHT_HAND, NAMES.index("left_shoulder")]]).all()
+
+
+def test_an_arm_in_the_plane_of_the_picture_has_no_other_place():
+    flat = pose(left_shoulder_abduction=1.57, right_shoulder_abduction=1.57)
+    assert all(mode.weight < 0.35 for mode in doubt(flat)[0].modes)
+
+
+def test_images_that_differ_from_no_other_place_are_no_modes_and_cheaper_ones_weigh_more():
+    ends, same = np.zeros((2, 3)), np.zeros(3)
+    far, near, other = (np.full((2, 3), x) for x in (0.2, 0.19, -0.2))
+    assert _weights(ends, np.array([far, near, ends + 0.01]), same) == {0: pytest.approx(1 / 3)}
+    found = _weights(ends, np.array([far, other, near]), np.array([100.0, 0, 50]))
+    assert list(found) == [1, 2]
+    assert found[1] > found[2] > 0.2
+    assert not _weights(ends, np.array([far] * 3), np.full(3, 1e6))
 
 
 def test_the_mirror_image_of_a_bone_is_as_far_before_as_it_is_behind():

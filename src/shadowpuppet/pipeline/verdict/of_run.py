@@ -17,7 +17,7 @@ MOSTLY_LOST = 0.5
 """Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
 OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, 0.4
 """Shares of frames, lost and with a doubtful limb, above which a run is doubtful."""
-WIDE, FAR = {1: 0.105, 2: 0.06}, {1: 0.125, 2: 0.09}
+WIDE, FAR = {1: 0.105, 2: 0.05}, {1: 0.12, 2: 0.07}
 """Expected joint errors (m) above which a run is doubtful, and bad; for one camera, and for two or more."""
 MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""

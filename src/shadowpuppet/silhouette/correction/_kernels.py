@@ -1,11 +1,11 @@
 """Kernels: points compared with a reduced picture, one by one and for many shifts; pictures moved back; gains of light, and their
-removal."""
+removal; lost detail restored."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.jit import compiled, kernel, reduction_kernel
+from shadowpuppet.jit import compiled, device, kernel, reduction_kernel
 
 
 @compiled(nogil=True)
@@ -220,3 +220,43 @@ def modes(pixels, levels, informative, log, bounds, width, least, window, shifts
             first, last = max(0, round(middle) - window), min(bins, round(middle) + window + 1)
             middle = (moment[last] - moment[first]) / (total[last] - total[first])
         out[c] = middle - bins // 2
+
+
+@kernel
+def restore_detail(image, smooth, scene, detail, inverse, quiet, near, out):
+    """Move pixels (H, W, C) of a picture, uint8, back by the share of `detail` that they have lost: from 0 to 1, that by which the smoothed
+    picture lies from the `scene` toward scene + detail; inverse: of the squared length of `detail`, (H, W), or 0. Pixels nearer than
+    `quiet` to the scene, or farther than `near` from that line, root mean square of the channels, stay as they are."""
+    height, width, channels = image.shape
+    quiet, near = channels * quiet * quiet, channels * near * near
+    for y in range(height):
+        for x in range(width):
+            if channels == 3:
+                _restore_three(image[y, x], smooth[y, x], scene[y, x], detail[y, x], inverse[y, x], quiet, near, out[y, x])
+            else:
+                far, less = np.float32(smooth[y, x, 0]) - scene[y, x, 0], detail[y, x, 0]
+                lost = min(max(far * less * inverse[y, x], np.float32(0)), np.float32(1))
+                rest = far - lost * less
+                lost = lost if far * far > quiet and rest * rest <= near else np.float32(0)
+                out[y, x, 0] = _rounded(np.float32(image[y, x, 0]) - lost * less)
+
+
+@device
+def _restore_three(image, smooth, scene, detail, inverse, quiet, near, out):
+    """`restore_detail` for a pixel of three channels; quiet, near: three times their squares."""
+    f0, f1, f2 = np.float32(smooth[0]) - scene[0], np.float32(smooth[1]) - scene[1], np.float32(smooth[2]) - scene[2]
+    out[0], out[1], out[2] = image[0], image[1], image[2]
+    if f0 * f0 + f1 * f1 + f2 * f2 <= quiet:
+        return
+    d0, d1, d2 = detail[0], detail[1], detail[2]
+    lost = min(max((f0 * d0 + f1 * d1 + f2 * d2) * inverse, np.float32(0)), np.float32(1))
+    r0, r1, r2 = f0 - lost * d0, f1 - lost * d1, f2 - lost * d2
+    if r0 * r0 + r1 * r1 + r2 * r2 <= near:
+        out[0], out[1], out[2] = (_rounded(np.float32(image[0]) - lost * d0), _rounded(np.float32(image[1]) - lost * d1),
+                                  _rounded(np.float32(image[2]) - lost * d2))
+
+
+@device
+def _rounded(value):
+    """A grey level as uint8."""
+    return np.uint8(min(max(value + np.float32(0.5), np.float32(0)), np.float32(255)))

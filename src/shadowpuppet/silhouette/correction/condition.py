@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -128,6 +128,7 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     masks: the person's masks (H, W) in them, for motion blur.
     """
     correction = segmenter.correction or Correction(np.zeros(segmenter.background.image_shape, np.uint8))
+    correction = replace(correction, detail=None)
     frames = [frame for run in runs for frame in run]
     each = [[correction(image) for _, image in run] for run in runs]
     corrected = [[frame.image for frame in run] for run in each]

@@ -1,5 +1,5 @@
 """What is undone in a frame before its pixels are compared with the empty scene: movement of the camera, changes of light, the rest of the
-room."""
+room, detail lost to compression."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image
 from shadowpuppet.silhouette.cleanup import Window
+from shadowpuppet.silhouette.correction.detail import LostDetail
 from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.correction.registration import Gap, Homography, Registration
 from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -41,6 +42,8 @@ class Correction:
     """None: changes of light are not corrected."""
     region: Window | None = None
     """Rows and columns outside which the frame shows the empty scene; None for all."""
+    detail: LostDetail | None = None
+    """None: the film shows the empty scene in all its detail."""
 
     @classmethod
     def of(cls, scene: Image, settings: SilhouetteSettings, region: Window | None = None) -> Correction:
@@ -62,4 +65,6 @@ class Correction:
             blank = self.scene.copy()
             blank[self.region] = image[self.region]
             image = blank
+        if self.detail is not None:
+            image = self.detail(image)
         return Corrected(image, gap, movement, gains)

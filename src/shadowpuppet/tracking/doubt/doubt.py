@@ -10,6 +10,7 @@ import numpy as np
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import joints_of_limbs, limbs_of
+from shadowpuppet.motion.motion import Mode
 from shadowpuppet.tracking.doubt.variance import Components, turned, variance_model
 
 STEP = 1e-4
@@ -31,6 +32,8 @@ class Evidence(NamedTuple):
     """Share of each limb that no silhouette shows: hidden before or behind the body, or outside the picture."""
     frozen: bool = False
     """Whether the picture has not changed for longer than repeated frames explain."""
+    modes: tuple[Mode, ...] = ()
+    """Other places of limbs, of all landmarks."""
 
 
 class Doubt(NamedTuple):
@@ -42,6 +45,8 @@ class Doubt(NamedTuple):
     """Standard deviations of the degrees of freedom, of shape (D,), rad or m."""
     limb_status: tuple[str, ...]
     """Of `motion.STATUSES`, for each of the limbs that the landmarks belong to."""
+    modes: tuple[Mode, ...] = ()
+    """Other places of limbs that the pictures allow."""
 
 
 def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: Skeleton, points: Points, pose: Array, status: str,
@@ -53,7 +58,8 @@ def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: S
     """
     model = variance_model(kind)
     sd = model.sd(names, evidence.components)
-    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), limb_statuses(model.limits, names, sd, evidence, status))
+    statuses = limb_statuses(model.limits, names, sd, evidence, status)
+    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), statuses, evidence.modes)
 
 
 def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) -> Array:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs
 
 GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
@@ -26,6 +30,12 @@ def group_of(joint: str) -> str:
 def lever_of(joint: str) -> float:
     """The joint's lever (m)."""
     return LEVER.get(joint.partition("_")[2], TRUNK_LEVER)
+
+
+@cache
+def levers_of(joints: tuple[str, ...]) -> Array:
+    """The joints' levers (L,), metres. Not to be changed: kept for the next call."""
+    return np.array([lever_of(joint) for joint in joints])
 
 
 def limb_of_part(part: str) -> str:

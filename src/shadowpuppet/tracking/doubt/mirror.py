@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from shadowpuppet.body.segments import dofs_of
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import limb_of
+from shadowpuppet.motion.motion import Mode
 from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -23,7 +26,31 @@ STEPS, DAMPING = 6, 1e-3
 DERIVATIVE = 1e-3
 """Step of its derivatives, rad."""
 ALLOWED = 60.0
-"""A mirror image is half as likely as the estimate if it costs this much more (pixels at 320 x 240), times ln 3."""
+"""A mirror image counts half in the joints' variances if it costs this much more (pixels at 320 x 240), times ln 3."""
+TEMPERATURE, ODDS = 400.0, 2.0
+"""Of modes: cost (pixels at 320 x 240) for which one is less probable by the factor e, as neighbouring pixels err together; and how much
+more probable the estimate is than one that costs the same. Both by the logarithmic score of the weights on made recordings."""
+APART = 0.1
+"""Distance (m) of elbow or wrist from which on two poses of an arm are different modes."""
+MOVED = 0.03
+"""Distance (m) from which on a mode moves a joint."""
+LEAST = 0.05
+"""Weight below which a mode is not stated."""
+
+
+class Images(NamedTuple):
+    """Mirror images of the arms of a pose: other poses that draw nearly the same silhouette."""
+
+    points: Array
+    """Landmarks (A, 3, L, 3) of the three images of each of A arms, camera's frame, metres."""
+    more: Array
+    """What each costs more than the pose (A, 3), pixels at 320 x 240."""
+
+    def displacements(self, points: Array) -> Array:
+        """Root mean square (L, 3), metres, of the landmarks' distances from those of the pose, `points` (L, 3), weighted by what the images
+        cost more."""
+        likely = 1 / (1 + np.exp(np.clip(self.more / ALLOWED, -30, 30)))
+        return np.sqrt(np.einsum("ai,ailx->lx", likely, (self.points - points) ** 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,18 +59,24 @@ class Mirrors:
 
     picture: Picture
 
-    def displacements(self, pose: Array, points: Array, observation: Observation) -> Array:
-        """Root mean square (L, 3), metres, along the camera's axes, by which the landmarks (L, 3) of a pose (D,) would move if the arms'
-        mirror images were true, each weighted by its likelihood."""
-        squares = np.zeros_like(points)
+    def images(self, pose: Array, points: Array, observation: Observation) -> Images:
+        """The mirror images of a pose (D,) with landmarks `points` (L, 3), within the joints' limits."""
         if not self.arms:
-            return squares
+            return Images(np.zeros((0, len(FLIPS), *points.shape)), np.zeros((0, len(FLIPS))))
         poses = self.nearest(pose, points)
-        moved = self.picture.points(poses) - points
-        cost = observation.cost_and_overlap(self.picture.draw(pose))[0]
-        more = np.array([observation.cost_and_overlap(self.picture.draw(each))[0] for each in poses]) - cost
-        likely = 1 / (1 + np.exp(np.clip(more / (ALLOWED * pixel_scale(self.picture.camera.size)), -30, 30)))
-        return np.sqrt(np.einsum("n,nla->la", likely, moved**2))
+        costs = np.array([observation.cost_and_overlap(self.picture.draw(each))[0] for each in (pose, *poses)])
+        more = (costs[1:] - costs[0]).reshape(-1, len(FLIPS)) / pixel_scale(self.picture.camera.size)
+        return Images(self.picture.points(poses).reshape(-1, len(FLIPS), *points.shape), more)
+
+    def modes(self, points: Array, images: Images) -> tuple[Mode, ...]:
+        """Places of the arms, in the world, that differ from the estimate, `points` (L, 3), and from one another; the likelier first."""
+        found, T = list[Mode](), self.picture.camera.T_camera_world
+        for (_, chain), more, own in zip(self.arms, images.more, images.points):
+            for n, weight in _weights(points[chain[1:]], own[:, chain[1:]], more).items():
+                moved = np.linalg.norm(own[n] - points, axis=1) > MOVED
+                places = np.where(moved[:, None], (own[n] - T[:3, 3]) @ T[:3, :3], np.nan)
+                found.append(Mode(limb_of(self.picture.body.landmark_names[chain[0]]), weight, places))
+        return tuple(found)
 
     @cached_property
     def arms(self) -> list[tuple[NDArray[np.int64], list[int]]]:
@@ -58,7 +91,7 @@ class Mirrors:
         low, high = skeleton.limits
         dofs = np.array([arm[0] for arm, _ in jobs])
         ends = np.array([arm[1][1:] for arm, _ in jobs])
-        targets = np.array([_mirrored(points[arm[1]], flips) for arm, flips in jobs])
+        targets = _mirrored(points[[arm[1] for arm in self.arms]]).reshape(-1, 6)
         rows, number = np.arange(len(jobs)), dofs.shape[1]
         poses = np.repeat(pose[None], len(jobs), axis=0)
         # begin half-way to the middle of the limits: from the estimate itself the derivatives may vanish
@@ -76,11 +109,24 @@ class Mirrors:
         return poses
 
 
-def _mirrored(chain: Array, flips: tuple[int, int]) -> Array:
-    """Elbow and wrist (6,) of a chain (3, 3) in which the part along the view of some bones has the other sign."""
-    found, place = [], chain[0]
-    for sign, start, end in zip(flips, chain[:-1], chain[1:], strict=True):
-        view, bone = end / np.linalg.norm(end), end - start
-        place = place + (bone if sign > 0 else bone - 2 * (bone @ view) * view)
-        found.append(place)
-    return np.concatenate(found)
+def _mirrored(chains: Array) -> Array:
+    """Elbow and wrist (A, 3, 6) of chains (A, 3, 3) in which the part along the view of some bones has the other sign, for each of
+    `FLIPS`."""
+    views = chains[:, 1:] / np.linalg.norm(chains[:, 1:], axis=2, keepdims=True)
+    bones = np.diff(chains, axis=1)
+    turned = bones - 2 * (bones * views).sum(2, keepdims=True) * views
+    chosen = np.where(np.array(FLIPS)[None, :, :, None] < 0, turned[:, None], bones[:, None])
+    return (chains[:, None, :1] + np.cumsum(chosen, axis=2)).reshape(len(chains), len(FLIPS), 6)
+
+
+def _weights(ends: Array, images: Array, more: Array) -> dict[int, float]:
+    """Weights, by index, of those images (3, 2, 3) of elbow and wrist that differ from the estimate's, `ends` (2, 3), and from cheaper
+    ones, the cheapest first. `more` (3,): what they cost more, pixels at 320 x 240."""
+    places, kept = [ends], list[int]()
+    for n in np.argsort(more, kind="stable").tolist():
+        if all(np.linalg.norm(images[n] - place, axis=1).max() >= APART for place in places):
+            places.append(images[n])
+            kept.append(n)
+    likely = np.exp(-np.clip(more[kept] / TEMPERATURE, -10, 30))
+    shares = likely / (ODDS + likely.sum())
+    return {n: share for n, share in zip(kept, shares.tolist()) if share >= LEAST}

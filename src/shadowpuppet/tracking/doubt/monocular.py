@@ -17,9 +17,9 @@ from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
-from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
+from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
 from shadowpuppet.tracking.doubt.mirror import Mirrors
-from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
@@ -47,8 +47,8 @@ class Before(NamedTuple):
     """What the next frame needs of this one."""
 
     seconds: float
-    points: Array
-    """Landmarks (L, 3), camera's frame, metres."""
+    trail: Trail
+    """Of the landmarks, camera's frame."""
     mask: Mask
     """Silhouette (H, W)."""
     still: int
@@ -68,7 +68,8 @@ class MonocularDoubt:
         picture = self.tracker.picture
         evidence, now = self.evidence(state, mask, seconds, before)
         R = picture.camera.T_camera_world[:3, :3].T
-        return state_doubt("monocular", evidence, self.names, picture.body.skeleton, picture.points, state.pose, state.status, R), now
+        skeleton = picture.body.skeleton
+        return state_doubt("monocular", evidence, self.names, skeleton, picture.points, state.pose, state.status, R), now
 
     def evidence(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Evidence, Before]:
         """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.
@@ -76,15 +77,19 @@ class MonocularDoubt:
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
         turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
-        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; its last step; the
-        misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the error of the
-        person's distance.
+        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; how far it
+        left its course; the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the
+        error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
-        at, lever = dict(zip(self.names, points)), self.levers
+        at, lever = dict(zip(self.names, points)), levers_of(self.names)
         still = before.still + 1 if before is not None and same_silhouette(before.mask, mask) else 0
+        trail = Trail() if before is None else before.trail
         spread = self._spread(state, points)
-        observation = self.tracker.observe(mask, state.pose)
+        # what is left out beside the body is no evidence for a pose, but one against the limbs near it
+        known = state.observation if state.unexplained is None else None
+        observation = self.tracker.observe(mask, state.pose) if known is None else known
+        images = self._mirrors.images(state.pose, points, observation)
         shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
@@ -95,26 +100,22 @@ class MonocularDoubt:
             "foreshortened": self._chains.foreshortened(points, at["left_shoulder"] - at["right_shoulder"]),
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
-            "step": steps(points, seconds, before),
+            "surprise": surprise(points, seconds, trail),
             "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * lever,
             "still": stillness(still) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
-        components["alternative"] = self._mirrors.displacements(state.pose, points, observation)
+        components["alternative"] = images.displacements(points)
         components["distance"] = points * (0, 0, DISTANCE)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
-        return Evidence(components, unseen, is_frozen(still, seconds - since)), Before(seconds, points, mask, still, since)
+        evidence = Evidence(components, unseen, is_frozen(still, seconds - since), self._mirrors.modes(points, images))
+        return evidence, Before(seconds, trail.with_frame(seconds, points), mask, still, since)
 
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the L landmarks."""
         return self.tracker.picture.body.landmark_names
-
-    @cached_property
-    def levers(self) -> Array:
-        """The joints' levers (L,), metres."""
-        return np.array([lever_of(name) for name in self.names])
 
     @cached_property
     def _chains(self) -> Chains:

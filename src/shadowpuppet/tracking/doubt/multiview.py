@@ -16,8 +16,8 @@ from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
-from shadowpuppet.tracking.doubt.limbs import lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import CONSTANT, steps, stillness
+from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
+from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
 from shadowpuppet.tracking.frozen import same_silhouette
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -29,6 +29,8 @@ FAR = 0.06
 """Distance (m) from a part's surface beyond which a surface point is unexplained."""
 POINTS = 600
 """Number of surface points that are looked at, about."""
+FEW = 3
+"""Number of surface points of a limb below which their distance is not told."""
 AXIS_POINTS = 7
 """Number of points along each part's axis that are looked up in the silhouettes."""
 CROSSING = 0.15
@@ -40,8 +42,8 @@ class Before(NamedTuple):
     """What the next frame needs of this one."""
 
     seconds: float
-    points: Array
-    """Landmarks (L, 3), world, metres."""
+    trail: Trail
+    """Of the landmarks, world."""
     masks: tuple[Mask | None, ...]
     still: int
     """Number of frames for which no camera's silhouette has changed, or some camera's has not."""
@@ -68,46 +70,52 @@ class MultiviewDoubt:
         frame needs.
 
         Of every joint there are: a constant; the particles' spread; of its limb, the surface near it that no part explains, the share
-        outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever; its last step;
-        the misfit of the whole body; silhouettes that do not change; and the distance to its counterpart on the other side, if they
-        were close within the last second.
+        outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever, and the
+        distance of the surface that its parts explain; how far the joint left its course; the misfit of the whole body; silhouettes that do
+        not change; and the distance to its counterpart on the other side, if they were close within the last second.
         """
-        body = self.tracker.body
+        body, levers = self.tracker.body, levers_of(self.names)
         points = body.points(state.pose[None])[0]
+        trail = Trail() if before is None else before.trail
         still = count_still(before, masks)
         apart = self._apart(points, seconds, before)
         weights = normalise(state.particles.log_weights)
         spread = np.sqrt(np.einsum("n,nla->la", weights, (body.points(state.particles.poses) - points) ** 2))
         shares = self._limb_shares(state.pose, surface, masks)
-        columns = dict(zip(("bare", "unexplained", "outside", "unseen"), shares[self._limbs_of_joints].T * self.levers))
-        columns |= {"constant": np.full(len(points), CONSTANT), "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * self.levers,
-                    "still": stillness(still) * self.levers, "step": steps(points, seconds, before)}
+        by_joint = shares[self._limbs_of_joints].T
+        columns = dict(zip(("bare", "unexplained", "outside", "unseen"), by_joint[:4] * levers)) | {"residual": by_joint[4]}
+        columns |= {"constant": np.full(len(points), CONSTANT), "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * levers,
+                    "still": stillness(still) * levers, "surprise": surprise(points, seconds, trail)}
         found = {name: np.repeat(values[:, None], 3, axis=1) for name, values in columns.items()} | {"spread": spread}
         other = np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]
         evidence = Evidence(found | {"swapped": other}, dict(zip(LIMBS, shares[:, 0].tolist())))
-        return evidence, Before(seconds, points, tuple(masks), still, apart)
+        return evidence, Before(seconds, trail.with_frame(seconds, points), tuple(masks), still, apart)
 
     def _limb_shares(self, pose: Array, surface: SurfacePoints, masks: Sequence[Mask | None]) -> Array:
         """For each of `LIMBS`: the share of it without surface points, the points near it that no part explains over those that its
-        surface should have, the share outside a silhouette, and the root of the inverse number of cameras that see it, (5, 4)."""
+        surface should have, the share outside a silhouette, the root of the inverse number of cameras that see it, and the distance
+        (m) of the surface that its parts explain, (5, 5)."""
         T = self.tracker.body.skeleton.forward(pose[None])[0][self._limbs.joints]
         starts, ends = (T[:, :, 3] + (T[:, :, :3] @ places[:, :, None])[..., 0] for places in (self._limbs.starts, self._limbs.ends))
-        near, far = self._explained(starts, ends, surface.points[:: max(1, len(surface.points) // POINTS)])
+        bare, unexplained, residual = self._explained(starts, ends, surface.points[:: max(1, len(surface.points) // POINTS)])
         outside, seen = self._looked_up(starts, ends, masks)
-        return np.stack([near, far, outside, seen], 1)
+        return np.stack([bare, unexplained, outside, seen, residual], 1)
 
-    def _explained(self, starts: Array, ends: Array, points: Array) -> tuple[Array, Array]:
-        """For each of `LIMBS`: the share of it without surface points, and the points near it that no part explains, over those that
-        its surface should have. `starts`, `ends`: of the parts' axes (S, 3); `points` (P, 3)."""
+    def _explained(self, starts: Array, ends: Array, points: Array) -> tuple[Array, Array, Array]:
+        """For each of `LIMBS`: the share of it without surface points; the points near it that no part explains, over those that its
+        surface should have; and the root mean square distance (m) of the others from its parts. `starts`, `ends`: of the parts' axes
+        (S, 3); `points` (P, 3)."""
         along = ends - starts
         share = np.einsum("psa,sa->ps", points[:, None] - starts, along) / np.maximum((along**2).sum(1), 1e-9)
         closest = starts + np.clip(share, 0, 1)[..., None] * along
         distances = np.linalg.norm(points[:, None] - closest, axis=2) - self._radii
         part = distances.argmin(1)
-        limb, explained = self._limb_of_parts[part], distances[np.arange(len(part)), part] < FAR
+        limb, distance = self._limb_of_parts[part], distances[np.arange(len(part)), part]
         expected = np.maximum(self._surface_shares * len(points), 1e-9)
-        good, bad = (np.bincount(limb[which], minlength=len(LIMBS)) / expected for which in (explained, ~explained))
-        return np.clip(1 - good, 0, 1), np.minimum(bad, 2.0)
+        good, bad = (np.bincount(limb[which], minlength=len(LIMBS)) for which in (distance < FAR, distance >= FAR))
+        squares = np.bincount(limb, np.minimum(distance, FAR) ** 2, minlength=len(LIMBS))
+        residual = np.where(good + bad >= FEW, np.sqrt(squares / np.maximum(good + bad, 1)), FAR)
+        return np.clip(1 - good / expected, 0, 1), np.minimum(bad / expected, 2.0), residual
 
     def _looked_up(self, starts: Array, ends: Array, masks: Sequence[Mask | None]) -> tuple[Array, Array]:
         """For each of `LIMBS`: the share of its axis outside a silhouette, and the root of the inverse number of cameras that see it."""
@@ -135,15 +143,10 @@ class MultiviewDoubt:
         forgotten = CROSSING * (seconds - before.seconds) / MEMORY
         return np.minimum(now, before.apart + forgotten)
 
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the L landmarks."""
         return self.tracker.body.landmark_names
-
-    @cached_property
-    def levers(self) -> Array:
-        """The joints' levers (L,), metres."""
-        return np.array([lever_of(name) for name in self.names])
 
     @cached_property
     def _limbs_of_joints(self) -> list[int]:

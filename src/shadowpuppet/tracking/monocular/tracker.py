@@ -41,6 +41,8 @@ class State(NamedTuple):
     """What the silhouettes have beside the body; None if nothing is left out."""
     mask: Mask | None = None
     """The frame's silhouette (H, W), if the next frame needs it."""
+    observation: Observation | None = None
+    """The frame's, which the estimate was judged by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +124,7 @@ class MonocularTracker:
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
         """The state of an estimate (D,), with its cost, overlap and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
-        return State(pose, tuple(particles), cost, overlap, status_of(overlap))
+        return State(pose, tuple(particles), cost, overlap, status_of(overlap), observation=observation)
 
     def is_absent(self, mask: Mask, pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""

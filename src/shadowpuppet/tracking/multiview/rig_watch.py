@@ -1,0 +1,39 @@
+"""Which of several cameras are set aside while a recording or a live session is tracked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Bits
+from shadowpuppet.tracking.frozen import CameraWatch, Interval
+from shadowpuppet.tracking.multiview.out_of_step import StepWatch
+
+
+class RigWatch:
+    """Sets cameras aside that are frozen, blind or out of step, and takes them back: `watch(seconds, masks)` has None in place of their
+    masks. `tracked` follows for each frame set, in the same order."""
+
+    def __init__(self, number: int) -> None:
+        """For a number of cameras."""
+        self._watch, self._steps = CameraWatch(number), StepWatch(number)
+        self._many = number > 1
+
+    def __call__(self, seconds: float, masks: Sequence[Mask | None]) -> tuple[Mask | None, ...]:
+        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside."""
+        return self._steps(seconds, self._watch(seconds, masks))
+
+    def tracked(self, drawn: Sequence[Bits]) -> None:
+        """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""
+        if self._many:
+            self._steps.tracked(drawn)
+
+    @property
+    def intervals(self) -> list[Interval]:
+        """When cameras were set aside."""
+        return self._watch.aside.intervals + self._steps.aside.intervals
+
+    @property
+    def present(self) -> dict[int, str]:
+        """Why cameras are set aside in the last frame set, by index."""
+        return self._watch.aside.present | self._steps.aside.present
