@@ -13,7 +13,6 @@ from rich.text import Text
 from shadowpuppet.cli.flags import AsJson, Config, LookFlags, options_from
 from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import RecordingError, SettingsError, choices
-from shadowpuppet.io.motion import READABLE
 
 if TYPE_CHECKING:
     from shadowpuppet.calibration.overview import CalibrationLook, CameraPlacement
@@ -87,6 +86,7 @@ def refuse_for_recordings(path: Path, to: Path | None, unit: str | None, up: str
 def refuse_other_files(path: Path) -> None:
     """Raise `ShadowPuppetError`, saying what it is, for a file that is no film but a calibration, settings or motion that is not read."""
     from shadowpuppet.io.calibration.calibration_files import ENDINGS, NO_CALIBRATIONS, examine_calibration
+    from shadowpuppet.io.motion import READABLE
 
     ending = path.suffix.lower()
     if not path.is_file():

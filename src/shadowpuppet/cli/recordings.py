@@ -28,7 +28,6 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
-from shadowpuppet.cli.motion import explain_motion
 from shadowpuppet.cli.tables import pairs, show, show_json
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason
 from shadowpuppet.settings import validate
@@ -65,12 +64,13 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
          config: Config = None, verbose: Verbose = False, as_json: AsJson = False, flags: LookFlags = None) -> None:  # fmt: skip
     """Look at a recording, as `track` does before it starts: cameras, scale, background, silhouettes, the person. Or explain a calibration:
     where its cameras stand, what they look at and see together, from above; and write it in another format. Or explain a file of motion."""
-    from shadowpuppet.io.motion.overview import is_motion
+    from shadowpuppet.cli.motion import explain_motion
+    from shadowpuppet.io.motion import READABLE
 
     if calibration.is_explained(recording):
         return calibration.explain(recording, to, unit, up, as_json)
     calibration.refuse_for_recordings(recording, to, unit, up)
-    if is_motion(recording):
+    if recording.suffix.lower() in READABLE and recording.is_file():
         return explain_motion(recording, as_json)
     calibration.refuse_other_files(recording)
     from shadowpuppet.cli.terminal import terminal

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError
-from shadowpuppet.io.motion import READABLE
 from shadowpuppet.io.motion.c3d import read_header
 from shadowpuppet.io.motion.joint_names import columns_of, pairs_of, renamed
 from shadowpuppet.io.motion.motion_files import leg_length, read_motion
@@ -21,7 +20,7 @@ FORMATS = {
     ".c3d": "C3D: points of a motion capture system", ".csv": "CSV: a table of joints", ".npz": "NPZ: arrays of a motion",
     ".parquet": "Parquet: a table of joints", ".trc": "TRC (Motion Analysis, OpenSim): a table of markers",
 }  # fmt: skip
-"""The formats of `READABLE` in words."""
+"""The formats of `io.motion.READABLE` in words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +48,6 @@ class MotionLook:
     """Names of analog channels, which are not read."""
     notes: tuple[str, ...]
     """How unit, axes and frames were understood, a sentence each."""
-
-
-def is_motion(path: Path) -> bool:
-    """Whether a path is a file with the ending of a motion file; reading it may still fail."""
-    return path.suffix.lower() in READABLE and path.is_file()
 
 
 def look_at_motion(path: str | Path) -> MotionLook:
