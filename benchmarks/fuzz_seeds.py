@@ -25,8 +25,10 @@ from shadowpuppet.io.export import export_run
 from shadowpuppet.io.humaneva import read_sync
 from shadowpuppet.io.intervals import read_intervals
 from shadowpuppet.io.motion.amc import read_mocap
+from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion, read_truth
 from shadowpuppet.io.motion.opensim import read_mot
+from shadowpuppet.io.motion.overview import look_at_motion
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import Person, read_person, write_person
 from shadowpuppet.io.prior import read_prior, write_prior
@@ -51,6 +53,8 @@ READERS: dict[str, Callable[[Path], object]] = {
     "intervals": read_intervals,
     "joints": read_joints,
     "motion": read_motion,
+    "look": look_at_motion,
+    "names": read_names,
     "truth": read_truth,
     "skeleton": lambda path: read_mocap(path.parent / "01_01.amc"),
     "mot": read_mot,
@@ -108,6 +112,9 @@ def write(folder: Path) -> None:
     (folder / "tables" / "motion.npz").unlink()
     (folder / "intervals" / "intervals.csv").write_bytes((run / "intervals.csv").read_bytes())
     _motions(folder, run, rng)
+    for path in (folder / "motion").iterdir():
+        (folder / "look" / path.name).write_bytes(path.read_bytes())
+    (folder / "names" / "names.toml").write_text('left_hip = "bone 1"\nleft_knee = "bone 2"\n"head" = "skull"\n')
     (folder / "sync" / "a.ofs").write_text("82\n61\n2.001\n5 6 7\n")
     (folder / "options" / "all.toml").write_text(options_text(make_options({})))
     (folder / "options" / "some.toml").write_text('preset = "liu2011"\nheight = 1.8\n[tracker.arm]\nparticles = 30\n')

@@ -41,7 +41,7 @@ def test_a_skeleton_of_unknown_names_and_markers_are_explained_too(tmp_path):
 
 def test_what_is_malformed_is_said(tmp_path):
     assert set(FORMATS) == set(READABLE)
-    for name, text in (("a.bvh", "HIERARCHY"), ("a.trc", "1"), ("a.csv", "time\n0\n")):
+    for name, text in (("a.bvh", "HIERARCHY"), ("a.trc", "1"), ("a.csv", "time\n0\n"), ("b.csv", "time,neck_x,neck_y,neck_z\n")):
         (tmp_path / name).write_text(text)
         with pytest.raises(FormatError, match=name):
             look_at_motion(tmp_path / name)

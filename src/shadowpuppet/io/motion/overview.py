@@ -56,6 +56,8 @@ def look_at_motion(path: str | Path) -> MotionLook:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         table, problem = _read(path)
+    if not len(table.times):
+        raise FormatError(f"{path}: found no frame, expected a motion")
     notes = [str(warning.message).removeprefix(f"{path}: ") for warning in said]
     names = table.names
     known = {ours: names[n] for ours, n in columns_of(names).items()}
