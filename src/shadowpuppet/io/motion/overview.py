@@ -50,6 +50,7 @@ class MotionLook:
     """How unit, axes and frames were understood, a sentence each."""
 
 
+@np.errstate(all="ignore")  # impossible numbers, as in `read_motion`
 def look_at_motion(path: str | Path) -> MotionLook:
     """What a motion file holds; a BVH file of unknown names is read in its own unit. Raises `FormatError` if it is malformed."""
     path = Path(path)
