@@ -6,13 +6,14 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from shadowpuppet.pipeline.verdict.verdict import Verdict
+if TYPE_CHECKING:
+    from shadowpuppet.pipeline.verdict.verdict import Verdict
 
 
 def show(*parts: RenderableType) -> None:
