@@ -61,7 +61,7 @@ def test_sizes_go_to_arrays_and_mappings_and_back():
     ({"upper_arm_length": 30.0}, "size upper_arm_length: found 30.0, expected 0.005 to 2.0 metres"),
     ({"neck_gap": -0.3}, "size neck_gap: found -0.3, expected -0.2"),
     ({"waist_width": math.nan}, "size waist_width: found nan"),
-    ({"waist_width": math.inf}, "size waist_width: found inf"),
+    ({"waist_width": math.inf}, "waist_width: found inf"),
 ])
 def test_what_is_no_size_is_said(values, said):
     mapping = {**dict(zip(NAMES, SIZES.to_array().tolist())), **values}

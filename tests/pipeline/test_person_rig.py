@@ -70,7 +70,7 @@ def errors(run: Run) -> np.ndarray:
 
 def tracked(shell, recording, *tokens) -> Run:
     few = ("--multiview.particles", 6, "--training.regions", 6)
-    code, _, err = shell("track", recording, "-o", "run", "--quiet", "--masks", *few, *tokens)
+    code, _, err = shell("track", recording, "-o", "run", "--quiet", "--force", "--masks", *few, *tokens)
     assert code == 0, err
     assert all(line.startswith("warning: camera") for line in err.splitlines()), err
     return read_run(Path("run"))

@@ -278,7 +278,7 @@ def test_a_flag_makes_faults_and_the_table_names_them(shell, tmp_path):
 
 def test_made_recordings_can_be_looked_at_and_tracked(shell):
     assert shell("-o", "made", "--motion", "wave_hands", "--size", "160x120", "--rate", "8", "--seconds", "2", "--quiet") == (0, "", "")
-    code, out, _ = shell("made", command="info")
+    code, out, _ = shell("made", "--verbose", command="info")
     assert code == 0
     assert "these silhouettes overlap the ready ones by 0.9" in out
     quick = ["--tracker.cycles", 1, "--tracker.explore", 20, "--initialization.rounds", 20, "--initialization.sweeps", 2]

@@ -671,7 +671,7 @@ def test_rubbish_prints_nothing_clients_are_counted_and_their_memory_comes_back(
             with connect(url, **known) as client:
                 client.recv(timeout=5)
         end = monotonic() + 10
-        while sum(isinstance(each, viser.ClientHandle) for each in gc.get_objects()) > 2:
+        while sum(issubclass(type(each), viser.ClientHandle) for each in gc.get_objects()) > 2:  # of a dead proxy only the type is known
             assert monotonic() < end, "clients that left are still kept"
             sleep(0.05)
         assert capfd.readouterr() == ("", "")

@@ -212,17 +212,17 @@ def test_runs_of_another_version_are_told(recording, tmp_path):
 
 def test_a_full_disk_fails_the_runs_that_it_hits(recording, tmp_path, monkeypatch):
     """As the writer meets it: no room for a row. Seed 1 finds room at its second try; seed 2 never does."""
-    hit, append = [], RunWriter._append
+    hit, write = [], RunWriter.write
 
-    def full(self, *rows):
+    def full(self, frame):
         seed = self.info["settings"]["seed"]
         if len(self._motion) == 3 and (seed == 2 or (seed == 1 and 1 not in hit)):
             hit.append(seed)
             with self._system_errors():
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        append(self, *rows)
+        write(self, frame)
 
-    monkeypatch.setattr(RunWriter, "_append", full)
+    monkeypatch.setattr(RunWriter, "write", full)
     notes = Notes()
     batch = run_batch([recording], tmp_path / "out", QUICK, range(4), workers=0, retries=2, listener=notes)
     assert [run.status for run in batch.runs] == ["done", "done", "failed", "done"]
