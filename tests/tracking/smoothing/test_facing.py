@@ -1,4 +1,4 @@
-"""A person who turns round before one camera: the mirrored pose draws the same, and a turn is told from a look aside."""
+"""A person who turns round before one camera: the mirrored pose draws the same, but a turn can be distinguished from a look aside."""
 
 from __future__ import annotations
 

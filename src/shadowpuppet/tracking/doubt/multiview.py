@@ -30,7 +30,7 @@ FAR = 0.06
 POINTS = 600
 """Number of surface points that are looked at, about."""
 FEW = 3
-"""Number of surface points of a limb below which their distance is not told."""
+"""Number of surface points of a limb below which their distance is unknown."""
 AXIS_POINTS = 7
 """Number of points along each part's axis that are looked up in the silhouettes."""
 CROSSING = 0.15
