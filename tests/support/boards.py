@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from shadowpuppet.calibration.boards.board import Board, board_from
+from shadowpuppet.calibration.boards.board import Board, board_from, board_text
 from shadowpuppet.calibration.boards.detection import View
+from shadowpuppet.calibration.boards.printing import rectangles
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.geometry import Array, rigid, rotation_about, rotation_from_vector
+from shadowpuppet.geometry import Array, inverse, rigid, rotation_about, rotation_from_vector
 
 BOARD = board_from("charuco 7x5", 0.11)
 SIZE = (1280, 720)
@@ -87,3 +91,53 @@ def moments(cameras: list[Camera], rng: np.random.Generator, count: int = 100, s
         views.append(found)
         speeds.append(moving)
     return views, speeds
+
+
+def drawn(camera: Camera, T_world_board: Array, board: Board = BOARD, mirrored: bool = False) -> NDArray[np.uint8]:
+    """The picture (H, W) of a board as a camera without distortion sees it from its front."""
+    texels = 400.0
+    wide, high = (round((side + 0.06) * texels) for side in board.size)
+    print_ = np.full((high, wide), 230, np.uint8)
+    for x, y, w, h in rectangles(board):
+        a, b, c, d = (round((v + 0.03) * texels) for v in (x, y, x + w, y + h))
+        print_[b:d, a:c] = 20
+    T = camera.T_camera_world @ T_world_board
+    texel = np.array([[1 / texels, 0, (0.5 - wide / 2) / texels], [0, 1 / texels, (0.5 - high / 2) / texels], [0, 0, 1]])
+    H = camera.matrix @ np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]]) @ texel
+    ground = np.full(camera.size[::-1], 120, np.uint8)
+    image = cv2.warpPerspective(print_, H, camera.size, dst=ground, flags=cv2.INTER_AREA, borderMode=cv2.BORDER_TRANSPARENT)
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.7), np.uint8)
+    return np.ascontiguousarray(image[:, ::-1]) if mirrored else image
+
+
+def pictured(folder: Path, cameras: list[Camera], count: int = 10, mirrored: bool = False) -> Path:
+    """A session of pictures in a folder: cameras without distortion in a narrow arc that see the front of a board."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "board.toml").write_text(board_text(BOARD))
+    rng = np.random.default_rng(1)
+
+    def write(kind: str, camera: Camera, poses: list[Array]) -> None:
+        for n, T in enumerate(poses):
+            place = folder / kind / camera.name
+            place.mkdir(parents=True, exist_ok=True)
+            cv2.imwrite(str(place / f"{n:02}.png"), drawn(camera, T, mirrored=mirrored))
+
+    middle = np.mean([camera.centre for camera in cameras], axis=0)
+    poses = []
+    for _ in range(count):  # toward the cameras' middle, tilted
+        place = np.array([*rng.uniform(-0.5, 0.5, 2), rng.uniform(0.7, 1.2)])
+        z = (place - middle) / np.linalg.norm(place - middle)
+        x = np.cross([0, 0, -1.0], z)
+        x /= np.linalg.norm(x)
+        R = np.column_stack([x, np.cross(z, x), z]) @ rotation_from_vector(rng.uniform(-0.5, 0.5, 3))
+        poses.append(rigid(R, place))
+    for camera in cameras:
+        write("extrinsics", camera, poses)
+        write("floor", camera, [FLOOR])
+        own = inverse(camera.T_camera_world)
+        near = []
+        for n in range(14):
+            tilt = 0.75 * np.array([np.cos(2.4 * n), np.sin(2.4 * n), 0.2])
+            near.append(own @ rigid(rotation_from_vector(tilt), [0.35 * np.cos(1.7 * n), 0.25 * np.sin(1.7 * n), 1.1 + 0.1 * (n % 5)]))
+        write("intrinsics", camera, near)
+    return folder

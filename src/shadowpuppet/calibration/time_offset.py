@@ -30,8 +30,9 @@ LEAST_MOTION = 0.5
 """Least standard deviation (robust) of a signal, pixels: less is the grid of the pixels."""
 LEAST_SCORE = 2.0
 """Standard errors by which two signals must be more alike, at their best shift, than chance makes them at the best of all shifts tried."""
-QUANTILE = 1.645
-"""Half-width of a 90 % interval over the standard deviation."""
+QUANTILE, NOISE_FACTOR = 1.645, 1.56
+"""Half-width of a 90 % interval over the standard deviation, and a factor on the variance from noise: the trimmed minimum is less exact
+than least squares would be; chosen on simulated signals, of whose true shifts the intervals then hold 86 to 91 %."""
 SOLVER_ROUNDS = 30
 """Rounds of iteratively reweighted least squares for all cameras."""
 
@@ -143,7 +144,7 @@ def _variance(signals: Array, shift: int, most: int) -> float | None:
         slope = np.gradient((a + b) / 2)
         noise = max(float(left.var()), 0.05**2) / _independent(_memory(left))
         information += float((np.clip(slope, *np.percentile(slope, (2, 98))) ** 2).sum()) / noise
-    return 1 / information if alike and information > 0 else None
+    return NOISE_FACTOR / information if alike and information > 0 else None
 
 
 def _memory(signal: Array) -> float:

@@ -261,7 +261,7 @@ def _described(board: Board, lens: _Lens, model: str, held_out: float) -> LensFi
     T = np.array(lens.poses)
     seen = observations(board, [(0, b, view) for b, view in enumerate(lens.views)])
     solved = adjust(Bundle((lens.camera,), T, np.zeros(1)), seen, Free([False], [True] * len(T), [False], [True]))
-    tilts = np.degrees(np.arccos(np.clip(np.abs(np.einsum("bi,bi->b", T[:, :3, 2], _unit(T[:, :3, 3]))), 0, 1)))
+    tilts = np.degrees(np.arccos(np.clip(np.abs(T[:, 2, 2]), 0, 1)))
     distances = np.linalg.norm(T[:, :3, 3], axis=1)
     size = np.array(lens.camera.size)
     cells = np.unique(np.clip((seen.pixels / size * CELLS).astype(int), 0, np.array(CELLS) - 1), axis=0)
@@ -271,10 +271,6 @@ def _described(board: Board, lens: _Lens, model: str, held_out: float) -> LensFi
         coverage=len(cells) / (CELLS[0] * CELLS[1]), tilt=float(np.percentile(tilts, 90)),
         distances=float(np.percentile(distances, 95) / np.percentile(distances, 5)), corners=seen.pixels, residuals=solved.residuals,
     )  # fmt: skip
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def lens_advice(fit: LensFit) -> list[str]:
