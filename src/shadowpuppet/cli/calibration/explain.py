@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 ARROWS = "→↗↑↖←↙↓↘"
 """Arrows by viewing direction, in eighths of a turn counter-clockwise from +x."""
-UNREADABLE = (".abc", ".asf", ".blend", ".dae", ".fbx", ".glb", ".gltf", ".json", ".md", ".mot", ".osim", ".sto", ".tsv", ".usd", ".usda",
+UNREADABLE = (".abc", ".asf", ".blend", ".dae", ".fbx", ".glb", ".gltf", ".md", ".mot", ".osim", ".sto", ".tsv", ".usd", ".usda",
               ".usdc", ".usdz", ".vsk", ".xls", ".xlsx")
 """Endings of files about motion and cameras that are not read."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
