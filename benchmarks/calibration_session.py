@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -30,8 +31,8 @@ LENSES = (((0.72, 0.722, 6, -5), (-0.12, 0.05, 0.0008, -0.0006)), ((0.70, 0.70, 
 """Focal lengths over the width and the principal point's distance from the middle, pixels of 1280; coefficients. The last: fisheye."""
 
 
-def rig(count: int, size: tuple[int, int], fisheye: bool = False) -> list[Camera]:
-    """Cameras of known lens in a ring of 3.2 m."""
+def rig(count: int, size: tuple[int, int], fisheye: bool = False, arc: float = 360.0) -> list[Camera]:
+    """Cameras of known lens on an arc (degrees) of 3.2 m."""
     cameras = []
     for n in range(count):
         (fx, fy, dx, dy), coefficients = LENSES[n % (5 if fisheye else 4)]
@@ -39,7 +40,7 @@ def rig(count: int, size: tuple[int, int], fisheye: bool = False) -> list[Camera
         bent[: len(coefficients)] = coefficients[:4]
         scale = size[0] / 1280
         K = np.array([[fx * size[0], 0, (size[0] - 1) / 2 + dx * scale], [0, fy * size[0], (size[1] - 1) / 2 + dy * scale], [0, 0, 1]])
-        angle = 2 * np.pi * n / count + 0.2 * np.sin(3 * n)
+        angle = np.radians(arc) * n / count + 0.2 * np.sin(3 * n)
         place = np.array([3.2 * np.cos(angle), 3.2 * np.sin(angle), 1.4 + 0.3 * (n % 3)])
         z = np.array([0, 0, 0.9]) - place
         z /= np.linalg.norm(z)
@@ -82,7 +83,7 @@ class Renderer:
         coarse = self.rng.uniform(60, 190, (size[1] // 40 + 2, size[0] // 40 + 2)).astype(np.float32)
         wall = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
         for _ in range(12):
-            a, b = self.rng.integers(0, size, (2, 2))
+            a = self.rng.integers(0, size)
             cv2.rectangle(wall, [int(v) for v in a], [int(v) for v in a + 30], float(self.rng.uniform(20, 230)), -1)
         return np.clip(cv2.GaussianBlur(wall, (0, 0), 1.0), 0, 255)
 
@@ -98,27 +99,39 @@ class Renderer:
         return np.repeat(np.clip(image, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
 
     def _draw(self, image: np.ndarray, T: np.ndarray) -> None:
+        window = self._window(T)
         H = np.linalg.inv(np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]]))  # ray -> board's x, y
-        at = self.rays @ H.T.astype(np.float32)
+        at = self.rays[window] @ H.T.astype(np.float32)
         with np.errstate(divide="ignore", invalid="ignore"):
             xy = at[..., :2] / at[..., 2:]
         half = (np.array(self.board.size) / 2 + MARGIN).astype(np.float32)
         inside = (np.abs(xy) < half).all(-1) & (at[..., 2] > 0)
         place = (np.where(inside[..., None], xy, 0) + half) * TEXELS - 0.5
-        spots = np.argwhere(inside)
-        if not len(spots):
+        if not inside.any():
             return
-        (y0, x0), (y1, x1) = spots.min(0) // 2, spots.max(0) // 2 + 1
-        part = np.s_[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
         zoom = max(1.0, TEXELS * float(np.linalg.norm(T[:3, 3])) / self.camera.matrix[0, 0] / 2)
         side = self.front if float(T[:3, 2] @ T[:3, 3]) > 0 else self.back
         blurred = cv2.GaussianBlur(side, (0, 0), 0.4 * zoom) if zoom > 1.3 else side
-        drawn = cv2.remap(blurred, place[part].astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        drawn = cv2.remap(blurred, place.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         light = 0.75 + 0.25 * abs(float(T[2, 2]))
-        shape = (y1 - y0, 2, x1 - x0, 2)
-        share = inside[part].reshape(shape).mean((1, 3))
-        value = (light * drawn * inside[part]).reshape(shape).sum((1, 3)) / np.maximum(inside[part].reshape(shape).sum((1, 3)), 1)
-        image[y0:y1, x0:x1] = image[y0:y1, x0:x1] * (1 - share) + value * share
+        shape = (inside.shape[0] // 2, 2, inside.shape[1] // 2, 2)
+        share = inside.reshape(shape).mean((1, 3))
+        value = (light * drawn * inside).reshape(shape).sum((1, 3)) / np.maximum(inside.reshape(shape).sum((1, 3)), 1)
+        part = np.s_[window[0].start // 2 : window[0].stop // 2, window[1].start // 2 : window[1].stop // 2]
+        image[part] = image[part] * (1 - share) + value * share
+
+    def _window(self, T: np.ndarray) -> tuple[slice, slice]:
+        """Samples among which the board is: rows and columns of `rays`."""
+        w, h = (side / 2 + MARGIN for side in self.board.size)
+        edge = np.linspace(-1, 1, 9)
+        outline = np.concatenate([np.stack([a * w + 0 * edge, b * h + 0 * edge], 1) for a, b in ((edge, -1), (edge, 1), (-1, edge), (1, edge))])
+        pixels = replace(self.camera, T_camera_world=T).project(np.pad(outline, ((0, 0), (0, 1))))
+        size = np.array(self.camera.size)
+        if not np.isfinite(pixels).all():
+            return slice(0, 2 * size[1]), slice(0, 2 * size[0])
+        low = np.clip(np.floor(pixels.min(0)) - 3, 0, size).astype(int)
+        high = np.clip(np.ceil(pixels.max(0)) + 4, low, size).astype(int)
+        return slice(2 * low[1], 2 * high[1]), slice(2 * low[0], 2 * high[0])
 
 
 def _smooth(rng: np.random.Generator, knots: np.ndarray, seconds: float) -> Callable[[float], np.ndarray]:
@@ -216,11 +229,13 @@ def main() -> None:
     parser.add_argument("--size", type=int, nargs=2, default=(1280, 720))
     parser.add_argument("--board", default="charuco 7x5")
     parser.add_argument("--square", type=float, default=0.11)
+    parser.add_argument("--arc", type=float, default=360.0, help="degrees of the circle on which cameras stand")
     parser.add_argument("--fisheye", action="store_true", help="the fifth camera has a fisheye lens")
     parser.add_argument("--delays", type=float, nargs="*", default=(), help="delays of the films of the carried board, frames")
     parser.add_argument("--seed", type=int, default=1)
-    args = parse(parser, lambda folder: [folder, "--cameras", 3, "--seconds", 5, "--rate", 10, "--size", 480, 360, "--square", 0.2])
-    cameras, board = rig(args.cameras, tuple(args.size), args.fisheye), board_from(args.board, args.square)
+    args = parse(parser, lambda folder: [folder, "--cameras", 2, "--seconds", 4, "--rate", 8, "--size", 480, 360, "--square", 0.2,
+                                          "--arc", 100])
+    cameras, board = rig(args.cameras, tuple(args.size), args.fisheye, args.arc), board_from(args.board, args.square)
     delays = [*(d / args.rate for d in args.delays), *[0.0] * args.cameras][: args.cameras]
     if not (args.folder / "extrinsics" / f"cam{args.cameras}.mp4").exists():
         make_session(args.folder, board, cameras, args.seconds, args.rate, delays, args.seed)

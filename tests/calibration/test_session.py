@@ -68,7 +68,7 @@ def test_a_mirrored_film_is_told(copy):
 
 def test_another_board_than_was_filmed(copy):
     (copy / "board.toml").write_text(board_text(replace(boards.BOARD, dictionary="6X6_250", marker=0.0)))
-    with pytest.raises(CalibrationError, match="found 0 different views .*is it the board that the settings describe"):
+    with pytest.raises(CalibrationError, match=r"found 0 different views .*is it the board that the settings describe"):
         calibrate(open_session(copy))
 
 

@@ -18,7 +18,8 @@ def write_results(found: Calibrated, path: Path, page: Callable[[Calibrated], st
     """Write the calibration to `path` (.toml), and what `page` makes of it beside it (.html); returns the files written. A calibration
     that is there is kept under another name. Raises `CalibrationError` if a file cannot be written."""
     if path.suffix.lower() != ".toml":
-        raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .toml; `shadowpuppet info FILE --to` writes other formats")
+        raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .toml; `shadowpuppet info FILE --to` writes other "
+                               "formats")
     kept = keep_old(path)
     write_calibration(path, found.cameras)
     written = [path, *([kept] if kept is not None else [])]
@@ -37,7 +38,8 @@ def keep_old(path: Path) -> Path | None:
     `CalibrationError`."""
     if not path.exists():
         return None
-    place = next((place for n in range(1, MOST_KEPT) if not (place := path.with_name(f"{path.stem}.before{n}{path.suffix}")).exists()), None)
+    places = (path.with_name(f"{path.stem}.before{n}{path.suffix}") for n in range(1, MOST_KEPT))
+    place = next((place for place in places if not place.exists()), None)
     if place is None:
         raise CalibrationError(f"{path}: {MOST_KEPT - 1} older files of this name are kept already; remove some")
     try:

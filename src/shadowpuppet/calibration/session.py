@@ -139,8 +139,9 @@ def calibrate(session: Session, lenses: Mapping[str, Camera] | None = None, say:
 def _lens(name: str, board: Board, films: Sequence[BoardFilm]) -> LensFit:
     sizes = {film.size for film in films}
     if len(sizes) > 1:
-        raise CalibrationError(f"camera {name!r}: its films have {choices(f'{w} x {h}' for w, h in sorted(sizes))} pixels, expected one size: "
-                               "film all with the same setting, as zoom and cropping change the lens")
+        found = choices(f"{w} x {h}" for w, h in sorted(sizes))
+        raise CalibrationError(f"camera {name!r}: its films have {found} pixels, expected one size: film all with the same "
+                               "setting, as zoom and cropping change the lens")
     views = films[0].found
     for film in films[1:] if len(views) < 20 else []:
         views = views + film.found
@@ -167,8 +168,8 @@ def _placed(session: Session, names: Sequence[str], cameras: Sequence[Camera], c
             laid: Mapping[str, BoardFilm]) -> tuple[Placement, list[str]]:
     board, notes = session.board, list[str]()
     if board.symmetric and len(names) > 1:
-        raise CalibrationError(f"the {board.text} looks the same after half a turn, so that two cameras cannot know which corner is which: "
-                               "take one with an odd and an even number of squares, or a ChArUco board")
+        raise CalibrationError(f"the {board.text} looks the same after half a turn, so that two cameras cannot know which corner is "
+                               "which: take one with an odd and an even number of squares, or a ChArUco board")
     missing = [name for name in names if name not in carried and name not in laid]
     if missing:
         raise CalibrationError(f"{session.folder}: extrinsics/ has no film of {choices(missing)}, expected one of every camera")
@@ -188,8 +189,8 @@ def _placed(session: Session, names: Sequence[str], cameras: Sequence[Camera], c
         notes.append("no camera finds the board in floor/: the floor is unknown")
     placed = place_cameras(cameras, board, moments, floor or None, speeds if any(speeds) else None)
     if not placed.floor:
-        notes.append("no film of the board on the floor: the world's z is up as the pictures have it, its origin is a camera, and the height "
-                     "of the floor is unknown; lay the board where the origin is to be, and film it: floor/CAMERA.mp4")
+        notes.append("no film of the board on the floor: the world's z is up as the pictures have it, its origin is a camera, and the "
+                     "height of the floor is unknown; lay the board where the origin is to be, and film it: floor/CAMERA.mp4")
     return placed, notes
 
 
@@ -214,8 +215,8 @@ def place_advice(placed: Placement, carried: Mapping[str, BoardFilm]) -> list[st
         if not len(own):
             said.append(f"camera {camera.name!r}: none of its views of the board fits the others': film the carried board again")
         elif rms > limit:
-            said.append(f"camera {camera.name!r}: the carried board is {rms:.1f} pixels off where the other cameras have it (expected under "
-                        f"{limit:.2g}): carry it slowly, hold it still now and then, and begin the films together")
+            said.append(f"camera {camera.name!r}: the carried board is {rms:.1f} pixels off where the other cameras have it (expected "
+                        f"under {limit:.2g}): carry it slowly, hold it still now and then, and begin the films together")
         place, angle = DOUBT_FACTOR * solved.place_sd[n], DOUBT_FACTOR * solved.angle_sd[n]
         if place > MAX_PLACE_SD or angle > MAX_ANGLE_SD:
             said.append(f"camera {camera.name!r}: its place is known to {1000 * place:.0f} mm and its direction to {np.degrees(angle):.2f} "
@@ -238,5 +239,5 @@ def _narrow(placed: Placement) -> list[str]:
     angle = float(np.arccos(np.clip(u @ v / max(float(np.linalg.norm(u) * np.linalg.norm(v)), 1e-12), -1, 1)))
     if angle > MIN_VIEW_ANGLE:
         return []
-    return [f"the two cameras see the room from nearly the same direction ({np.degrees(angle):.1f} degrees apart, {np.linalg.norm(a - b):.2f} "
-            "m): depth will be uncertain in every recording; place them 60 to 120 degrees apart"]
+    return [f"the two cameras see the room from nearly the same direction ({np.degrees(angle):.1f} degrees apart, "
+            f"{np.linalg.norm(a - b):.2f} m): depth will be uncertain in every recording; place them 60 to 120 degrees apart"]

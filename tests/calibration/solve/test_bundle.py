@@ -156,5 +156,5 @@ def test_a_board_held_square_at_one_distance_is_told():
 
 def test_few_views_say_what_to_film():
     views = boards.shown(boards.ring(1)[0], np.random.default_rng(2), 4)
-    with pytest.raises(CalibrationError, match="found 4 different views of the board .*film it again"):
+    with pytest.raises(CalibrationError, match=r"found 4 different views of the board .*film it again"):
         solve_lens("cam1", boards.BOARD, views, boards.SIZE)

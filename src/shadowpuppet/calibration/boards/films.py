@@ -118,8 +118,8 @@ def _read_film(path: Path, facts: _Facts, board: Board, times: Array, start: flo
         for file in chosen:
             found_size = read_image(file).shape[1::-1]
             if found_size != facts.size:
-                raise CalibrationError(f"{file}: found {found_size[0]} x {found_size[1]} pixels, expected {facts.size[0]} x {facts.size[1]} "
-                                       f"as in {chosen[0].name}")
+                raise CalibrationError(f"{file}: found {found_size[0]} x {found_size[1]} pixels, expected {facts.size[0]} x "
+                                       f"{facts.size[1]} as in {chosen[0].name}")
         views = [detector.find(_grey(read_image(file)), float(n)) for n, file in enumerate(chosen)]
         _check_not_mirrored(path, board, detector, views, [_grey(read_image(file)) for file in chosen[:MIRROR_TRIES]])
         return BoardFilm(path, facts.size, 0.0, np.arange(len(chosen), dtype=float), tuple(views), (None,) * len(views))

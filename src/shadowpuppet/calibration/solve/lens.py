@@ -1,4 +1,5 @@
-"""The lens of a camera from views of a board: focal lengths, principal point and the model of distortion that predicts unseen views best."""
+"""The lens of a camera from views of a board: focal lengths, principal point, and the model of distortion that predicts unseen views
+best."""
 
 from __future__ import annotations
 

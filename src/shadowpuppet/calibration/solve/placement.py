@@ -93,7 +93,8 @@ def _robust(rig: tuple[Camera, ...], board: Board, boards: Array, views: Sequenc
         shows = [bool(np.any(seen.velocities[seen.camera == n])) for n in range(C)]
         held = laid is not None and bool(watched[laid])
         watched[laid if held else 0] &= not held
-        free = Free([True] * C if held else others, watched, [timed and attempt > 0 and other and moves for other, moves in zip(others, shows)], [False] * C)
+        late = [timed and attempt > 0 and other and moves for other, moves in zip(others, shows)]
+        free = Free([True] * C if held else others, watched, late, [False] * C)
         solved = adjust(start, seen, free)
         start = solved.bundle
         number = np.repeat(np.arange(len(keep)), [len(view.ids) for _, _, view in chosen])
@@ -134,7 +135,8 @@ def _check_linked(cameras: Sequence[Camera], poses: Sequence[dict[int, list[Pose
     bridges = [pair for pair in pairs if (pair.first in alone) != (pair.second in alone)]
     if any(pair.two_sided for pair in bridges):
         pair = next(pair for pair in bridges if pair.two_sided)
-        raise CalibrationError(f"cameras {cameras[pair.first].name!r} and {cameras[pair.second].name!r} see the two sides of the board, and "
+        both = f"{cameras[pair.first].name!r} and {cameras[pair.second].name!r}"
+        raise CalibrationError(f"cameras {both} see the two sides of the board, and "
                                "both have the same pattern: which side is which cannot be known; cover one side, and film the board "
                                "again so that neighbouring cameras see the same side at the same time")
     if not any(n in each for n in alone for each in poses):
@@ -142,9 +144,9 @@ def _check_linked(cameras: Sequence[Camera], poses: Sequence[dict[int, list[Pose
                                "toward it and one neighbour")
     if bridges:
         most = max(bridges, key=lambda pair: pair.seen)
-        raise CalibrationError(f"camera {names} and the others ({rest}) see the board at the same time in {most.seen} moments, but these do "
-                               "not agree on where they stand: were the films begun together (say in board.toml's [start] when each began), "
-                               "and is the board flat? film again, holding it still at some places that both see")
+        raise CalibrationError(f"camera {names} and the others ({rest}) see the board at the same time in {most.seen} moments, but these "
+                               "do not agree on where they stand: were the films begun together (say in board.toml's [start] when each "
+                               "began), and is the board flat? film again, holding it still at some places that both see")
     raise CalibrationError(f"camera {names} never sees the board at the same time as the others ({rest}): film again, carrying the board "
                            "where they and a neighbour see it together, and turn it half-way between the two")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 
 import numpy as np
@@ -68,7 +68,8 @@ def _place_table(found: Calibrated) -> str:
     cells = []
     for n, camera in enumerate(found.cameras):
         off = np.linalg.norm(solved.residuals[number == n], axis=1)
-        error = ("", "", "") if not len(off) else (f"{np.sqrt((off**2).mean()):.2f}", f"{np.median(off):.2f}", f"{np.percentile(off, 95):.2f}")
+        spread = (np.sqrt((off**2).mean()), np.median(off), np.percentile(off, 95)) if len(off) else ()
+        error = [f"{value:.2f}" for value in spread] or [""] * 3
         cells.append((camera.name, " ".join(f"{value:.3f}" for value in camera.centre.tolist()),
                       f"{1000 * DOUBT_FACTOR * solved.place_sd[n]:.1f}", f"{np.degrees(DOUBT_FACTOR * solved.angle_sd[n]):.2f}", *error,
                       f"{1000 * solved.bundle.delays[n]:.1f}"))
@@ -115,11 +116,12 @@ def _map(found: Calibrated) -> str:
     origin = f'<path d="M{x - 5:.1f} {y:.1f}h10M{x:.1f} {y - 5:.1f}v10" stroke="#1f2329"/>'
     width, height = k * (high - low)
     return (f'<svg viewBox="0 0 {width:.0f} {height:.0f}" style="max-width:{width:.0f}px" role="img" aria-label="cameras from above">'
-            f'<rect width="{width:.1f}" height="{height:.1f}" fill="#f6f8fa" stroke="#c8ced6"/><g fill="#b6bec9">{dots}</g>{origin}{drawn}</svg>')
+            f'<rect width="{width:.1f}" height="{height:.1f}" fill="#f6f8fa" stroke="#c8ced6"/><g fill="#b6bec9">{dots}</g>'
+            f"{origin}{drawn}</svg>")
 
 
-def _drawn_camera(camera: Camera, at: object) -> str:
-    x, y = at(camera.centre[:2])  # pyright: ignore[reportCallIssue]
-    a, b = at(camera.centre[:2] + 0.5 * camera.T_camera_world[2, :2])  # pyright: ignore[reportCallIssue]
+def _drawn_camera(camera: Camera, at: Callable[[Array], tuple[float, float]]) -> str:
+    x, y = at(camera.centre[:2])
+    a, b = at(camera.centre[:2] + 0.5 * camera.T_camera_world[2, :2])
     return (f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#0072b2"/><path d="M{x:.1f} {y:.1f}L{a:.1f} {b:.1f}" stroke="#0072b2" '
             f'stroke-width="2"/><text x="{x + 6:.1f}" y="{y - 6:.1f}" font-size="11">{plain(camera.name)}</text>')

@@ -91,7 +91,8 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
                      sizes: Callable[[str], tuple[int, int] | None] | None = None) -> tuple[Camera, ...]:
     """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
-    Formats, recognised by content: JSON with K, R and t a camera, COLMAP's text, TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML,
+    Formats, recognised by content: JSON with K, R and t a camera, COLMAP's text, TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its
+    own and its export), OpenCV's YAML and XML,
     EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
     something is missing or impossible.
 

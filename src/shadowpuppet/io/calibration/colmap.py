@@ -38,7 +38,8 @@ def read_colmap(path: Path) -> Drafts:
         pose = numbers_of(" ".join(cells[1:8]), (7,))
         lens = lenses.get(cells[8])
         if pose is None:
-            raise CalibrationError(f"{file}, line {n}: found {shown(' '.join(cells[:9]))}, expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
+            raise CalibrationError(f"{file}, line {n}: found {shown(' '.join(cells[:9]))}, expected IMAGE_ID QW QX QY QZ TX TY TZ "
+                                   "CAMERA_ID NAME")
         if lens is None:
             raise CalibrationError(f"{file}, line {n}: found the camera {shown(cells[8])}, cameras.txt has {choices(lenses)}")
         picture = Path(" ".join(cells[9:]).replace("\\", "/"))
@@ -64,7 +65,8 @@ def _lenses(file: Path) -> dict[str, tuple[list[float], Array, Array, bool]]:
             raise CalibrationError(f"{file}, line {n}: found the model {shown(model)}, expected one of {choices(MODELS)}")
         numbers = numbers_of(" ".join(cells[2:]), (2 + MODELS[model],))
         if numbers is None:
-            raise CalibrationError(f"{file}, line {n}: found {len(cells) - 2} values, expected width, height and {MODELS[model]} parameters")
+            raise CalibrationError(f"{file}, line {n}: found {len(cells) - 2} values, expected width, height and {MODELS[model]} "
+                                   "parameters")
         fx, *rest = numbers[2:]
         fy, cx, cy, *lens = (fx, *rest) if model in ONE_FOCAL else rest
         matrix = np.array([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1]])

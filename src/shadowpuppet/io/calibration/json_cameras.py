@@ -84,7 +84,8 @@ def _tables(value: Any, name: str, depth: int) -> Iterator[tuple[str, Mapping[st
 def _is_camera(table: Mapping[str, Any]) -> bool:
     inner = _flat(table)
     matrix = _find(inner, "matrix")
-    return (matrix is not None and not isinstance(matrix, dict | str)) or all(_find(inner, key) is not None for key in ("fx", "fy", "cx", "cy"))
+    stated = matrix is not None and not isinstance(matrix, dict | str)
+    return stated or all(_find(inner, key) is not None for key in ("fx", "fy", "cx", "cy"))
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -119,8 +120,11 @@ def _draft(path: Path, key: str, table: Mapping[str, Any]) -> Draft:
         return array
 
     matrix = numbers("matrix", 9, 4)
+    if matrix is not None and len(matrix) == 4 and np.ndim(_find(flat, "matrix")) != 1:
+        raise CalibrationError(f"{where}: matrix: found {shown(_find(flat, 'matrix'))}, expected 3 x 3 numbers, or fx, fy, cx, cy")
     if matrix is None or len(matrix) == 4:
-        parts = matrix if matrix is not None else np.array([float(numbers(k, 1)[0]) for k in ("fx", "fy", "cx", "cy")])  # pyright: ignore[reportOptionalSubscript]
+        single = [part for k in ("fx", "fy", "cx", "cy") if (part := numbers(k, 1)) is not None]
+        parts = matrix if matrix is not None else np.concatenate(single)
         matrix = np.array([parts[0], 0, parts[2], 0, parts[1], parts[3], 0, 0, 1])
     distortion = numbers("distortion", 0, 1, 2, 4, 5, 8, 12, 14)
     size, width, height = numbers("size", 2, 3), numbers("width", 1), numbers("height", 1)
