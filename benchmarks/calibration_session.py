@@ -124,7 +124,8 @@ class Renderer:
         """Samples among which the board is: rows and columns of `rays`."""
         w, h = (side / 2 + MARGIN for side in self.board.size)
         edge = np.linspace(-1, 1, 9)
-        outline = np.concatenate([np.stack([a * w + 0 * edge, b * h + 0 * edge], 1) for a, b in ((edge, -1), (edge, 1), (-1, edge), (1, edge))])
+        sides = ((edge, -1), (edge, 1), (-1, edge), (1, edge))
+        outline = np.concatenate([np.stack([a * w + 0 * edge, b * h + 0 * edge], 1) for a, b in sides])
         pixels = replace(self.camera, T_camera_world=T).project(np.pad(outline, ((0, 0), (0, 1))))
         size = np.array(self.camera.size)
         if not np.isfinite(pixels).all():
