@@ -93,7 +93,7 @@ def turning(degrees: float, across: float = 20.0) -> tuple[np.ndarray, Animation
 def test_the_pelvis_origin_is_the_models(model):
     _, animation = turning(0)
     q, ours = coordinates(animation, model), coordinates(animation, "own")
-    hip = MODELS[model].hip
+    hip = np.array(MODELS[model].hip)
     offsets = animation.offsets[[animation.names.index(f"{side}_hip") for side in ("left", "right")]]
     scale = (offsets[0, 0] - offsets[1, 0]) / (2 * hip[2])
     pelvis = Rotation.from_euler("ZXY", np.stack([q[name] for name in ("pelvis_tilt", "pelvis_list", "pelvis_rotation")], 1))
