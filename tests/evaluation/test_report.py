@@ -112,7 +112,7 @@ def test_what_a_plot_refers_to_is_there_and_its_own(plain_page):
     assert wanted <= {*read.ids}
     of_other_plots = [name for name in read.ids if read.ids.count(name) > 1 and not re.search(r"-(figure|axes|patch|line2d)", name)]
     owners = {name.split("-")[0] for name in read.ids}
-    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "coverage"} <= owners
+    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "angles", "coverage"} <= owners
     assert len({name for name in of_other_plots if name.split("-")[0] not in owners}) == 0
 
 
@@ -122,8 +122,17 @@ def test_figures_are_those_that_were_measured(tmp_path, quick):
     for value in (of.measured["errors"]["mean_mm"], of.measured["humaneva"]["mean_mm"], of.measured["aligned_mm"]["rigid"],
                   of.measured["errors"]["joints"]["left_wrist"]["max_mm"], of.measured["axes_mm"]["x"]["rmse"]):
         assert f"{value:.1f}" in text
-    for head in ("Error over time", "Joints", "Motion", "Body", "Silhouettes", "Stated uncertainty", "What the figures mean", "The run"):
+    for head in ("Error over time", "Joints", "Motion", "Body", "Angles", "Silhouettes", "Stated uncertainty", "What the figures mean", "The run"):
         assert f"<h2>{head}</h2>" in text
+
+
+def test_the_runs_own_verdict_comes_first(tmp_path):
+    of = measure_run(run_that_errs(tmp_path))
+    assert "The run's own verdict" not in page(of)
+    of.run.metrics["verdict"] = {"word": "doubtful", "reasons": ["left arm <doubtful> in 80 % of frames"]}
+    card = page(of).partition('<div class="card">')[2].partition("</div>")[0]
+    assert "doubtful" in card
+    assert "left arm &lt;doubtful&gt; in 80 % of frames" in card
 
 
 def test_a_page_is_the_same_each_time(tmp_path, plain_page):
