@@ -444,7 +444,8 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
     child.send_signal(number)
     _, err = child.communicate()
     assert child.returncode == code
-    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}; --resume goes on with them", err.splitlines()[-1])
+    said = rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}; --resume goes on with them"
+    assert re.fullmatch(said, err.splitlines()[-1])
     left = read_run(folder)
     assert not left.complete
     assert 2 <= len(left.motion) < made.FRAMES

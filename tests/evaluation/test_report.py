@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import runs
 from made import write_film
 from measured import NAMES, moved, person, write_run
 
@@ -112,7 +113,7 @@ def test_what_a_plot_refers_to_is_there_and_its_own(plain_page):
     assert wanted <= {*read.ids}
     of_other_plots = [name for name in read.ids if read.ids.count(name) > 1 and not re.search(r"-(figure|axes|patch|line2d)", name)]
     owners = {name.split("-")[0] for name in read.ids}
-    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "angles", "coverage"} <= owners
+    assert {"time", "map", "joints", "shares", "path", "jitter", "fit", "coverage"} <= owners
     assert len({name for name in of_other_plots if name.split("-")[0] not in owners}) == 0
 
 
@@ -122,8 +123,17 @@ def test_figures_are_those_that_were_measured(tmp_path, quick):
     for value in (of.measured["errors"]["mean_mm"], of.measured["humaneva"]["mean_mm"], of.measured["aligned_mm"]["rigid"],
                   of.measured["errors"]["joints"]["left_wrist"]["max_mm"], of.measured["axes_mm"]["x"]["rmse"]):
         assert f"{value:.1f}" in text
-    for head in ("Error over time", "Joints", "Motion", "Body", "Angles", "Silhouettes", "Stated uncertainty", "What the figures mean", "The run"):
+    for head in ("Error over time", "Joints", "Motion", "Body", "Silhouettes", "Stated uncertainty", "What the figures mean", "The run"):
         assert f"<h2>{head}</h2>" in text
+
+
+@pytest.mark.parametrize(("body", "panels"), [("rounded", 7), ("anatomical", 19)])
+def test_angles_of_both_sides_share_a_panel(tmp_path, body, panels):
+    text = page(measure_run(runs.make_run(tmp_path / "run", body, lost=(3,), spread=True)))
+    section = text.partition("<h2>Angles</h2>")[2].partition("<h2>")[0]
+    assert len(set(re.findall(r'id="angles-axes_(\d+)"', section))) >= panels
+    assert ">elbow flexion<" in section
+    assert ">torso y<" not in section  # metres
 
 
 def test_the_runs_own_verdict_comes_first(tmp_path):
