@@ -72,3 +72,10 @@ def test_intervals_of_shifts_hold_what_is_true():
         assert found is not None
         held.append(abs(found.shift - late) <= QUANTILE * np.sqrt(found.variance))
     assert 0.78 <= np.mean(held) <= 0.99
+
+
+def test_sway_of_less_than_the_grid_of_pixels_gives_no_offset():
+    rng = np.random.default_rng(5)
+    for _ in range(6):  # the same sway in both, which whole pixels round each in its own way
+        sway = wandering(rng, 240, 1.0, 10.0)
+        assert _compared(0, 1, np.round(np.stack([sway + 0.2, sway - 0.3])), 120) is None

@@ -26,8 +26,9 @@ TRIM_PERCENTILE = 80
 """Percentile up to which differences are averaged: the greatest come from limbs missing in one silhouette."""
 MAX_RESIDUAL_SHARE = 0.6
 """Two signals give an offset if at most this share of their median difference is left at the best shift."""
-LEAST_MOTION = 0.5
-"""Least standard deviation (robust) of a signal, pixels: less is the grid of the pixels."""
+LEAST_MOTION = 2.0
+"""Least standard deviation (robust) of a signal, pixels: the sway of a person at rest stays below, and the grid of the pixels, which is
+alike in no two pictures, then biases a shift by most of a frame."""
 LEAST_SCORE = 2.0
 """Standard errors by which two signals must be more alike, at their best shift, than chance makes them at the best of all shifts tried."""
 QUANTILE, NOISE_FACTOR = 1.645, 1.56
