@@ -15,10 +15,10 @@ from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
 from shadowpuppet.tracking.smoothing.facing import turned_on
-from shadowpuppet.tracking.smoothing.fixed_interval import LEAST, ORDER, differences, smooth
+from shadowpuppet.tracking.smoothing.fixed_interval import INDEPENDENT, LEAST, ORDER, Smoothed, differences, smooth
 from shadowpuppet.tracking.smoothing.gaps import bridged, stray
 from shadowpuppet.tracking.smoothing.method import Method
-from shadowpuppet.tracking.smoothing.pose_path import PathCost, likeliest_poses
+from shadowpuppet.tracking.smoothing.pose_path import STEPS, PathCost, likeliest_poses
 from shadowpuppet.tracking.smoothing.projection import Markers, Points, markers, nearest_poses
 
 BLOCK, OVERLAP = 1500, 4.0
@@ -41,6 +41,19 @@ class SmoothedMotion(NamedTuple):
     """Frames (T,) that were unknown and are `predicted` now."""
     mirrored: NDArray[np.bool_]
     """Frames (T,) in which the person has turned away from one camera, whose tracker took them for facing it."""
+
+
+class Tracked(NamedTuple):
+    """Tracked poses of some frames."""
+
+    times: Array
+    """Seconds, of shape (T,)."""
+    poses: Array
+    """Of shape (T, D), rad or m."""
+    pose_sd: Array
+    """Stated deviations, of shape (T, D); not a number where there are none."""
+    joint_sd: Array
+    """Stated deviations of the joints, of shape (T, N, 3), metres; likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +108,40 @@ class MotionSmoother:
         if self.method == "butterworth":
             found = filtered(motion.times, both, self.cutoff)
             return self._nearest(start, found, number, free)
-        turns = np.repeat(self._turns(_stated(motion.pose_sd)), 3, axis=1)
-        sd = np.concatenate([_stated(motion.joint_sd), np.repeat(turns[..., None], 3, axis=2)], 1)
-        found = smooth(motion.times, both, sd, np.repeat([LEAST, LEAST / ARM], [number, turns.shape[1]]))
+        sd = self._marker_sd(motion.pose_sd, motion.joint_sd)
+        found = smooth(motion.times, both, sd, self._least(number))
         near = self._nearest(start, found.points, number, free)
-        if len(motion) <= ORDER:
-            return near
-        share = np.repeat([1.0, AXES_SHARE], [number, turns.shape[1]])
-        cost = PathCost(_in_a_row(filled(motion.times, both)), _in_a_row(found.precision * share[:, None]), differences(motion.times),
+        return near if len(motion) <= ORDER else self._path(near, filled(motion.times, both), found, motion.times, free)
+
+    def likeliest(self, tracked: Tracked, start: Array, free: NDArray[np.bool_], given: int, given_sd: float, rounds: int,
+                  steps: int) -> Array:
+        """Poses (T, D) from `start` (T, D) on, of frames of which the first `given` are known: their markers to `given_sd` (m, and 1 for
+        axes). Only `free` (D,) degrees of freedom change; `rounds` of estimating speeds and outliers, and Gauss-Newton `steps`. Up to
+        three frames stay as they are."""
+        if len(start) <= ORDER:
+            return start
+        measured = np.concatenate(markers(self.skeleton, self.points, tracked.poses), axis=1)
+        sd = self._marker_sd(tracked.pose_sd, tracked.joint_sd)
+        sd[:given] = given_sd / INDEPENDENT
+        found = smooth(tracked.times, measured, sd, self._least(tracked.joint_sd.shape[1]), rounds)
+        return self._path(_unwrapped(self.skeleton, start), measured, found, tracked.times, free, steps)
+
+    def _path(self, start: Array, measured: Array, found: Smoothed, times: Array, free: NDArray[np.bool_], steps: int = STEPS) -> Array:
+        """The likeliest poses (T, D) from `start` on, given measured markers (T, M, 3), and what they weigh by `found`."""
+        number = measured.shape[1] - 3 * len(self.skeleton.joints)
+        share = np.repeat([1.0, AXES_SHARE], [number, measured.shape[1] - number])
+        cost = PathCost(_in_a_row(measured), _in_a_row(found.precision * share[:, None]), differences(times),
                         np.repeat(found.variances / share, 3, axis=1))
-        return likeliest_poses(self.skeleton, self.points, near, cost, free)
+        return likeliest_poses(self.skeleton, self.points, start, cost, free, steps)
+
+    def _marker_sd(self, pose_sd: Array, joint_sd: Array) -> Array:
+        """Deviations (T, M, 3) of joints (m) and of the axes of the skeleton's joints, from those of poses (T, D) and joints (T, N, 3)."""
+        turns = np.repeat(self._turns(_stated(pose_sd)), 3, axis=1)
+        return np.concatenate([_stated(joint_sd), np.repeat(turns[..., None], 3, axis=2)], 1)
+
+    def _least(self, number: int) -> Array:
+        """Acceleration (M,) of a person who stands still, of `number` points (m/s^2) and of axes (1/s^2)."""
+        return np.repeat([LEAST, LEAST / ARM], [number, 3 * len(self.skeleton.joints)])
 
     def _nearest(self, start: Array, found: Array, number: int, free: NDArray[np.bool_]) -> Array:
         """Poses (T, D) near `start` whose markers are nearest to those found (T, M, 3), `number` points before the axes."""
