@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import smallest
@@ -77,10 +77,11 @@ def made_turns(folder: Path) -> Iterator[Path]:
     for name, kind, seed, gestures, count, behind in TURNS:
         body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
         motion, scene, turn = parse_gestures(gestures), Scene(clothing=seed, room=seed), 180.0 * behind
-        ring = Ring(count=count, radius=4.2, jitter=0.4, seed=seed, size=(320, 240), fov_deg=55)
-        view = (Viewpoint(fov_deg=60, height=0.9 * body.stature, distance=2.2),)
-        spec = (Spec(name=name, body=body, motion=motion, cameras=view, scene=scene, turn_deg=turn, seed=(7, seed)) if count == 1 else
-                Spec(name=name, body=body, motion=motion, ring=ring, scene=scene, rate=30, turn_deg=turn, seed=(8, seed)))  # fmt: skip
+        seen: dict[str, Any] = {"cameras": (Viewpoint(fov_deg=60, height=0.9 * body.stature, distance=2.2),), "seed": (7, seed)}
+        if count > 1:
+            ring = Ring(count=count, radius=4.2, jitter=0.4, seed=seed, size=(320, 240), fov_deg=55)
+            seen = {"ring": ring, "rate": 30, "seed": (8, seed)}
+        spec = Spec(name=name, body=body, motion=motion, scene=scene, turn_deg=turn, **seen)
         if not (folder / name / "made").exists():
             synthesize(spec, folder / name)
             (folder / name / "made").touch()

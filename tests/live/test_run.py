@@ -102,10 +102,12 @@ def test_every_picture_is_worked_on_or_counted_as_dropped(played):
 def test_the_folder_tells_how_it_was_made_and_keeps_no_picture(played, film):
     run = played[0]
     names = {path.name for path in run.folder.iterdir()}
-    assert names == {"joints.csv", "angles.csv", "intervals.csv", "motion.npz", "run.toml", "metrics.json", "person.toml",
+    assert names == {"raw.csv", "joints.csv", "angles.csv", "intervals.csv", "motion.npz", "run.toml", "metrics.json", "person.toml",
                      "calibration.toml"}
     assert run.info["camera"] == str(film)
     assert run.info["live"]["countdown"] == 0.2
+    assert run.info["smoothing"]["method"] == "tracker"
+    assert run.metrics["live"]["smoothed_latency_ms"]["median"] > run.metrics["live"]["latency_ms"]["median"] + 50
     assert run.info["settings"]["height"] == HEIGHT
     assert read_person(run.folder / "person.toml").height == HEIGHT
     assert json.loads((run.folder / "metrics.json").read_text())["overlap"]["mean"] > 0.8
@@ -279,7 +281,7 @@ def test_other_programs_get_every_frame_while_it_is_tracked(film, tmp_path, caps
 
         reading = threading.Thread(target=listen, daemon=True)
         reading.start()
-        assert cli.run([*command(film, folder, "--osc", ear.port, "--websocket", port, "--speed", 2), *FLAGS]) == 0
+        assert cli.run([*command(film, folder, "--osc", ear.port, "--websocket", port, "--speed", 2, "--lag", 0, "--smooth", "off"), *FLAGS]) == 0
         reading.join(10)
         listening.join(10)
         heard += ear.heard(0.1)

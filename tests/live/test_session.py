@@ -23,7 +23,7 @@ from shadowpuppet.video.live_source import Snapshot
 
 SIZE = (160, 120)
 OPTIONS = make_options(QUICK | {"height": HEIGHT, "distance": 2.0})
-SETTINGS = LiveSettings(countdown=0.5, learn=1.0, still=0.4)
+SETTINGS = LiveSettings(countdown=0.5, learn=1.0, still=0.4, lag=0)
 
 
 @pytest.fixture(scope="module")
@@ -355,6 +355,62 @@ def test_a_person_can_be_measured_anew_with_the_sizes_known(pictures, tracking):
     assert stage.session.phase == "tracking"
     assert stage.session.newly_measured()
     assert stage.session.measured.guess.sizes == sizes
+
+
+# Smoothed motion, some frames later
+
+
+def lagging(pictures, lag=0.2):
+    return Stage(replace(SETTINGS, lag=lag)).to_tracking(pictures)
+
+
+def shaking(frames):
+    joints = np.array([frame.joints for frame in frames])
+    return np.abs(np.diff(joints, n=2, axis=0)).mean()
+
+
+def test_with_a_lag_the_same_frames_come_later_and_smoother_with_their_own_pictures(pictures):
+    stage = lagging(pictures)
+    before = len(stage.session.rest())  # of the frames until here
+    outcomes = stage.play(pictures[1][20:40], cost=0.01)
+    assert before == 3
+    assert [len(outcome.given) for outcome in outcomes] == [0] * 3 + [1] * 17
+    given = [outcome.given[0] for outcome in outcomes[3:]]
+    raw = [outcome.frame for outcome in outcomes]
+    assert [each.frame.time for each in given] == [frame.time for frame in raw[:-3]]
+    assert shaking([each.frame for each in given]) < 0.8 * shaking(raw)
+    for outcome, first in zip(outcomes[3:], outcomes):
+        (frame, age), view = outcome.given[0], outcome.view
+        assert view.image is first.images[0]
+        assert view.lag == 0.2
+        assert age == view.latency == pytest.approx(3 * (1 / RATE + 0.01) + 0.01)
+        np.testing.assert_array_equal(view.pose, frame.pose)
+    smoothed = stage.session.timing.summary()["smoothed_latency_ms"]
+    assert smoothed["median"] > 3000 / RATE
+
+
+def test_frames_that_wait_are_given_when_the_pictures_break_off_or_the_person_is_measured_anew(pictures):
+    stage = lagging(pictures)
+    stage.session.rest()
+    stage.play(pictures[1][20:30])
+    silent = stage.idle(2.0)
+    assert silent.view.trouble
+    assert len(silent.given) == 3
+    assert not stage.session.rest()
+    stage.play(pictures[1][30:33])
+    stage.session.ask("measure")
+    assert len(stage.give(pictures[1][33]).given) == 3
+
+
+@pytest.mark.parametrize(("lag", "values", "expected"), [(None, {}, 0.1), (None, {"preset": "liu2011"}, 0), (None, {"smooth": "off"}, 0),
+                                                         (0, {}, 0), (0.3, {"smooth": "off"}, 0.3)])  # fmt: skip
+def test_the_default_lag(lag, values, expected):
+    assert Stage(replace(SETTINGS, lag=lag), make_options(values)).session.lag == expected
+
+
+def test_without_a_lag_frames_are_given_at_once_as_tracked(pictures, tracking):
+    outcome = tracking.give(pictures[1][25], cost=0.03)
+    assert outcome.given == ((outcome.frame, pytest.approx(0.03)),)
 
 
 # Cameras that fail

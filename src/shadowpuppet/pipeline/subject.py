@@ -119,6 +119,10 @@ class TrackedSubject(ABC):
         """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
         return self.body.points(poses)
 
+    def joints(self, poses: Array) -> Array:
+        """The landmarks (N, J, 3) of poses (N, D) that a run writes as joints, in the world, metres."""
+        return self.landmarks(poses)[:, self.joint_columns]
+
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""
         return self.landmarks(pose[None])[0]

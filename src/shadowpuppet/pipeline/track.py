@@ -51,7 +51,7 @@ from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
-from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_parts
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -192,7 +192,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         listener.look(prepared.look)
         _check_cutoff(options, prepared.look.rate)
         _track(writer, prepared, kind, options, listener, for_track, cache)
-        _smooth(writer, prepared.check(), options, listener)
+        smooth_run(writer, [(0, prepared.check())], options, listener)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
@@ -216,18 +216,19 @@ def _check_cutoff(options: Options, rate: float) -> None:
         check_cutoff(options.cutoff, rate / options.every)
 
 
-def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
-    """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
+def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]], options: Options, listener: Listener) -> None:
+    """Replace the tracked motion by the smoothed one: of each of `subjects` from its first frame to the next one's. If that is impossible,
+    the motion stays as it is, with a warning."""
     method, gaps = options.smoothing
     if method == "off" and gaps == 0:
         writer.info["smoothing"] = {"method": "off"}
         return
     listener.begin("smoothing")
-    start, columns = time.perf_counter(), subject.joint_columns
-    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps,
-                              options.facing == "away")
+    start, away = time.perf_counter(), options.facing == "away"
+    parts = [(begin, MotionSmoother(subject.body.skeleton, subject.joints, method, options.cutoff, gaps, away))
+             for begin, subject in subjects]
     try:
-        found = smoother(writer.motion)
+        found = smoothed_parts(writer.motion, parts)
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
         writer.info["smoothing"] = {"method": "off"}
@@ -237,7 +238,7 @@ def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listen
         warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
              "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
     writer.revise(found.motion)
-    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
+    writer.info["smoothing"] = {**parts[0][1].summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 

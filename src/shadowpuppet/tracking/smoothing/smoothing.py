@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
-from shadowpuppet.motion.motion import Motion
+from shadowpuppet.motion.motion import PER_FRAME, Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
 from shadowpuppet.tracking.smoothing.facing import turned_on
 from shadowpuppet.tracking.smoothing.fixed_interval import INDEPENDENT, LEAST, ORDER, Smoothed, differences, smooth
@@ -171,6 +171,14 @@ class MotionSmoother:
         status, limbs = motion.status.copy(), motion.limb_status.copy()
         status[inside], limbs[inside] = "predicted", "predicted"
         return replace(motion, poses=poses, joints=joints, joint_sd=joint_sd, pose_sd=pose_sd, status=status, limb_status=limbs)
+
+
+def smoothed_parts(motion: Motion, parts: Sequence[tuple[int, MotionSmoother]]) -> SmoothedMotion:
+    """A motion smoothed in parts, one after another: for each its first frame and smoother, at first frame 0. Raises as they do."""
+    ends = [*(begin for begin, _ in parts[1:]), len(motion)]
+    found = [smoother(motion[begin:end]) for (begin, smoother), end in zip(parts, ends)]
+    whole = {name: np.concatenate([getattr(each.motion, name) for each in found]) for name in PER_FRAME}
+    return SmoothedMotion(replace(motion, **whole), *(np.concatenate([each[k] for each in found]) for k in (1, 2)))
 
 
 def _grown(motion: Motion, joints: Array, inside: NDArray[np.bool_]) -> tuple[Array, Array]:
