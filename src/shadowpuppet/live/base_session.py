@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -96,6 +97,8 @@ class LiveSession(ABC):
         """Smooths the frames; None without a lag, and before there is a person."""
         self._seen = dict[float, _Seen]()
         """What belongs to the frames that wait, by their times."""
+        self.leans = array("d")
+        """`TrackedSubject.lean` of each frame."""
         self._watch: RigWatch | None = None
         """Which of several cameras are set aside."""
         self._measured: Callable[[], Any] = lambda: None
@@ -223,6 +226,7 @@ class LiveSession(ABC):
             self._watch.tracked(self.subject.drawn(self._state))
         seconds = shot.captured - self._began if shot.shown is None else shot.shown
         frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
+        self.leans.append(self.subject.lean(frame, masks))
         now = self.clock()
         self.timing.done(shot.captured, now, shot.number)
         if frame.status != "lost":

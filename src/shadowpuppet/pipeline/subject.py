@@ -103,6 +103,11 @@ class TrackedSubject(ABC):
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
         return ()
 
+    def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
+        """How far the head lies before the neck in a frame in which the person is seen in profile (`head_lean`); NaN in others, and with
+        several cameras."""
+        return np.nan
+
     def kept(self, state: Any) -> Any:
         """A tracker's state without what the next frame does not need."""
         return state

@@ -14,7 +14,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.motion import PER_FRAME, Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
-from shadowpuppet.tracking.smoothing.facing import turned_on
+from shadowpuppet.tracking.smoothing.facing import Faced, turned_on
 from shadowpuppet.tracking.smoothing.fixed_interval import INDEPENDENT, LEAST, ORDER, Smoothed, differences, smooth
 from shadowpuppet.tracking.smoothing.gaps import bridged, stray
 from shadowpuppet.tracking.smoothing.method import Method
@@ -41,6 +41,8 @@ class SmoothedMotion(NamedTuple):
     """Frames (T,) that were unknown and are `predicted` now."""
     mirrored: NDArray[np.bool_]
     """Frames (T,) in which the person has turned away from one camera, whose tracker took them for facing it."""
+    reversed: NDArray[np.bool_]
+    """Frames (T,) of profiles that one camera's tracker took for facing the other way."""
 
 
 class Tracked(NamedTuple):
@@ -71,16 +73,17 @@ class MotionSmoother:
     away: bool = False
     """Whether one camera first sees the person from behind."""
 
-    def __call__(self, motion: Motion) -> SmoothedMotion:
-        """A motion smoothed in runs of known frames. Raises `SettingsError` for a cut-off that the frame rate does not allow."""
-        motion, mirrored = self._faced(motion)
+    def __call__(self, motion: Motion, leans: Array | None = None) -> SmoothedMotion:
+        """A motion smoothed in runs of known frames; `leans` (T,): of the head in a profile (`head_lean`). Raises `SettingsError` for a
+        cut-off that the frame rate does not allow."""
+        motion, mirrored, wrong = self._faced(motion, leans)
         inside = bridged(motion.times, motion.joints, self.gaps)
         poses, known = motion.poses.copy(), motion.known
         free = np.asarray((poses[known] != poses[known][:1]).any(0))
         for begin, end in true_runs(known | inside):
             for block, kept in _blocks(motion.times, begin, end):
                 poses[kept] = self._poses(motion[block], free)[kept.start - block.start : kept.stop - block.start]
-        return SmoothedMotion(self._motion(motion, poses, inside), inside, mirrored)
+        return SmoothedMotion(self._motion(motion, poses, inside), inside, mirrored, wrong)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -89,15 +92,15 @@ class MotionSmoother:
             return {"method": self.method, "cutoff_hz": self.cutoff, "order": 2 * PASSES, "lag": 0, "gaps_s": self.gaps}
         return {"method": self.method, "gaps_s": self.gaps}
 
-    def _faced(self, motion: Motion) -> tuple[Motion, NDArray[np.bool_]]:
-        """The motion of a person who may turn right round, and the frames (T,) that are mirrored."""
+    def _faced(self, motion: Motion, leans: Array | None) -> Faced:
+        """The motion of a person who may turn right round."""
         if self.method == "off":
-            return motion, np.zeros(len(motion), bool)
-        turned, mirrored = turned_on(motion, self.away)
+            return Faced(motion, *np.zeros((2, len(motion)), bool))
+        turned = turned_on(motion, self.away, leans)
         joints = motion.joints.copy()
-        changed = mirrored & motion.known
-        joints[changed] = self.points(turned.poses[changed])
-        return replace(turned, joints=joints), mirrored
+        changed = (turned.mirrored | turned.reversed) & motion.known
+        joints[changed] = self.points(turned.motion.poses[changed])
+        return turned._replace(motion=replace(turned.motion, joints=joints))
 
     def _poses(self, motion: Motion, free: NDArray[np.bool_]) -> Array:
         """Poses (T, D) of a run of frames in which no gap is left."""
@@ -173,12 +176,13 @@ class MotionSmoother:
         return replace(motion, poses=poses, joints=joints, joint_sd=joint_sd, pose_sd=pose_sd, status=status, limb_status=limbs)
 
 
-def smoothed_parts(motion: Motion, parts: Sequence[tuple[int, MotionSmoother]]) -> SmoothedMotion:
-    """A motion smoothed in parts, one after another: for each its first frame and smoother, at first frame 0. Raises as they do."""
+def smoothed_parts(motion: Motion, parts: Sequence[tuple[int, MotionSmoother]], leans: Array) -> SmoothedMotion:
+    """A motion smoothed in parts, one after another: for each its first frame and smoother, at first frame 0; `leans` (T,) of the head.
+    Raises as they do."""
     ends = [*(begin for begin, _ in parts[1:]), len(motion)]
-    found = [smoother(motion[begin:end]) for (begin, smoother), end in zip(parts, ends)]
+    found = [smoother(motion[begin:end], leans[begin:end]) for (begin, smoother), end in zip(parts, ends)]
     whole = {name: np.concatenate([getattr(each.motion, name) for each in found]) for name in PER_FRAME}
-    return SmoothedMotion(replace(motion, **whole), *(np.concatenate([each[k] for each in found]) for k in (1, 2)))
+    return SmoothedMotion(replace(motion, **whole), *(np.concatenate([each[k] for each in found]) for k in (1, 2, 3)))
 
 
 def _grown(motion: Motion, joints: Array, inside: NDArray[np.bool_]) -> tuple[Array, Array]:
