@@ -281,7 +281,8 @@ def test_other_programs_get_every_frame_while_it_is_tracked(film, tmp_path, caps
 
         reading = threading.Thread(target=listen, daemon=True)
         reading.start()
-        assert cli.run([*command(film, folder, "--osc", ear.port, "--websocket", port, "--speed", 2, "--lag", 0, "--smooth", "off"), *FLAGS]) == 0
+        at_once = ("--speed", 2, "--lag", 0, "--smooth", "off")
+        assert cli.run([*command(film, folder, "--osc", ear.port, "--websocket", port, *at_once), *FLAGS]) == 0
         reading.join(10)
         listening.join(10)
         heard += ear.heard(0.1)

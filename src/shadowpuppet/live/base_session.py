@@ -276,7 +276,8 @@ class LiveSession(ABC):
         return View(
             phase=self.phase, message=message, countdown=countdown, trouble=self.trouble, status=frame.status if frame else "",
             overlap=frame.overlap if frame and pose is not None else np.nan, angles=angles, latency=latency, rate=self.timing.rate,
-            lag=0.0 if self._lagging is None else self.lag, interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, doubtful=doubtful,
+            interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, doubtful=doubtful,
+            lag=0.0 if self._lagging is None else self.lag,
             **self._shown(images, masks, frame),
         )  # fmt: skip
 

@@ -36,6 +36,7 @@ from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names
 from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
+from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video.capture import Capture
 from shadowpuppet.video.live_source import open_feed
 from shadowpuppet.video.network_stream import without_secrets
@@ -58,6 +59,7 @@ class _Nobody(Exception):
     """Nobody was tracked, so there is no run to keep."""
 
 
+@one_blas_thread()
 def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
              listener: LiveListener | None = None, display: Display | None = None,
              clock: Callable[[], float] = time.monotonic, outlets: Outlets | None = None) -> dict[str, Any] | None:

@@ -240,8 +240,8 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
         warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
              "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
     writer.revise(found.motion)
-    writer.info["smoothing"] = {**parts[0][1].summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum()),
-                                "reversed_frames": int(found.reversed.sum())}
+    counts = {"bridged_frames": found.bridged, "turned_frames": found.mirrored, "reversed_frames": found.reversed}
+    writer.info["smoothing"] = {**parts[0][1].summary, **{name: int(frames.sum()) for name, frames in counts.items()}}
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 

@@ -25,6 +25,9 @@ TWIST, BEND = "torso_twist", "torso_bend"
 NEAR, STEADY, PROFILE = np.radians(50), np.radians(62), np.radians(70)
 """Twist of the trunk (rad) about a profile; and that which a profile reaches at least, as a median of three frames and in one: the trunk
 of a boxer twists by 69 degrees."""
+AT_LEAST = np.radians(60)
+"""The twist (rad), both of three frames and of one, that is enough if the head shows that it is a profile: a tracker may lag behind a quick
+turn."""
 SHORTEST, LONGEST = 0.15, 0.8
 """Time (s) that the passing of a profile lasts. To turn so far and back in less than this, a trunk would have to be jerked round
 (20 rad/s^2)."""
@@ -38,15 +41,18 @@ EDGE = np.radians(10)
 """Twist (rad) up to which the passing of a profile reaches that is turned to the other side."""
 
 
-def turns(motion: Motion) -> list[int]:
-    """Frames of an upper body's motion in which the person passes a profile and turns on, away from the camera or back to it."""
+def turns(motion: Motion, leans: Array | None = None) -> list[int]:
+    """Frames of an upper body's motion in which the person passes a profile and turns on, away from the camera or back to it. The `leans`
+    (T,) of the head help to recognise a profile."""
     if TWIST not in motion.dof_names or not motion.known.any():
         return []
     twist = filled(motion.times, motion.poses[:, motion.dof_names.index(TWIST)])
     steady, found = median_filter(twist, 3, mode="nearest"), list[int]()
     for begin, end in true_runs(np.abs(steady) > NEAR):
         peak, lasted = begin + int(np.abs(steady[begin:end]).argmax()), motion.times[end - 1] - motion.times[begin]
-        if np.abs(twist[begin:end]).max() < PROFILE or abs(steady[peak]) < STEADY or not SHORTEST <= lasted <= LONGEST:
+        shown = leans is not None and abs(_lean(leans[begin:end])) >= CLEAR
+        least, constant = (AT_LEAST, AT_LEAST) if shown else (PROFILE, STEADY)
+        if np.abs(twist[begin:end]).max() < least or abs(steady[peak]) < constant or not SHORTEST <= lasted <= LONGEST:
             continue
         before, after = np.searchsorted(motion.times, [motion.times[begin] - LEAVING - AROUND, motion.times[end - 1] + LEAVING + AROUND])
         first, last = np.searchsorted(motion.times, [motion.times[begin] - LEAVING, motion.times[end - 1] + LEAVING])
@@ -73,7 +79,7 @@ def turned_on(motion: Motion, away: bool = False, leans: Array | None = None) ->
     if TWIST not in motion.dof_names:
         return Faced(motion, none, none)
     mirrored, poses, limbs = np.full(len(motion), away), motion.poses.copy(), motion.limb_status.copy()
-    at = turns(motion)
+    at = turns(motion, leans)
     for begin, end in zip(at, [*at[1:], len(motion)]):
         mirrored[begin + 1 : end + 1] = not mirrored[begin]
     wrong = none if leans is None or not at else _wrong_way(motion, at, leans)
@@ -96,10 +102,15 @@ def _wrong_way(motion: Motion, at: list[int], leans: Array) -> NDArray[np.bool_]
     for peak in at:
         side = np.sign(twist[peak]) * twist
         profile, reach = _around(side > NEAR, peak), _around(side > EDGE, peak)
-        seen = leans[profile][np.isfinite(leans[profile])]
-        if 2 * len(seen) >= profile.stop - profile.start and seen.mean() * np.sign(twist[peak]) < -CLEAR:
+        if _lean(leans[profile]) * np.sign(twist[peak]) <= -CLEAR:
             out[reach] = True
     return out
+
+
+def _lean(leans: Array) -> float:
+    """Mean of the head's leans (N,) in a profile; 0 if most are unknown."""
+    known = leans[np.isfinite(leans)]
+    return float(known.mean()) if 2 * len(known) >= max(len(leans), 1) else 0.0
 
 
 def _around(inside: NDArray[np.bool_], frame: int) -> slice:

@@ -1,7 +1,7 @@
 """Fixed-lag smoothing: every pose as soon as some of the next are there, by the same cost as the pass over a whole film.
 
-Poses that were given out count as known to a few millimetres, so that the motion goes on from them without a step; the frames since then are
-estimated anew with every frame, from the last estimate on.
+Poses that were given out count as known to a few millimetres, so that the motion goes on from them without a step. The frames since then
+are estimated anew with every frame, from the last estimate on.
 """
 
 from __future__ import annotations
