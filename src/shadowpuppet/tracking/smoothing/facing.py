@@ -87,7 +87,8 @@ def turned_on(motion: Motion, away: bool = False, leans: Array | None = None) ->
         return Faced(motion, mirrored, wrong)
     poses[mirrored] = mirror(motion.dof_names, poses[mirrored])
     twist, bend = motion.dof_names.index(TWIST), motion.dof_names.index(BEND)
-    poses[np.ix_(wrong, [twist, bend])] *= -1
+    for dof in (twist, bend):
+        poses[wrong, dof] *= -1
     poses[motion.known, twist] = np.unwrap(poses[motion.known, twist])
     limbs[mirrored] = limbs[mirrored][:, _exchanged(limbs_of(motion.joint_names))]
     pose_sd, joint_sd = motion.pose_sd.copy(), motion.joint_sd.copy()

@@ -182,7 +182,8 @@ def smoothed_parts(motion: Motion, parts: Sequence[tuple[int, MotionSmoother]], 
     ends = [*(begin for begin, _ in parts[1:]), len(motion)]
     found = [smoother(motion[begin:end], leans[begin:end]) for (begin, smoother), end in zip(parts, ends)]
     whole = {name: np.concatenate([getattr(each.motion, name) for each in found]) for name in PER_FRAME}
-    return SmoothedMotion(replace(motion, **whole), *(np.concatenate([each[k] for each in found]) for k in (1, 2, 3)))
+    return SmoothedMotion(replace(motion, **whole), np.concatenate([each.bridged for each in found]),
+                          np.concatenate([each.mirrored for each in found]), np.concatenate([each.reversed for each in found]))
 
 
 def _grown(motion: Motion, joints: Array, inside: NDArray[np.bool_]) -> tuple[Array, Array]:
