@@ -4,9 +4,9 @@
 
 A mistake: a comparison, sum, product, number, condition, minimum or statement of a function is changed. Compiled functions are left out
 (plain twins check them), and so are texts, annotations and the constants of modules. Tests are those of the folder in tests/ that mirrors
-the module's, the files that name the module first, until one fails. Prints a line for each mistake, `killed` if a test fails or hangs,
-else `SURVIVED`, and the share killed. The mistakes are in a copy of the package in a temporary folder. A survivor is a test to write, or a
-change that changes nothing.
+the module's, the files that name the module first, until one fails. Prints a line for each mistake, `killed` if a test fails, `hangs` if
+they take too long, else `SURVIVED`, and the share not survived. The mistakes are in a copy of the package in a temporary folder. A survivor
+is a test to write, or a change that changes nothing.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="shadowpuppet-mutants-") as folder:
         shutil.copytree(PACKAGE.parent, Path(folder) / "src", ignore=shutil.ignore_patterns("__pycache__"))
         for mistake in (found[k] for k in chosen):
-            noticed = is_noticed(mistake, Path(folder), args.seconds)
-            killed += noticed
+            end = tried(mistake, Path(folder), args.seconds)
+            killed += end != "SURVIVED"
             where = f"{mistake.module.relative_to(PACKAGE)}:{mistake.line}"
-            print(f"{'killed  ' if noticed else 'SURVIVED'} {where}: {shown(mistake.before)} -> {shown(mistake.after)}", flush=True)
+            print(f"{end:8} {where}: {shown(mistake.before)} -> {shown(mistake.after)}", flush=True)
     print(f"{killed} of {len(chosen)} killed, {100 * killed / max(len(chosen), 1):.0f} %, of {len(found)} possible ones")
     return 0
 
@@ -75,8 +75,8 @@ def shown(text: str) -> str:
     return " ".join(text.split())[:70]
 
 
-def is_noticed(mistake: Mistake, folder: Path, seconds: float) -> bool:
-    """Whether tests fail on the package's copy in `folder` with a mistake in it."""
+def tried(mistake: Mistake, folder: Path, seconds: float) -> str:
+    """What the tests say of the package's copy in `folder` with a mistake in it: killed, hangs or SURVIVED."""
     target = folder / "src" / mistake.module.relative_to(PACKAGE.parent)
     whole = target.read_bytes()
     target.write_text(mistake.text, encoding="utf-8")
@@ -84,9 +84,10 @@ def is_noticed(mistake: Mistake, folder: Path, seconds: float) -> bool:
                                 "NUMBA_CACHE_DIR": str(folder / "kernels")}  # fmt: skip
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, tests_of(mistake.module))]
     try:
-        return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=seconds).returncode != 0
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=seconds)
+        return "killed" if done.returncode else "SURVIVED"
     except subprocess.TimeoutExpired:
-        return True
+        return "hangs"
     finally:
         target.write_bytes(whole)
 
