@@ -2,8 +2,8 @@
 
     python benchmarks/mutants.py [--number 60] [--seed 1] [--under src/shadowpuppet/FOLDER] [--seconds 300]
 
-A mistake: a comparison, sum, product, number, condition, minimum or statement of a function is changed. Compiled functions are left out
-(plain twins check them), and so are texts, annotations and the constants of modules. Tests are those of the folder in tests/ that mirrors
+A mistake: a comparison, sum, product, whole number, condition, minimum or statement of a function is changed. Compiled functions are left
+out (plain twins check them), and so are texts, annotations and the constants of modules. Tests are those of the folder in tests/ that mirrors
 the module's, the files that name the module first, until one fails. Prints a line for each mistake, `killed` if a test fails, `hangs` if
 they take too long, else `SURVIVED`, and the share not survived. The mistakes are in a copy of the package in a temporary folder. A survivor
 is a test to write, or a change that changes nothing.
@@ -164,9 +164,9 @@ def variants(node: ast.expr | ast.Expr) -> Iterator[str]:
         changed.op = ast.Or() if isinstance(changed.op, ast.And) else ast.And()
     elif isinstance(changed, ast.UnaryOp):
         changed = changed.operand
-    elif isinstance(changed, ast.Constant) and isinstance(changed.value, bool | int | float):
+    elif isinstance(changed, ast.Constant) and isinstance(changed.value, bool | int):
         value = changed.value
-        changed.value = not value if isinstance(value, bool) else value + 1 if isinstance(value, int) else 2 * value + (value == 0)
+        changed.value = not value if isinstance(value, bool) else value + 1
     elif isinstance(changed, ast.IfExp):
         changed.test = ast.UnaryOp(ast.Not(), changed.test)
     elif isinstance(changed, ast.Call) and _name(changed) in NAMES:
