@@ -3,10 +3,10 @@
     python benchmarks/mutants.py [--number 60] [--seed 1] [--under src/shadowpuppet/FOLDER] [--seconds 300]
 
 A mistake: a comparison, sum, product, whole number, condition, minimum or statement of a function is changed. Compiled functions are left
-out (plain twins check them), and so are texts, annotations and the constants of modules. Tests are those of the folder in tests/ that mirrors
-the module's, the files that name the module first, until one fails. Prints a line for each mistake, `killed` if a test fails, `hangs` if
-they take too long, else `SURVIVED`, and the share not survived. The mistakes are in a copy of the package in a temporary folder. A survivor
-is a test to write, or a change that changes nothing.
+out (plain twins check them), and so are texts, annotations and the constants of modules. Tests are those of the folder in tests/ that
+mirrors the module's, the files that name the module first, until one fails. Prints a line for each mistake, `killed` if a test fails,
+`hangs` if they take too long, else `SURVIVED`, and the share not survived. The mistakes are in a copy of the package in a temporary
+folder. A survivor is a test to write, or a change that changes nothing.
 """
 
 from __future__ import annotations
