@@ -61,7 +61,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder for the inputs of findings")
     parser.add_argument("--read", action="store_true", help=argparse.SUPPRESS)
-    args = smallest.parse(parser, lambda folder: ["--seconds", 12, "--keep", folder])
+    args = smallest.parse(parser, lambda folder: ["--seconds", 8, "--keep", folder])
     if args.read:
         read_many(args.keep, args.seed)
         return 0

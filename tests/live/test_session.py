@@ -331,11 +331,11 @@ def test_who_is_measured_anew_keeps_the_height_that_was_measured(pictures, track
 
 def test_stillness_begins_anew_after_pictures_did_not_come(pictures):
     stage = Stage()
-    stage.play([*pictures[0], *pictures[1][:4]])
-    assert stage.session.phase == "waiting"
+    stage.play([*pictures[0], *pictures[1][:8]])  # of which the last stand still, but not for long enough
+    assert not np.isnan(stage.session._still._since)
     stage.idle(5.0)
-    assert stage.give(pictures[1][4]).view.phase == "waiting"
-    assert stage.play(pictures[1][5:14])[-1].view.phase in ("measuring", "tracking")
+    assert stage.give(pictures[1][8]).view.phase == "waiting"
+    assert stage.play(pictures[1][9:20])[-1].view.phase in ("measuring", "tracking")
 
 
 # Leaving and returning
