@@ -305,7 +305,7 @@ def test_a_huge_file_and_no_calibration_are_said(tmp_path):
             file.truncate(11_000_000)
         said(tmp_path / name, "found 11000000 bytes")
     (tmp_path / "notes.txt").write_text("milk, eggs")
-    said(tmp_path / "notes.txt", "found no calibration in it that is known, expected one of: Qualisys")
+    said(tmp_path / "notes.txt", "found no calibration in it that is known, expected one of: JSON")
     assert not is_calibration(tmp_path / "notes.txt")
     assert not is_calibration(tmp_path / "nowhere.toml")
 
