@@ -142,7 +142,7 @@ def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
     people = list(islice((each for each in map(seen, chain(sample.first, sample.frames)) if may_be_person(each[1])), FIRST))
     last = people[-1][0] if people else 0.0
     later = [each for each in (seen(run[0]) for run in sample.runs if run[0].time > last) if may_be_person(each[1])]
-    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], [(mask,) for _, mask in later])
+    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in later))
 
 
 def _look(footage: Footage, film: FilmSurvey) -> Look:

@@ -32,7 +32,7 @@ CLOTHED = 0.89
 made people, men, women and children who stand, sit and kneel, 1.3 to 2.4 m away."""
 COMPARED = 5
 """Number of moments in which places are compared."""
-PRUNED, WELL = 0.15, 0.2
+PRUNED, WELL = 0.15, 0.15
 """A place is compared in all moments if its overlap in its own is at most this much under the best; a moment fits the chosen place if its
 overlap is at most this much under the median."""
 
