@@ -44,6 +44,8 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 def on_post_page(output: str, **_: Any) -> str:
     """The page with the script that lets search work from the disk, before Material's own; called by MkDocs for every page."""
+    if BUNDLE not in output:
+        raise RuntimeError("found no script of Material's in a page: search from the disk would not work")
     return output.replace(BUNDLE, f'<script src="{FROM_DISK}"></script>{BUNDLE}', 1)
 
 

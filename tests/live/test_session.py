@@ -12,6 +12,7 @@ from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.live import base_session
 from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, in_background, moved, unfit
 from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
@@ -313,7 +314,49 @@ def test_what_is_no_person_is_not_tracked(pictures):
     assert any("no person's shape" in outcome.view.message for outcome in outcomes)
 
 
+@pytest.mark.parametrize(("overlaps", "phase"), [((0.0, 0.9, 0.9), "tracking"), ((0.0, 0.0, 0.9), "waiting")])
+def test_a_measurement_is_good_if_most_silhouettes_fit(pictures, tracking, overlaps, phase):
+    session = tracking.session
+    fit = replace(session.measured, overlaps=dict(enumerate(overlaps)))
+    session.phase, session._measured = "measuring", lambda: fit
+    assert tracking.give(pictures[1][24]).view.phase == phase
+
+
+def test_who_is_measured_anew_keeps_the_height_that_was_measured(pictures, tracking):
+    session, known = tracking.session, tracking.session.measured
+    session.fit = replace(known, guess=replace(known.guess, height=1.62))
+    task = session._fitting([np.ones((120, 160), bool)])
+    assert (task.keywords["height"], task.keywords["distance"], task.keywords["sizes"]) == (1.62, None, known.guess.sizes)
+
+
+def test_stillness_begins_anew_after_pictures_did_not_come(pictures):
+    stage = Stage()
+    stage.play([*pictures[0], *pictures[1][:8]])  # of which the last stand still, but not for long enough
+    assert not np.isnan(stage.session._still._since)
+    stage.idle(5.0)
+    assert stage.give(pictures[1][8]).view.phase == "waiting"
+    assert stage.play(pictures[1][9:20])[-1].view.phase in ("measuring", "tracking")
+
+
 # Leaving and returning
+
+
+def test_who_is_lost_for_long_is_advised_to_be_measured_anew(pictures, tracking, monkeypatch):
+    plain = base_session.motion_frame
+
+    def lost(*args):
+        frame, before = plain(*args)
+        return frame._replace(status="lost"), before
+
+    def said(count):
+        return [tracking.give(image, after=0.5).view.message for image in pictures[1][25 : 25 + count]]
+
+    advice = "the body does not fit any more: measure anew"
+    for _ in range(2):  # the second time it is counted anew
+        monkeypatch.setattr(base_session, "motion_frame", lost)
+        assert said(7) == [""] * 5 + [advice] * 2
+        monkeypatch.setattr(base_session, "motion_frame", plain)
+        assert said(1) == [""]
 
 
 def test_a_person_who_leaves_is_absent_and_tracked_again_when_they_return(pictures, tracking):

@@ -27,6 +27,8 @@ from shadowpuppet.silhouette.correction.condition import FilmCondition, film_con
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
 
+SHORT = 1.0
+"""Length of a film, seconds, under which it is said to be short."""
 UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 GOOD = 0.9
@@ -134,12 +136,15 @@ def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (Scen
 
 
 def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
-    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film."""
+    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film; and those
+    of the later runs of the sample, the first of each."""
     def seen(frame: CameraFrame) -> tuple[float, Mask]:
         return frame.time, clean(frame)
 
     people = list(islice((each for each in map(seen, chain(sample.first, sample.frames)) if may_be_person(each[1])), FIRST))
-    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people])
+    last = people[-1][0] if people else 0.0
+    later = [each for each in (seen(run[0]) for run in sample.runs if run[0].time > last) if may_be_person(each[1])]
+    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in later))
 
 
 def _look(footage: Footage, film: FilmSurvey) -> Look:
@@ -198,6 +203,10 @@ def _doubts(look: Look, footage: Footage) -> list[Caution]:
         doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",
                               "distance not known: measure it, give --distance", NOTED))
+    if look.frames is not None and look.frames < SHORT * look.rate:
+        seconds = f"{look.frames / look.rate:.1f} s"
+        doubts.append(Caution(f"the film has only {look.frames} frames ({seconds}): too few to measure the person well and to smooth the "
+                              "motion; film some seconds", f"film of {seconds} is very short: film some seconds", HARMFUL))
     if look.jitter * look.rate > UNEVEN:
         doubts.append(Caution(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are "
                               "kept", "frames come unevenly: their own times are kept", NOTED))
