@@ -25,9 +25,10 @@ from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
 from shadowpuppet.pipeline.survey import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
-from shadowpuppet.tracking.doubt.doubt import Points, state_doubt
+from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
+from shadowpuppet.tracking.doubt.variance import ModeWeights, variance_model
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
@@ -113,9 +114,11 @@ class Tracked:
     pose_errors: Array = field(default_factory=lambda: np.empty((0, 0)))
     """True poses less the estimates (T, D), rad or m; not a number where there is none."""
     pose_sd: Array = field(default_factory=lambda: np.empty((0, 0)))
-    """Standard deviations (T, D) of the degrees of freedom as the package states them, rad or m."""
+    """Standard deviations (T, D) of the degrees of freedom before calibration, rad or m."""
     statuses: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, "<U9"))
     """The frames' (T,)."""
+    weighting: ModeWeights | None = None
+    """Which weights `modes` states."""
 
 
 def mode_rows(modes: Sequence[Mode], points: Array, truth: Array, names: Sequence[str]) -> list[tuple[float, float]]:
@@ -159,7 +162,7 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
     skeleton, names, rate = picture.body.skeleton, picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
     turn, truth = case.camera.T_camera_world[:3, :3], _places(case.truth, names)
     right = true_poses(skeleton, picture.points_world, truth)
-    angles = np.array([dof.kind == "rotation" for dof in skeleton.dofs])
+    model, angles = variance_model("monocular"), np.array([dof.kind == "rotation" for dof in skeleton.dofs])
     for n, (fault, spoil) in enumerate(FAULTS.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
         tracker = MonocularTracker(picture, options.tracker)
@@ -170,7 +173,7 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
             found, before = doubt.evidence(state, mask, seconds, before)
             rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
-            deviations.append(state_doubt("monocular", found, names, skeleton, picture.points, state.pose, state.status, turn.T).pose_sd)
+            deviations.append(pose_deviations(skeleton, picture.points, state.pose, model.sd(names, found.components)))
             statuses.append(state.status)
             modes += mode_rows(found.modes, picture.points_world(poses[-1][None])[0], truth[n], names)
         errors = (truth[: len(poses)] - picture.points_world(np.array(poses))) @ turn.T
@@ -178,7 +181,7 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
         off[:, angles] = wrapped(off[:, angles])
         components = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         yield Tracked(path.name, fault, names, components, errors, np.array(modes).reshape(-1, 2), tuple(dof.name for dof in skeleton.dofs),
-                      off, np.array(deviations), np.array(statuses))
+                      off, np.array(deviations), np.array(statuses), model.modes)
 
 
 ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
@@ -243,7 +246,7 @@ def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
         for run in TRACK[kind](path):
             np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
                                 modes=run.modes, names=list(run.components), dofs=run.dofs, pose_errors=run.pose_errors,
-                                pose_sd=run.pose_sd, statuses=run.statuses,
+                                pose_sd=run.pose_sd, statuses=run.statuses, weighting=run.weighting or (),
                                 components=np.stack(list(run.components.values()), 3).astype(np.float32))
         (folder / "done").touch()
     return sorted(folder.glob("*.npz"))
@@ -261,5 +264,6 @@ def read_runs(files: Iterable[Path]) -> list[Tracked]:
         data = np.load(file, allow_pickle=False)
         components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
         found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"], data["modes"],
-                             tuple(data["dofs"].tolist()), data["pose_errors"], data["pose_sd"], data["statuses"]))
+                             tuple(data["dofs"].tolist()), data["pose_errors"], data["pose_sd"], data["statuses"],
+                             ModeWeights(*data["weighting"].tolist()) if data["weighting"].size else None))
     return found

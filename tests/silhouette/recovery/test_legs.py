@@ -24,7 +24,8 @@ def test_legs_that_keep_still_are_found_below_the_trunk():
     still, movement, covered = standing()
     found = still_legs(still, movement, covered)
     assert found is not None
-    assert found[62:99, 66:76].all() and found[62:99, 84:94].all()
+    assert found[62:99, 66:76].all()
+    assert found[62:99, 84:94].all()
     assert not found[70:, 78:82].any()
     assert not found[102:].any()
 

@@ -14,8 +14,8 @@ from shadowpuppet.silhouette.background import Floats, Image, check_alike, check
 from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
 from shadowpuppet.silhouette.recovery.filling import filled
-from shadowpuppet.silhouette.recovery.legs import still_legs
 from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels
+from shadowpuppet.silhouette.recovery.legs import still_legs
 from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, temporal_modes
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
@@ -70,7 +70,8 @@ def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
     2. `movement.find_movement`: pixels that something moved over, and those enclosed by them. All others show the scene.
     3. `modes.temporal_modes`: the colours that each of these pixels shows, with their shares.
     4. `labelling.label_pixels`: which mode is the scene's, or whether the person covers the pixel always. The first time the colours of
-       the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene.
+       the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene. If `legs.still_legs` finds
+       legs that kept still below a trunk, they are added to the pixels of step 2, and all are labelled again.
     5. The scene's picture at full size: the mean of the frames that show the mode. Covered pixels are filled from around.
 
     Raises `SilhouetteError` for fewer than 3 frames, and frames that do not fit together.
