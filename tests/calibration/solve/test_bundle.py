@@ -8,8 +8,9 @@ import boards
 import numpy as np
 import pytest
 
-from shadowpuppet.calibration.solve.bundle import _reduced, _solve, projected
+from shadowpuppet.calibration.solve.bundle import projected
 from shadowpuppet.calibration.solve.lens import MODELS, lens_advice, solve_lens
+from shadowpuppet.calibration.solve.normal_equations import reduced, solution
 from shadowpuppet.calibration.solve.placement import place_cameras
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
@@ -45,8 +46,8 @@ def test_boards_taken_out_leave_the_same_solution(rng):
     for b in range(3):  # each row sees one board only
         A[:, 7 + 6 * b : 13 + 6 * b] *= (np.arange(200) % 3 == b)[:, None]
     H, g = A.T @ A, rng.normal(size=25)
-    np.testing.assert_allclose(_solve(H, g, 7), np.linalg.solve(H, g), atol=1e-9)
-    np.testing.assert_allclose(np.linalg.inv(_reduced(H, 7).S), np.linalg.inv(H)[:7, :7], atol=1e-9)
+    np.testing.assert_allclose(solution(H, g, 7), np.linalg.solve(H, g), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.inv(reduced(H, 7).S), np.linalg.inv(H)[:7, :7], atol=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -103,7 +103,7 @@ class Board:
         """The corners between four squares in the board's frame, row by row, of shape (N, 3), metres."""
         across, down = self.inner
         x, y = np.meshgrid(np.arange(across) - (across - 1) / 2, np.arange(down) - (down - 1) / 2)
-        return self.square * np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+        return np.asarray(self.square * np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), float)
 
     @property
     def aruco_dictionary(self) -> Any:

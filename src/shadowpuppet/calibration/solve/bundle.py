@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.calibration.solve.normal_equations import covariance_of, solution
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector
@@ -95,7 +96,8 @@ class _Columns(NamedTuple):
     """Columns of OpenCV's lens derivatives (fx, fy, cx, cy, coefficients) that are free, by camera."""
     shared: int
     """Columns that are not boards': the first ones."""
-    count: int
+    total: int
+    """Number of columns."""
 
 
 def adjust(start: Bundle, seen: Observations, free: Free) -> Solved:
@@ -112,11 +114,11 @@ def _adjusted(start: Bundle, seen: Observations, free: Free) -> Solved:
     bundle, damping = start, 1e-3
     scale = _scale(residuals)
     cost = _cost(residuals, scale)
-    for _ in range(MAX_STEPS if columns.count else 0):
+    for _ in range(MAX_STEPS if columns.total else 0):
         H, g = _normal(jacobian, residuals, scale)
-        stepped = False
+        stepped, new = False, cost
         for _ in range(12):
-            step = _solve(H + damping * np.diag(np.maximum(np.diag(H), 1e-12)), g, columns.shared)
+            step = solution(H + damping * np.diag(np.maximum(np.diag(H), 1e-12)), g, columns.shared)
             tried = _moved(bundle, step, columns)
             off, jac = _linearised(tried, seen, columns)
             new = _cost(off, scale) if np.isfinite(off).all() else np.inf
@@ -136,9 +138,9 @@ def _adjusted(start: Bundle, seen: Observations, free: Free) -> Solved:
 def _result(bundle: Bundle, residuals: Array, jacobian: object, scale: float, columns: _Columns) -> Solved:
     C = len(bundle.cameras)
     place, angle, delay, lens = np.zeros(C), np.zeros(C), np.zeros(C), np.zeros(C)
-    if columns.count:
+    if columns.total:
         H, _ = _normal(jacobian, residuals, scale)
-        covariance = _covariance(H, columns.shared)
+        covariance = covariance_of(H, columns.shared)
         for c, camera in enumerate(bundle.cameras):
             if (k := columns.places[c]) >= 0:
                 # centre = -R' t: with R <- exp(w) R and t <- t + d it moves by -R' (d + t x w)
@@ -210,9 +212,9 @@ def _linearised(bundle: Bundle, seen: Observations, columns: _Columns) -> tuple[
         put(which, columns.boards[seen.board[which]], np.concatenate([by_world @ -_cross(turned[which]), by_world], axis=2))
         put(which, same + columns.delays[n], -seen.velocities[which][:, :, None])
         put(which, same + columns.lenses[n], by_lens[:, :, columns.coefficients[n]])
-    if not columns.count:
+    if not columns.total:
         return out, None
-    table = csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(2 * M, columns.count))
+    table = csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(2 * M, columns.total))
     return out, table
 
 
@@ -283,43 +285,3 @@ def _normal(jacobian: object, residuals: Array, scale: float) -> tuple[Array, Ar
     weighted = jacobian.multiply(weights[:, None])  # pyright: ignore[reportAttributeAccessIssue]
     H = (weighted.T @ jacobian).toarray()
     return np.asarray(H, float), np.asarray(weighted.T @ residuals.ravel(), float)
-
-
-class _Reduced(NamedTuple):
-    """Normal equations without the poses of boards, which see cameras only: Schur's complement."""
-
-    S: Array
-    """Of cameras, of shape (P, P)."""
-    E: Array
-    """Cameras' with boards', of shape (P, 6 B)."""
-    inverses: Array
-    """Of the boards' own blocks, of shape (B, 6, 6)."""
-
-
-def _reduced(H: Array, P: int) -> _Reduced:
-    """The complement of normal equations (N, N) whose first `P` columns are the cameras'. Raises `LinAlgError` if a board is free."""
-    count = (len(H) - P) // 6
-    own = H[P:, P:].reshape(count, 6, count, 6)[np.arange(count), :, np.arange(count)]
-    inverses, E = np.linalg.inv(own) if count else np.zeros((0, 6, 6)), H[:P, P:]
-    spread = np.einsum("pbi,bij->pbj", E.reshape(P, count, 6), inverses).reshape(P, 6 * count)
-    return _Reduced(H[:P, :P] - spread @ E.T, E, inverses)
-
-
-def _solve(H: Array, g: Array, P: int) -> Array:
-    """The solution (N,) of H x = g."""
-    try:
-        S, E, inverses = _reduced(H, P)
-        alone = np.einsum("bij,bj->bi", inverses, g[P:].reshape(-1, 6)).ravel()
-        first = np.linalg.solve(S, g[:P] - E @ alone) if P else g[:0]
-        rest = alone - np.einsum("bij,bj->bi", inverses, (E.T @ first).reshape(-1, 6)).ravel()
-        return np.concatenate([first, rest])
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(H, g, rcond=None)[0], float)
-
-
-def _covariance(H: Array, P: int) -> Array:
-    """Covariance (P, P) of the cameras' columns; infinite variance where the observations say nothing."""
-    try:
-        return np.linalg.pinv(_reduced(H, P).S, hermitian=True) if P else np.zeros((0, 0))
-    except np.linalg.LinAlgError:
-        return np.diag(np.full(P, np.inf))
