@@ -92,6 +92,12 @@ def test_freemocap_s_board_tells_the_unit(tmp_path, made, square, unit):
     assert any("FreeMoCap" in note for note in found.notes)
 
 
+def test_a_number_too_large_for_any_board_is_none(tmp_path, made):
+    path = tmp_path / "c.toml"
+    path.write_text(calibrations.toml(made, 1.0, f"[metadata]\ncharuco_square_size = {'9' * 400}\n"))
+    assert not any("FreeMoCap" in note for note in examine_calibration(path).notes)
+
+
 @pytest.mark.parametrize("board", ["[metadata.board]\nsquare_length_mm = 54.0\n", "[board]\nsquare_length_mm = 54\n",
                                    '[metadata]\n"board.square_length_mm" = 54.0\n'])
 def test_newer_files_of_freemocap_have_millimetres(tmp_path, made, board):
