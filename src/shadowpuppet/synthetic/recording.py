@@ -53,7 +53,10 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     wrong = [CameraFaults(spec.faults, camera, len(times), spec.rate, own, spec.scene.flicker_hz)
              for camera, own in zip(cameras, for_faults.spawn(len(cameras)))]
     absent = wrong[0].absent()
-    write_truth(folder / "truth", times, figure.joints, spec.rate, feet, absent)
+    for name in ("truth", *["truth_1"][: len(others)]):
+        write_truth(folder / name, times, figure.joints, spec.rate, feet, absent)
+    for n, other in enumerate(others, 2):
+        write_truth(folder / f"truth_{n}", times, other.joints, spec.rate)
     figure = _away(figure, absent)
     _write_given(folder, spec, cameras, for_training)
     hidden = 0
@@ -216,6 +219,8 @@ def _write_subject(path: Path, spec: Spec) -> None:
     if "distance" in spec.tells and len(views) == 1:
         distance = views[0].distance
         lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
+    if spec.scene.bystanders and len(views) > 1:
+        lines += ["", "[masks]          # of all people", *(f'{view.name} = "people/{view.name}.mkv"' for view in views)]
     write_lines(path, lines)
 
 
