@@ -209,7 +209,8 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
     first, cameras = views[0], f"{len(views)} cameras" if len(views) > 1 else "1 camera"
     extras = [thing.kind for thing in spec.scene.obstacles] + ["another person"] * len(spec.scene.bystanders)
     one_camera = f" --camera {first.name}" if len(views) > 1 else ""
-    also = {"people/, truth_1.csv, ...": spec.scene.bystanders, "training.csv, training.trc": recording.training, "references/": recording.references}
+    also = {"people/, truth_1.csv, ...": spec.scene.bystanders, "training.csv, training.trc": recording.training,
+            "references/": recording.references}
     return pairs([
         ("recording", str(path)),
         ("person", f"{spec.body.stature:.2f} m: {_gestures(spec)}" + (f"; in the scene: {', '.join(extras)}" if extras else "")),

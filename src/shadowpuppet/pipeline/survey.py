@@ -19,6 +19,7 @@ from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.footage import FIRST, LOOKED_AT, CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import sampled_sets, take_census
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
@@ -223,14 +224,26 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> S
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
     silhouettes = tuple(film.silhouettes for film in films)
+    census, wide = None, tuple(each.of_several() for each in silhouettes)
+    if any(_shows_person(film) for film in films):
+        census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide))
+    if census is not None and census.number > 1:
+        silhouettes = wide
     first = _first_sets(rig, silhouettes, options.masks)
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
     doubts = [*_rig_doubts(look), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    if census is not None and census.number > 1:
+        doubts.insert(0, Caution(f"{census.number} people are in the recording: each is tracked, into person-1, person-2, ... in the run's "
+                                 "folder", f"{census.number} people: each is tracked", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
-    return Survey(rig, silhouettes, silhouettes, first, look)
+    return Survey(rig, silhouettes, silhouettes, first, look, census)
+
+
+def _shows_person(film: FilmSurvey) -> bool:
+    return any(may_be_person(mask) for mask in film.masks)
 
 
 def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> FirstSeconds:

@@ -65,6 +65,8 @@ class Segmenter:
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
     correction: Correction | None = None
     """Undoes what has changed since the empty scene; None: nothing."""
+    several: bool = False
+    """Whether masks keep all parts of a person's size, for several people, or the largest part, one person's."""
     covered: NDArray[np.bool_] | None = None
     """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
 
@@ -90,7 +92,7 @@ class Segmenter:
         """The mask (H, W) that step 4 makes of it."""
         image, label, gap = labelled
         if self.settings.cleaned:
-            label = clean(label, lambda window: self.contrast(image, window), self.edge)
+            label = clean(label, lambda window: self.contrast(image, window), self.edge, self.several)
         mask = label > 0 if self.covered is None else (label > 0) | self.covered
         return mask if gap is None else gap.filled(mask)
 
