@@ -20,6 +20,8 @@ BESIDE = 6
 """Pixels beside a column's projection that are still that person's, at a quarter of the size: hands that the coarse hull lacks."""
 MIN_SETS, MOST_SETS = 4, 16
 """Least number of frame sets that show a person apart in two views, or else views are used that do not; and the most that are used."""
+TALL = 0.8, 2.3
+"""Least and greatest height of a person, metres, that is expected of a column; the sizes are refined from there."""
 
 View = tuple[Mask | None, ...]
 
@@ -58,5 +60,7 @@ def fit_apart(rng: np.random.Generator, cameras: Sequence[Camera], room: Room, o
     if len(apart) < min(MIN_SETS, len(seen)):
         apart = [views_of(room, *each, strict=False) for each in seen]
     chosen = [apart[n] for n in np.unique(np.linspace(0, len(apart) - 1, MOST_SETS).astype(int))]
-    subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate)
+    # half a voxel less, as the lowest and the highest are filled in part
+    tall = float(np.clip(np.median([column.height for column, *_ in seen]) - room.pitch / 2, *TALL))
+    subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall)
     return replace(subject, tracker=replace(subject.tracker, looks=0))
