@@ -21,7 +21,8 @@ def two_people(folder):
             for n in range(3):
                 for person in (1, 2):
                     gone = person == 2 and n == 2
-                    write_place(file, n / 10, person, "absent" if gone else "tracked", np.full(2, np.nan) if gone else np.array([n, person]))
+                    place = np.full(2, np.nan) if gone else np.array([n, person])
+                    write_place(file, n / 10, person, "absent" if gone else "tracked", place)
         for person in (1, 2):
             with RunWriter(person_folder(folder, person), "anatomical", DOFS, JOINTS, {"person": person}):
                 pass
@@ -66,9 +67,13 @@ def test_people_replace_a_run_of_one(tmp_path):
 
 
 def test_an_interrupted_run_is_not_complete(tmp_path):
-    with pytest.raises(ShadowPuppetError, match="stop"), RunWriter(tmp_path / "run", "anatomical", DOFS, JOINTS, {}) as writer:
-        writer.hand_over()
-        raise ShadowPuppetError("stop")
+    def stopped() -> None:
+        with RunWriter(tmp_path / "run", "anatomical", DOFS, JOINTS, {}) as writer:
+            writer.hand_over()
+            raise ShadowPuppetError("stop")
+
+    with pytest.raises(ShadowPuppetError, match="stop"):
+        stopped()
     assert "complete = false" in (tmp_path / "run" / "run.toml").read_text()
 
 

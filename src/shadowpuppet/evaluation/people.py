@@ -84,7 +84,7 @@ def measure_people(folder: str | Path, truths: Sequence[Path] = ()) -> dict[str,
     tables = [read_truth(path) for path in paths]
     times = tables[0].times
     begin, end = (next(iter(runs.values())).info.get(key) for key in ("begin", "end"))
-    times = times[(times >= (begin or 0.0) - 1e-6) & (times <= (np.inf if end is None else end) + 1e-6)]
+    times = times[(times >= (begin or 0.0) - 1e-6) & (times < (np.inf if end is None else end) - 1e-6)]
     who = identities(np.stack([_places(table, times) for table in tables], 1),
                      np.stack([_tracked(run, times) for run in runs.values()], 1))  # fmt: skip
     numbers = list(runs)

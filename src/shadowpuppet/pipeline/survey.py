@@ -19,7 +19,7 @@ from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.footage import FIRST, LOOKED_AT, CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import count_in_picture, sampled_sets, take_census
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
@@ -154,8 +154,17 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    doubts = (*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *_clutter_warnings(look.left_out))
+    doubts = (*_several_people(film), *_doubts(look, footage),
+              *_recovery_doubts([camera.name], [film.silhouettes]), *_clutter_warnings(look.left_out))
     return replace(look, doubts=(*doubts, *look.quality.warnings()))
+
+
+def _several_people(film: FilmSurvey) -> list[Caution]:
+    number = count_in_picture(film.sample, film.silhouettes)
+    if number < 2:
+        return []
+    return [Caution(f"{number} people are in the picture: one camera tracks one, the nearest, who is the largest in the picture; two "
+                    "calibrated cameras or more track all", f"{number} people; the nearer one is tracked", HARMFUL)]
 
 
 def _doubted(silhouettes: Silhouettes) -> str | None:
@@ -234,7 +243,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> S
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    doubts = [*_rig_doubts(look), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    doubts = [*_rig_doubts(look, census is not None and census.number > 1), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
     if census is not None and census.number > 1:
         doubts.insert(0, Caution(f"{census.number} people are in the recording: each is tracked, into person-1, person-2, ... in the run's "
                                  "folder", f"{census.number} people: each is tracked", NOTED))
@@ -273,7 +282,8 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     return look.agreement.refusal()
 
 
-def _rig_doubts(look: RigLook) -> list[Caution]:
+def _rig_doubts(look: RigLook, several: bool = False) -> list[Caution]:
+    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing."""
     doubts = list(look.agreement.doubts())
     rates = np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
@@ -289,7 +299,8 @@ def _rig_doubts(look: RigLook) -> list[Caution]:
     for camera in look.cameras:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(_unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
-        warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *camera.quality.warnings())
+        quality = () if several else camera.quality.warnings()
+        warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
         doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]

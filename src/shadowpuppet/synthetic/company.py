@@ -6,9 +6,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from shadowpuppet.synthetic.movement.paths import TURN_RADIUS
+
 Together = Literal["round", "past", "dance", "shake_hands"]
 
-LANE = 1.7
+LANE = 2.0
 """Distance from one pair of people who walk past each other to the next, metres."""
 HANDSHAKE = 0.92, 0.3
 """Distance of two people who shake hands, and how far the second stands to the first's right, metres."""
@@ -28,14 +30,14 @@ class Member(NamedTuple):
     motion: dict[str, Any]
     """The values of a `Gesture`."""
     x: float = 0.0
-    """Place, world, metres: the middle of the area walked over, or where the person stands."""
+    """Place in the first frame, world, metres."""
     y: float = 0.0
     turn_deg: float = 0.0
     """Heading, degrees to the left of -Y."""
 
 
 def members(together: Together, count: int) -> list[Member]:
-    """The `count` people of a scene, the tracked person first, who is at the origin."""
+    """The `count` people of a scene; the first is at the origin when the film begins."""
     people = {"round": _round, "past": _past, "dance": _dance, "shake_hands": _shake_hands}[together](count)
     first = people[0]
     return [one._replace(x=one.x - first.x, y=one.y - first.y) for one in people]
@@ -43,14 +45,19 @@ def members(together: Together, count: int) -> list[Member]:
 
 def _round(count: int) -> list[Member]:
     """People who walk round each other, evenly spaced on one circle."""
-    walk = {"motion": "walk", "path": "circle", "size": max(0.75, 0.3 * count), "speed": 1.0}
-    return [Member(walk, turn_deg=_half_open(360 * n / count)) for n in range(count)]
+    radius = max(0.75, 0.3 * count)
+    walk = {"motion": "walk", "path": "circle", "size": radius, "speed": 1.0}
+    angles = 2 * np.pi * np.arange(count) / count  # of the headings; the circle's middle is to everybody's left
+    return [Member(walk, -radius * float(np.cos(angle)), -radius * float(np.sin(angle)), _half_open(float(np.degrees(angle))))
+            for angle in angles]  # fmt: skip
 
 
 def _past(count: int) -> list[Member]:
     """Pairs of people who walk to and fro in opposite directions, past each other in the middle."""
-    walk = {"motion": "walk", "path": "line", "size": 2.2, "speed": 1.1}
-    return [Member(walk, y=LANE * (n // 2), turn_deg=90.0 if n % 2 == 0 else -90.0) for n in range(count)]
+    length, aside = 2.2, 2 * TURN_RADIUS  # there and back are a lane each, the second to the left of the first
+    walk = {"motion": "walk", "path": "line", "size": length, "speed": 1.1}
+    return [Member(walk, length if n % 2 else 0.0, LANE * (n // 2) + (aside if n % 2 else 0.0), -90.0 if n % 2 else 90.0)
+            for n in range(count)]  # fmt: skip
 
 
 def _dance(count: int) -> list[Member]:

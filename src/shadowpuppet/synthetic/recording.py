@@ -49,7 +49,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     times, figure = perform(spec, for_motion)
     feet = feet_of(spec, times, figure, same_motion)
     company = spec.scene.bystanders
-    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
+    others = [_bystander(spec, someone, len(times), own, figure) for someone, own in zip(company, for_others.spawn(len(company)))]
     wrong = [CameraFaults(spec.faults, camera, len(times), spec.rate, own, spec.scene.flicker_hz)
              for camera, own in zip(cameras, for_faults.spawn(len(cameras)))]
     absent = wrong[0].absent()
@@ -104,14 +104,17 @@ def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> Figure:
     return animate(spec.body, spec.motion, t, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
 
 
-def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
-    """The figure of a bystander in `count` frames, at the bystander's place."""
+def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator, person: Figure | None = None) -> Figure:
+    """The figure of a bystander in `count` frames, at the bystander's place beside the `person`, who else is at the origin."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
     always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None,
                      posture="standing", scene=Scene())
     _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
+    if someone.from_start:
+        begin, own = (np.zeros(2) if one is None else one.joints[0, 0, :2] for one in (person, figure))
+        place[:2] += begin - own
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
 

@@ -39,6 +39,9 @@ class Bystander:
     """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Rotation to their left, degrees; 0 looks where the person looks."""
+    from_start: bool = False
+    """Whether they stand in the first frame at that distance from where the person stands then; else the middle of the area over which they
+    walk is that far from the middle of the person's."""
 
     def __post_init__(self) -> None:
         """Check that the bystander does not stand at the person's place; one who walks passes over it at other times."""

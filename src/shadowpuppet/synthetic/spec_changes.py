@@ -146,7 +146,8 @@ def _gather(values: dict[str, Any], said: dict[str, Any], spec: Spec, source: st
         values["motion"] = [first.motion | {"seconds": seconds}]
     values["turn_deg"], values["training"] = first.turn_deg, []
     values["scene"]["bystanders"] = [
-        {"motion": other.motion, "ahead": -other.y, "left": other.x, "turn_deg": other.turn_deg, "seed": SEED + n}
+        {"motion": other.motion, "ahead": -other.y, "left": other.x, "turn_deg": other.turn_deg, "seed": SEED + n,
+         "from_start": True}
         for n, other in enumerate(others)
     ]  # fmt: skip
     if "ring" not in values and said.get("cameras", 1) > 1:
