@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
-from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
+from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEAD_SECONDS, LEVEL, TAIL_SECONDS, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
@@ -107,7 +107,8 @@ def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> Figure:
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator, person: Figure | None = None) -> Figure:
     """The figure of a bystander in `count` frames, at the bystander's place beside the `person`, who else is at the origin."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
-    gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
+    length = count / spec.rate - (LEAD_SECONDS + TAIL_SECONDS if someone.from_start else 0.0)  # they begin and end together
+    gestures = (replace(someone.motion, seconds=max(2.0, length / again)),) * again
     always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None,
                      posture="standing", scene=Scene())
     _, figure = perform(always, rng)
