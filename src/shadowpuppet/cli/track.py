@@ -88,12 +88,15 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     """Print the people of a run and its files; returns the exit code."""
     from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST
 
+    def is_lost(status: Mapping[str, int], frames: int) -> bool:
+        return status.get("lost", 0) > MOSTLY_LOST * (frames - status.get("absent", 0))
+
     people = metrics["people"]
     if not quiet:
         names = [f"person-{number}" for number in people]
         show(people_table(people), pairs([("speed", f"{metrics['frames_per_s']:.1f} frame sets/s"),
                                           files_in(folder, "people.csv", "overlay.mp4", *names)]))
-    lost = [number for number, each in people.items() if each["status"]["lost"] > MOSTLY_LOST * (each["frames"] - each["status"]["absent"])]
+    lost = [number for number, each in people.items() if is_lost(each["status"], each["frames"])]
     if len(lost) < len(people):
         return 0
     print("all people are lost in most frames", file=sys.stderr)

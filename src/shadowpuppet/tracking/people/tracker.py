@@ -24,7 +24,6 @@ from shadowpuppet.tracking.people.evidence import (
     picked,
     predicted,
 )
-from shadowpuppet.tracking.recovery import settle
 from shadowpuppet.tracking.unexplained import near
 
 TOUCHING = 0.25
@@ -85,11 +84,10 @@ def start(person: MultiviewTracker, rng: np.random.Generator, column: Column, dr
     rough = PersonObservation(person.views, own, masks)
     if not person.is_present(rough):
         return None
-    found = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))
+    found = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, found.pose)
     observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
-    still = np.zeros_like(found.pose)
-    return _judged(settle(found, lambda state: person.cycle(rng, state, observation)._replace(velocity=still)))
+    return _judged(person.search(rng, observation))
 
 
 def touching(drawn: Mapping[int, Drawn]) -> list[int]:
