@@ -236,17 +236,17 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> S
     census, wide = None, tuple(each.of_several() for each in silhouettes)
     if any(_shows_person(film) for film in films):
         census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide))
-    if census is not None and census.number > 1:
-        silhouettes = wide
+    several = census.number if census is not None and census.number > 1 else 0
+    silhouettes = wide if several else silhouettes
     first = _first_sets(rig, silhouettes, options.masks)
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    doubts = [*_rig_doubts(look, census is not None and census.number > 1), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
-    if census is not None and census.number > 1:
-        doubts.insert(0, Caution(f"{census.number} people are in the recording: each is tracked, into person-1, person-2, ... in the run's "
-                                 "folder", f"{census.number} people: each is tracked", NOTED))
+    doubts = [*_rig_doubts(look, bool(several)), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    if several:
+        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... in the run's folder",
+                                 f"{several} people: each is tracked", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
     return Survey(rig, silhouettes, silhouettes, first, look, census)
 
