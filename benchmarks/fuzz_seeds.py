@@ -27,7 +27,7 @@ from shadowpuppet.io.intervals import read_intervals
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion, read_truth
-from shadowpuppet.io.motion.opensim import read_mot
+from shadowpuppet.io.motion.opensim.mot import read_mot
 from shadowpuppet.io.motion.overview import look_at_motion
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.person import Person, read_person, write_person

@@ -30,6 +30,8 @@ from shadowpuppet.tracking.monocular.settings import PRESETS
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS
 
 MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
+BUNDLE = '<script src="assets/javascripts/bundle'
+FROM_DISK = "assets/search_from_disk.js"
 QUOTES = '"""'
 SIGNS = {"ge": "from", "gt": "over", "le": "to", "lt": "under"}
 WORDS = {bool: "true, false", int: "whole number", float: "number", str: "text"}
@@ -38,6 +40,19 @@ WORDS = {bool: "true, false", int: "whole number", float: "number", str: "text"}
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """The page with all markers replaced; called by MkDocs for every page."""
     return MARKER.sub(lambda found: MAKERS[found[1]](*(found[2] or "").split()), markdown)
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """The page with the script that lets search work from the disk, before Material's own; called by MkDocs for every page."""
+    if BUNDLE not in output:
+        raise RuntimeError("found no script of Material's in a page: search from the disk would not work")
+    return output.replace(BUNDLE, f'<script src="{FROM_DISK}"></script>{BUNDLE}', 1)
+
+
+def on_post_build(config: Any, **_: Any) -> None:
+    """Keep the search index as a script too, which pages opened from the disk may load; called by MkDocs at the end."""
+    index = Path(config["site_dir"]) / "search" / "search_index.json"
+    index.with_suffix(".js").write_text(f"var __index = {index.read_text('utf-8')}", encoding="utf-8")
 
 
 def settings_table(table: str = "") -> str:

@@ -299,7 +299,7 @@ def test_a_wrong_file_of_settings_is_said_by_name(shell, recording, tmp_path, te
 
 def test_a_missing_film(shell, spoilt):
     (spoilt / "video" / "cam.mp4").unlink()
-    assert "spoilt: no films in it, expected video/<camera>.mp4, a folder of pictures" in refused(shell, "track", spoilt)
+    assert "spoilt: no films in it, expected <camera>.mp4 or video/<camera>.mp4, a folder of pictures" in refused(shell, "track", spoilt)
 
 
 def test_an_unreadable_film(shell, spoilt):
@@ -444,7 +444,8 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
     child.send_signal(number)
     _, err = child.communicate()
     assert child.returncode == code
-    assert re.fullmatch(rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}", err.splitlines()[-1])
+    said = rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}; --resume goes on with them"
+    assert re.fullmatch(said, err.splitlines()[-1])
     left = read_run(folder)
     assert not left.complete
     assert 2 <= len(left.motion) < made.FRAMES

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import runs
 from made import write_film
 from measured import NAMES, moved, person, write_run
 
@@ -124,6 +125,24 @@ def test_figures_are_those_that_were_measured(tmp_path, quick):
         assert f"{value:.1f}" in text
     for head in ("Error over time", "Joints", "Motion", "Body", "Silhouettes", "Stated uncertainty", "What the figures mean", "The run"):
         assert f"<h2>{head}</h2>" in text
+
+
+@pytest.mark.parametrize(("body", "panels"), [("rounded", 7), ("anatomical", 19)])
+def test_angles_of_both_sides_share_a_panel(tmp_path, body, panels):
+    text = page(measure_run(runs.make_run(tmp_path / "run", body, lost=(3,), spread=True)))
+    section = text.partition("<h2>Angles</h2>")[2].partition("<h2>")[0]
+    assert len(set(re.findall(r'id="angles-axes_(\d+)"', section))) >= panels
+    assert ">elbow flexion<" in section
+    assert ">torso y<" not in section  # metres
+
+
+def test_the_runs_own_verdict_comes_first(tmp_path):
+    of = measure_run(run_that_errs(tmp_path))
+    assert "The run's own verdict" not in page(of)
+    of.run.metrics["verdict"] = {"word": "doubtful", "reasons": ["left arm <doubtful> in 80 % of frames"]}
+    card = page(of).partition('<div class="card">')[2].partition("</div>")[0]
+    assert "doubtful" in card
+    assert "left arm &lt;doubtful&gt; in 80 % of frames" in card
 
 
 def test_a_page_is_the_same_each_time(tmp_path, plain_page):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import runs
 
+from shadowpuppet.body.models import WHOLE
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.export import FORMATS, export_run
 from shadowpuppet.io.files.table import read_table
@@ -25,7 +26,8 @@ from shadowpuppet.io.motion.c3d import read_c3d, read_header
 from shadowpuppet.io.motion.c3d_writer import write_c3d
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import read_motion_npz
-from shadowpuppet.io.motion.opensim import read_mot
+from shadowpuppet.io.motion.opensim.markers import MARKERS
+from shadowpuppet.io.motion.opensim.mot import read_mot
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Y_UP
@@ -60,17 +62,21 @@ def refused(shell, *tokens: object) -> str:
 def test_every_format_of_a_run_has_the_runs_joints(shell, run, tmp_path):
     code, out, err = shell("export", run, "--to", "all", "-o", tmp_path / "out")
     assert code == 0, err
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {f"walk.{name}" for name in EXPORTS}
-    assert "walk.glb" in out
     motion = read_run(run).motion
+    left_out = set() if motion.body_name in WHOLE else {"osim"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {f"walk.{name}" for name in EXPORTS if name not in left_out}
+    assert ("osim is left out: only whole bodies have bones of constant lengths" in err) == bool(left_out)
+    assert "walk.glb" in out
     known = np.delete(np.arange(len(motion)), LOST)
     bvh = read_bvh(tmp_path / "out" / "walk.bvh").joints().select(motion.joint_names).positions @ Y_UP
     assert np.abs(bvh[known] - motion.joints[known]).max() < 1e-4
     for name in ("c3d", "csv", "npz", "parquet"):
         found = read_motion(tmp_path / "out" / f"walk.{name}").select(motion.joint_names)
         np.testing.assert_allclose(found.positions, motion.joints, atol=1e-6, err_msg=name)
-    trc = read_joints(tmp_path / "out" / "walk.trc").positions @ Y_UP
-    np.testing.assert_allclose(trc, motion.joints, atol=1e-6)
+    trc = read_joints(tmp_path / "out" / "walk.trc")
+    ours = trc.select([MARKERS.get(name, name) for name in motion.joint_names])
+    np.testing.assert_allclose(ours.positions @ Y_UP, motion.joints, atol=1e-6)
+    assert ("LHeel" in trc.names) == (motion.body_name == "anatomical")
     np.testing.assert_allclose(read_mot(tmp_path / "out" / "walk.mot").times, motion.times[known])
     assert "3 of 40 frames are not known, which this format cannot tell" in err
     assert "3 of 40 frames are not known: the puppet is hidden" in err
@@ -104,9 +110,18 @@ def test_a_killed_run_is_exported_as_far_as_it_came(shell, whole, tmp_path):
 def test_without_pyarrow_all_others_are_written(shell, whole, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     code, _, err = shell("export", whole, "--to", "all", "-o", tmp_path / "out")
-    assert (code, err) == (0, "warning: parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'\n")
+    assert (code, err.splitlines()[0]) == (0, "warning: parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
     assert {path.suffix[1:] for path in (tmp_path / "out").iterdir()} == set(EXPORTS) - {"parquet"}
     assert "Parquet needs pyarrow" in refused(shell, "export", whole, "--to", "parquet", "-o", tmp_path / "out")
+
+
+def test_the_model_and_the_weight_are_chosen(shell, whole, tmp_path):
+    for model, knee in (("rajagopal", 1), ("gait2392", -1)):
+        assert shell("export", whole, "--to", "mot,osim", "--model", model, "--weight", "70", "-o", tmp_path / model)[0] == 0
+        assert np.median(knee * read_mot(tmp_path / model / "walk.mot").values["knee_angle_r"]) > 0
+    text = (tmp_path / "gait2392" / "walk.osim").read_text()
+    assert sum(map(float, re.findall(r"<mass>(.*)</mass>", text))) == pytest.approx(70, abs=1e-5)
+    assert "weight: found 0.5, expected kilograms from 1 to 500" in refused(shell, "export", whole, "--to", "osim", "--weight", "0.5")
 
 
 def test_units_of_bvh(shell, whole, tmp_path):
@@ -125,7 +140,8 @@ def test_units_and_gaps_of_trc(shell, run, tmp_path):
         assert ("NaN" in text) == (missing == "nan")
         found = read_joints(tmp_path / "walk.trc")
         assert len(found.times) == len(known if missing == "drop" else motion)
-        np.testing.assert_allclose(found.positions[slice(None) if missing == "drop" else known] @ Y_UP, motion.joints[known], atol=1e-6)
+        places = found.positions[slice(None) if missing == "drop" else known, : len(motion.joint_names)]
+        np.testing.assert_allclose(places @ Y_UP, motion.joints[known], atol=1e-6)
     assert "Hip" in found.names or "pelvis" not in motion.joint_names
     assert shell("convert", tmp_path / "walk.trc", tmp_path / "other.trc", "--unit", "m")[0] == 0
     assert "\tm\t" in (tmp_path / "other.trc").read_text()
@@ -200,12 +216,12 @@ def test_joints_become_any_other_file(shell, whole, tmp_path, target):
     assert code == 0, err
     assert f"made{target}" in out
     motion = read_run(whole).motion
-    if target in (".bvh", ".glb", ".mot"):
+    if target in (".bvh", ".glb", ".mot", ".osim"):
         assert "a body's poses fitted to 17 joints, 25 frames" in out
     if target == ".bvh":
         found = read_bvh(tmp_path / "made.bvh").joints().select(motion.joint_names).positions @ Y_UP
         assert np.sqrt(((found - motion.joints) ** 2).sum(2).mean()) < 0.02
-    elif target not in (".glb", ".mot"):
+    elif target not in (".glb", ".mot", ".osim"):
         found = read_motion(tmp_path / f"made{target}").select(motion.joint_names)
         np.testing.assert_allclose(found.positions, motion.joints, atol=2e-6)
 
@@ -291,5 +307,5 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
 
 
 def test_help_names_the_formats(shell):
-    assert "bvh, c3d, csv, glb, mot, npz, parquet, trc" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
+    assert "bvh, c3d, csv, glb, mot, npz, osim, parquet, trc" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
     assert "--source-unit" in shell("convert", "--help")[1]

@@ -252,11 +252,26 @@ def test_unknown_postures_and_lonely_masks_are_said(one):
     said(one, "found front_t_pose_mask alone, expected the picture front_t_pose beside it")
 
 
+def test_films_may_lie_beside_their_calibration(tmp_path):
+    (tmp_path / "lab").mkdir()
+    write_calibration(tmp_path / "lab" / "calibration.toml", cameras("a", "b"))
+    for name in ("a", "b"):
+        film(tmp_path / "lab" / f"{name}.mp4")
+    assert [view.video.name for view in read_recording(tmp_path / "lab").views] == ["a.mp4", "b.mp4"]
+    (tmp_path / "lab" / "calibration.toml").rename(tmp_path / "lab" / "Calib_own.toml")
+    assert [view.camera.name for view in read_recording(tmp_path / "lab").views] == ["a", "b"]
+    film(tmp_path / "lab" / "overlay.mp4")
+    said(tmp_path / "lab", "found overlay, but the calibration knows no such camera")
+    film(tmp_path / "lab" / "video" / "a.mp4")  # films in video/ count alone
+    with pytest.warns(ShadowPuppetWarning, match="no film of b"):
+        assert [view.video for view in read_recording(tmp_path / "lab").views] == [tmp_path / "lab" / "video" / "a.mp4"]
+
+
 def test_what_is_no_recording_is_said(tmp_path, one):
     said(tmp_path / "nowhere", "no such recording")
-    said(tmp_path, "found neither video/ nor calibration.toml nor pictures")
+    said(tmp_path, "found neither films nor video/ nor calibration.toml nor pictures")
     (one / "video" / "cam.mp4").unlink()
-    said(one, "no films in it, expected video/<camera>.mp4")
+    said(one, "no films in it, expected <camera>.mp4 or video/<camera>.mp4")
     (one / "video" / "cam.mp4").write_bytes(b"no film")
     said(one, "cam.mp4: no film that can be read", error=VideoError)
     said(one / "calibration.toml", "calibration.toml: no ", fov=1.0, error=VideoError)

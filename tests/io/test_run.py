@@ -245,7 +245,7 @@ def test_a_second_writer_is_refused_by_name_and_the_first_goes_on(tmp_path):
     folder = tmp_path / "run"
     with writer(folder) as run:
         run.write(a_frame(0))
-        said = rf"run: found another run at work in it \(process {os.getpid()} on .+\), expected a folder for each"
+        said = rf"run: found another run at work in it \(process {os.getpid()} on .+\), expected its end first"
         with pytest.raises(ShadowPuppetError, match=said), writer(folder):
             pass
         other = child(folder, 1)
@@ -336,6 +336,12 @@ def replaced(old: str, new: str):
 
 def without_last_line(path: Path) -> None:
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+
+
+def test_a_recording_is_told_from_a_run(tmp_path):
+    (tmp_path / "lab" / "video").mkdir(parents=True)
+    with pytest.raises(FormatError, match=r"lab: found no run\.toml in it, .*; it is a recording: track it first \(shadowpuppet track "):
+        read_run(tmp_path / "lab")
 
 
 def put(content: bytes):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from shadowpuppet.body.models import WholeBodyName
+from shadowpuppet.body.models import WHOLE, WholeBodyName
 from shadowpuppet.cli.flags import LEARNING, Quiet, Switch, flags_of, given, output, unpacked
 from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import SettingsError, choices
@@ -63,6 +63,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
            to: Annotated[str, Parameter(help=f"Formats, separated by commas: {choices(EXPORTS)}; or all.")] = "bvh,c3d,trc,mot,csv,glb,npz",
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
            unit: Literal["m", "cm", "mm"] | None = None, missing: Literal["nan", "drop", "fill"] = "nan",
+           model: Literal["rajagopal", "gait2392", "pose2sim", "own"] = "rajagopal", weight: float | None = None,
            quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
 
@@ -72,19 +73,27 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         Unit of lengths in .bvh and .trc files. BVH files do not state it; Blender expects m. [default: m in BVH, mm in TRC]
     missing
         Unknown positions in .trc files: the text NaN, no frame that has one, or positions filled in between known frames.
+    model
+        OpenSim model whose coordinates .mot files have: Rajagopal 2016, gait2392, Pose2Sim's, or the .osim file of this command (own).
+    weight
+        Of the person, kilograms, for the masses in .osim files. [default: average build]
     """
     from importlib.util import find_spec
 
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import export_run
+    from shadowpuppet.io.run import read_run
 
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
         if to == "all" and find_spec("pyarrow") is None:
             names.remove("parquet")
             listener.warn("parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
+        if to == "all" and read_run(run).motion.body_name not in WHOLE:
+            names.remove("osim")
+            listener.warn("osim is left out: only whole bodies have bones of constant lengths, as an OpenSim model needs")
         listener.begin("exporting")
-        written = export_run(run, names, folder, unit, missing)
+        written = export_run(run, names, folder, unit, missing, model, weight)
     if not quiet:
         show(pairs([("made", "\n".join(map(str, written)))]))
 

@@ -139,10 +139,10 @@ class Terminal(LiveListener):
 
 @contextmanager
 def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written",
-             verbose: bool = False) -> Iterator[Terminal]:
+             verbose: bool = False, resume: str = "") -> Iterator[Terminal]:
     """A listener that shows progress and warnings.
 
-    After Ctrl-C it names `folder`, which has the frames so far, or says `nothing` before the first frame.
+    After Ctrl-C it names `folder`, which has the frames so far, and how to `resume`, or says `nothing` before the first frame.
     """
     listener = Terminal(quiet, verbose)
     with warnings.catch_warnings():
@@ -153,7 +153,7 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         except KeyboardInterrupt as interrupt:
             if interrupt.args:
                 raise  # its message already says what was kept
-            kept = f"the {listener.frames} frames so far are in {folder}" if listener.frames and folder else nothing
+            kept = f"the {listener.frames} frames so far are in {folder}{resume}" if listener.frames and folder else nothing
             raise KeyboardInterrupt(kept) from None
         finally:
             listener.stop()

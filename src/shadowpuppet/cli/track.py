@@ -68,7 +68,8 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     if not resume:
         _check_earlier(folder, force)
     try:
-        with terminal(quiet, folder, verbose=verbose) as listener:
+        nothing = f"{folder} is as it was" if resume else "nothing was written"
+        with terminal(quiet, folder, nothing, verbose, "; --resume goes on with them") as listener:
             summary = track_recording(recording, folder, options, listener, resume=resume)
         motion, metrics = summary.motion, summary.metrics
     except CompleteRun as error:
@@ -201,7 +202,8 @@ def _show_next(folder: Path) -> None:
     import os
 
     program, run = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet"), folder / "run-ring"
-    print(f"\nnext\n  {program} view {run}\n  {program} evaluate {run} --report {folder / 'run-ring.html'}\n"
+    print("\nA limb that is named above as doubtful is dashed in overlay.mp4, and has its own status in joints.csv.\n"
+          f"\nnext\n  {program} view {run}\n  {program} evaluate {run} --report {folder / 'run-ring.html'}\n"
           f"  {program} export {run} --to bvh,trc\n  {program} track YOUR-FILM.mp4 --fov 65 --height 1.75 --overlay")
 
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     ViewFlags = Any
 else:
-    ViewFlags = unpacked(flags_of(Options, without=("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay")))
+    TRACKING = ("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay", "smooth", "cutoff", "gaps", "facing")
+    ViewFlags = unpacked(flags_of(Options, without=(*TRACKING, "start", "end")))
     """Options for looking at a recording."""
 
 PAGE = Group("Page", sort_key=5.5)

@@ -24,7 +24,11 @@ from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import write_motion_npz, write_npz
-from shadowpuppet.io.motion.opensim import coordinates, marker_names, write_mot
+from shadowpuppet.io.motion.opensim.coordinates import MODELS, coordinates
+from shadowpuppet.io.motion.opensim.feet import with_feet
+from shadowpuppet.io.motion.opensim.markers import marker_names
+from shadowpuppet.io.motion.opensim.model_writer import write_osim
+from shadowpuppet.io.motion.opensim.mot import write_mot
 from shadowpuppet.io.motion.parquet import write_parquet
 from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETON_ENDINGS
 from shadowpuppet.io.motion.skeletons import read_animation
@@ -52,19 +56,36 @@ class Layout(NamedTuple):
     """Unit of length of BVH and TRC files; None for the format's own."""
     missing: str = "nan"
     """What TRC files have for unknown positions, of `MISSING`."""
+    model: str = "rajagopal"
+    """Model, of `MODELS`, whose coordinates MOT files have."""
+    weight: float | None = None
+    """Of the person, kilograms, for .osim files; None: of average build."""
 
     @classmethod
-    def checked(cls, unit: str | None, missing: str) -> Layout:
+    def checked(cls, unit: str | None, missing: str, model: str = "rajagopal", weight: float | None = None) -> Layout:
         """A layout. Raises `SettingsError` if a choice is unknown."""
         if unit is not None and unit not in METRES:
             raise SettingsError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
         if missing not in MISSING:
             raise SettingsError(f"missing: found {missing!r}, expected one of {choices(MISSING)}")
-        return cls(unit, missing)
+        if model not in MODELS:
+            raise SettingsError(f"model: found {model!r}, expected one of {choices(MODELS)}")
+        if weight is not None and not 1 <= weight <= 500:
+            raise SettingsError(f"weight: found {weight}, expected kilograms from 1 to 500")
+        return cls(unit, missing, model, weight)
+
+
+class Puppet(NamedTuple):
+    """A moving body or skeleton."""
+
+    animation: Animation
+    mesh: Mesh
+    body: Body | None = None
+    """None for a skeleton of a file."""
 
 
 def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str | None = None,
-               missing: str = "nan") -> list[Path]:
+               missing: str = "nan", model: str = "rajagopal", weight: float | None = None) -> list[Path]:
     """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths.
 
     A killed run is exported up to its last frame. Warns of data that a format cannot hold. Raises a `ShadowPuppetError` for an
@@ -77,11 +98,13 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
         out: folder of the files (default: export/ in the run's).
         unit: of BVH and TRC files: m, cm or mm (default: m in BVH, mm in TRC).
         missing: what TRC files have for unknown positions: nan, drop or fill, as in `write_trc`.
+        model: of `MODELS`, whose coordinates MOT files have.
+        weight: of the person, kilograms, for .osim files (default: average build).
     """
     unknown = [name for name in formats if name not in EXPORTS]
     if unknown or not formats:
         raise SettingsError(f"formats: found {unknown[0] if unknown else 'none'!r}, expected some of {choices(EXPORTS)}")
-    layout = Layout.checked(unit, missing)
+    layout = Layout.checked(unit, missing, model, weight)
     export = _RunExport(read_run(folder), layout)
     if not np.isfinite(export.run.motion.joints).all(2).any():
         raise ShadowPuppetError(f"{folder}: found no frame with a known joint, expected one at least")
@@ -126,7 +149,7 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
     written = FORMATS[kind[1:]]
     if written.any_skeleton and source.suffix.lower() in SKELETON_ENDINGS:
         animation = read_animation(source, rate, unit, given)
-        written.write_skeleton(target, animation, bone_mesh(animation), layout)
+        written.write_skeleton(target, Puppet(animation, bone_mesh(animation)), layout)
         return f"a skeleton of {len(animation.names)} joints, {len(animation.times)} frames"
     table = read_motion(source, rate, own_names, unit, given)
     _warn_of_channels(source)
@@ -150,7 +173,8 @@ def _fitted(source: Path, target: Path, table: JointTable, written: Format, layo
         fit = fit_poses(table, source=str(source))
     except ShadowPuppetError as error:
         raise ShadowPuppetError(f"{target}: needs a skeleton, and none can be fitted: {error}") from None
-    written.write_skeleton(target, BodyTree(fit.body).animation(fit.times, fit.poses, np.eye(4)), body_mesh(fit.body), layout)
+    puppet = Puppet(BodyTree(fit.body).animation(fit.times, fit.poses, np.eye(4)), body_mesh(fit.body), fit.body)
+    written.write_skeleton(target, puppet, layout)
     off = f"{1000 * fit.residual:.1f} mm beside them (rms)"
     return f"a body's poses fitted to {len(table.names)} joints, {len(table.times)} frames, {off}"
 
@@ -180,6 +204,17 @@ class _RunExport:
             warn(f"{self.run.folder}: the joints of the body in person.toml lie up to {1000 * off:.0f} mm off the run's: the person was "
                  "measured anew while it was made", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
         return animation
+
+    @cached_property
+    def puppet(self) -> Puppet:
+        """The run's body, moving as in the run."""
+        return Puppet(self.animation, body_mesh(self.body), self.body)
+
+    @property
+    def markers(self) -> JointTable:
+        """The joints, with heels and toes if person.toml has a body with feet."""
+        table = self.run.motion.table
+        return with_feet(table, self.body, self.animation) if (self.run.folder / "person.toml").exists() else table
 
     @property
     def spread(self) -> Array:
@@ -223,8 +258,7 @@ class Format(NamedTuple):
 
     run: Callable[[_RunExport, Path], None] | None = None
     joints: Callable[[Path, JointTable, Layout], None] | None = None
-    skeleton: Callable[[Path, Animation, Mesh, Layout], None] | None = None
-    """Writes an animated skeleton with its mesh."""
+    skeleton: Callable[[Path, Puppet, Layout], None] | None = None
     any_skeleton: bool = False
     """Whether `skeleton` accepts any joint names, not only those of our bodies."""
 
@@ -233,30 +267,40 @@ class Format(NamedTuple):
         if self.run is not None:
             self.run(export, path)
         else:
-            self.write_skeleton(path, export.animation, body_mesh(export.body), export.layout)
+            self.write_skeleton(path, export.puppet, export.layout)
 
-    def write_skeleton(self, path: Path, animation: Animation, mesh: Mesh, layout: Layout) -> None:
-        """Write an animated skeleton."""
+    def write_skeleton(self, path: Path, puppet: Puppet, layout: Layout) -> None:
+        """Write a moving body or skeleton."""
         assert self.skeleton is not None
-        self.skeleton(path, animation, mesh, layout)
+        self.skeleton(path, puppet, layout)
 
 
 def _write_markers(path: Path, table: JointTable, layout: Layout) -> None:
     write_trc(path, marker_names(table), layout.unit or "mm", layout.missing)
 
 
+def _write_coordinates(path: Path, puppet: Puppet, layout: Layout, smoothing: str = "") -> None:
+    write_mot(path, puppet.animation.times, coordinates(puppet.animation, layout.model), smoothing)
+
+
+def _write_model(path: Path, puppet: Puppet, layout: Layout) -> None:
+    assert puppet.body is not None
+    write_osim(path, puppet.body, puppet.animation, layout.weight)
+
+
 FORMATS = {
     "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing),
                   lambda path, table, layout: write_c3d(path, table)),
-    "trc": Format(lambda export, path: _write_markers(path, export.run.motion.table, export.layout), _write_markers),
+    "trc": Format(lambda export, path: _write_markers(path, export.markers, export.layout), _write_markers),
     "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)),
                   lambda path, table, layout: write_joints(path, table)),
     "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), lambda path, table, layout: write_npz(path, table)),
-    "bvh": Format(skeleton=lambda path, animation, mesh, layout: write_bvh(path, animation, layout.unit or "m"), any_skeleton=True),
+    "bvh": Format(skeleton=lambda path, puppet, layout: write_bvh(path, puppet.animation, layout.unit or "m"), any_skeleton=True),
     "glb": Format(lambda export, path: write_glb(path, export.animation, body_mesh(export.body), export.smoothing),
-                  skeleton=lambda path, animation, mesh, layout: write_glb(path, animation, mesh), any_skeleton=True),
-    "mot": Format(lambda export, path: write_mot(path, export.animation.times, coordinates(export.animation), export.smoothing),
-                  skeleton=lambda path, animation, mesh, layout: write_mot(path, animation.times, coordinates(animation))),
+                  skeleton=lambda path, puppet, layout: write_glb(path, puppet.animation, puppet.mesh), any_skeleton=True),
+    "mot": Format(lambda export, path: _write_coordinates(path, export.puppet, export.layout, export.smoothing),
+                  skeleton=_write_coordinates),
+    "osim": Format(skeleton=_write_model),
     "parquet": Format(lambda export, path: write_parquet(path, motion_columns(export.run.motion), export.smoothing),
                       lambda path, table, layout: write_parquet(path, table_columns(table))),
 }

@@ -90,7 +90,7 @@ class Recording:
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
-    """Read a recording: a folder (video/, calibration.toml, ...), or one film, folder of pictures or live camera.
+    """Read a recording: a folder (video/ or films, calibration.toml, ...), or one film, folder of pictures or live camera.
 
     `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera. Raises `RecordingError`,
     `CalibrationError` or `VideoError`, naming file and field, if something is missing or does not fit.
@@ -102,11 +102,11 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
         raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
     if camera_number(path) is None and not exists:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
-    if folder.is_dir() and any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml")):
+    if folder.is_dir() and (any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml")) or _loose(folder)):
         return _read_folder(folder, fov, calibration)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
-        raise RecordingError(f"{folder}: found neither video/ nor calibration.toml nor pictures in it, expected a recording "
-                             "(video/<camera>.mp4 and calibration.toml) or a folder of pictures")
+        raise RecordingError(f"{folder}: found neither films nor video/ nor calibration.toml nor pictures in it, expected a "
+                             "recording (<camera>.mp4 or video/<camera>.mp4, and calibration.toml) or a folder of pictures")
     source = folder if camera_number(path) is None else path
     if source is folder:
         open_frames(folder)  # raises for a file that is no film, before the calibration is read
@@ -126,8 +126,8 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
     distance = notes.number("distance", DISTANCES, "metres", "subject")
     films, backgrounds, masks = (_sources(folder, kind, notes) for kind in ("video", "background", "masks"))
     if not films:
-        raise RecordingError(f"{folder}: no films in it, expected video/<camera>.mp4, a folder of pictures video/<camera>/, or a "
-                             "[video] table in recording.toml")
+        raise RecordingError(f"{folder}: no films in it, expected <camera>.mp4 or video/<camera>.mp4, a folder of pictures "
+                             "video/<camera>/, or a [video] table in recording.toml")
     cameras = _cameras(folder, films, fov, calibration or notes.file("calibration") or find_calibration(folder), notes)
     for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
         _check_names(folder / kind, sources, cameras)
@@ -218,7 +218,14 @@ def _sources(folder: Path, kind: str, notes: _Notes) -> dict[str, Any]:
     """Film, picture or folder by camera: those named in recording.toml, else <kind>/<camera>.*."""
     sources: dict[str, Any] = {camera: notes.source(kind, camera) for camera in notes.table(kind)}
     found = _films(folder / kind, FILM_SUFFIXES if kind == "video" else FILM_SUFFIXES + IMAGE_SUFFIXES)
+    if kind == "video" and not found and not sources:
+        found = _loose(folder)
     return {name: _only(paths) for name, paths in found.items() if name not in sources} | sources
+
+
+def _loose(folder: Path) -> dict[str, list[Path]]:
+    """Films that lie in a recording's folder itself, as in many laboratories, by camera."""
+    return {name: films for name, paths in _films(folder, FILM_SUFFIXES).items() if (films := [path for path in paths if path.is_file()])}
 
 
 def _films(folder: Path, suffixes: tuple[str, ...]) -> dict[str, list[Path]]:

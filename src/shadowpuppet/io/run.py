@@ -296,7 +296,9 @@ def read_run(folder: str | Path) -> Run:
     """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
     if not (folder / "run.toml").exists():
-        raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it")
+        film = any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
+        hint = f"; it is a recording: track it first (shadowpuppet track {folder})" if film else ""
+        raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it{hint}")
     info = read_toml(folder / "run.toml", FormatError)
     _check_info(folder / "run.toml", info)
     if people := person_folders(folder):

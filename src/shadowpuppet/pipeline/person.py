@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.errors import HARMFUL, NOTED, Caution, RecordingError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
@@ -58,6 +58,8 @@ BROAD = 0.33
 0.2, the broadest people (ANSUR II; Gordon et al. 2014) 0.27."""
 POOR = 0.75
 """Overlap with the film's first silhouette below which the body is in doubt; bodies that fit have 0.85 to 0.95."""
+NOBODY = 0.3
+"""Overlap with the first silhouette below which it is hardly the person's."""
 LONGEST_REFERENCE = 60
 """Greatest number of frames read from a reference's film."""
 MOST = 0.75
@@ -173,7 +175,11 @@ def _doubts(fit: SizeFit, source: str, start: float) -> list[Caution]:
     doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
                       "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
               for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
-    if start < POOR:
+    if start < NOBODY:
+        doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: is anybody in the picture then, and "
+                              "does the distance hold? begin where the whole person is seen (--start), give --distance",
+                              "no person fits the first silhouette: give --start or --distance", RUINOUS))
+    elif start < POOR:
         doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
                               "silhouette a person's, and does the person face the camera?",
                               "body fits the first silhouette badly: check height and distance", HARMFUL))

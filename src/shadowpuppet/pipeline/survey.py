@@ -28,6 +28,8 @@ from shadowpuppet.silhouette.correction.condition import FilmCondition, film_con
 from shadowpuppet.silhouette.quality import MaskQuality, mask_quality
 from shadowpuppet.threads import usable_cores
 
+SHORT = 1.0
+"""Length of a film, seconds, under which it is said to be short."""
 UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 GOOD = 0.9
@@ -208,6 +210,10 @@ def _doubts(look: Look, footage: Footage) -> list[Caution]:
         doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",
                               "distance not known: measure it, give --distance", NOTED))
+    if look.frames is not None and look.frames < SHORT * look.rate:
+        seconds = f"{look.frames / look.rate:.1f} s"
+        doubts.append(Caution(f"the film has only {look.frames} frames ({seconds}): too few to measure the person well and to smooth the "
+                              "motion; film some seconds", f"film of {seconds} is very short: film some seconds", HARMFUL))
     if look.jitter * look.rate > UNEVEN:
         doubts.append(Caution(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are "
                               "kept", "frames come unevenly: their own times are kept", NOTED))
@@ -243,7 +249,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> S
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    doubts = [*_rig_doubts(look, bool(several)), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    doubts = [*_rig_doubts(look, several > 0), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... in the run's folder",
                                  f"{several} people: each is tracked", NOTED))

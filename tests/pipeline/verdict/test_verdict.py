@@ -99,8 +99,8 @@ def test_errors_that_intervals_lead_one_to_expect_are_met_by_draws():
 
 @pytest.mark.parametrize(("run", "word", "reason"), [
     (motion(0.03), "good", None),
-    (motion(0.03, statuses="tttttttlaa"), "doubtful", "person lost in 12 % of frames: see --overlay"),
-    (motion(0.03, statuses="ttlllaaaaa"), "bad", "person lost in 60 % of frames: see --overlay"),
+    (motion(0.03, statuses="tttttttlaa"), "doubtful", "person lost in 12 % of frames: run with --overlay to see"),
+    (motion(0.03, statuses="ttlllaaaaa"), "bad", "person lost in 60 % of frames: run with --overlay to see"),
     (motion(0.03, statuses="aaaaaaaaaa"), "bad", "nobody was seen: film the empty scene and the person"),
     (motion(0.03, doubtful=2), "good", "left arm doubtful in 20 % of frames"),
     (motion(0.03, doubtful=8), "doubtful", "left arm doubtful in 80 % of frames"),

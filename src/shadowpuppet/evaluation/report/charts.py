@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from shadowpuppet.evaluation.error_metrics import true_stretches
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.intervals import HALF_WIDTH
+from shadowpuppet.io.motion.table import dof_unit
 from shadowpuppet.motion.metrics import accelerations
 
 # Colours that colour-blind people can tell apart: Okabe & Ito 2008.
@@ -22,6 +24,8 @@ STATUSES = {"tracked": "#dfe6ee", "uncertain": "#F0C75E", "predicted": "#9ECAE1"
 WAYS = {"none": ("as it stands", BLUE, "-"), "root": ("from the root", GREEN, "--"), "rigid": ("each frame moved and turned", ORANGE, "-.")}
 POINTS = 1200
 """Greatest number of points of a line; more do not show."""
+COLUMNS = 3
+"""Panels of angles in a row."""
 INK = "#2b2f36"
 STYLE = {"svg.fonttype": "none", "font.size": 9.5, "axes.edgecolor": "#c4c9d0", "axes.labelcolor": INK, "text.color": INK,
          "xtick.color": "#5b6470", "ytick.color": "#5b6470", "axes.grid": True, "grid.color": "#e6e9ed", "grid.linewidth": 0.8,
@@ -169,6 +173,32 @@ def fit_over_time(of: Evaluation) -> str:
         return _svg(figure, "fit")
 
 
+def angles_over_time(of: Evaluation) -> str:
+    """Every angle over time with its 90 % interval, left and right of a pair in one panel."""
+    motion = of.run.motion
+    angles = [(d, name) for d, name in enumerate(motion.dof_names) if dof_unit(name) == "rad"]
+    panels = list(dict.fromkeys(name.removeprefix("left_").removeprefix("right_") for _, name in angles))
+    rows = -(-len(panels) // COLUMNS)
+    with _drawing("angles", (10, 0.4 + 1.45 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
+        places = dict(zip(panels, grid.flat))
+        for axes in list(grid.flat)[len(panels) :]:
+            axes.set_axis_off()
+        for d, name in angles:
+            side = name.split("_")[0]
+            axes = places[name.removeprefix("left_").removeprefix("right_")]
+            t, middle, wide = _binned(motion.times, [np.degrees(motion.poses[:, d]), HALF_WIDTH * np.degrees(motion.pose_sd[:, d])])
+            colour = SIDES.get(side, BLUE)
+            axes.plot(t, middle, color=colour, lw=1.3, label=side if side in SIDES else "trunk, head")
+            axes.fill_between(t, middle - wide, middle + wide, color=colour, alpha=0.16, lw=0)
+        for panel, axes in places.items():
+            axes.set_title(panel.replace("_", " "), fontsize=9, loc="left", pad=3)
+            axes.set_xlim(*_span(motion.times))
+            axes.tick_params(labelsize=8)
+        drawn = {label: handle for axes in places.values() for handle, label in zip(*axes.get_legend_handles_labels())}
+        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
+        return _svg(figure, "angles")
+
+
 def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
     """Found against stated coverage of the intervals."""
     with _drawing("coverage", (3.6, 3.3)) as (figure, axes):
@@ -184,12 +214,13 @@ def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
 class _drawing:
     """Context of a matplotlib figure with panels, in our style."""
 
-    def __init__(self, name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,)) -> None:
+    def __init__(self, name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,),
+                 columns: int = 1) -> None:
         from matplotlib import rc_context
 
         style: dict[Any, Any] = {**STYLE, "svg.hashsalt": name}
         self._context = rc_context(style)
-        self._size, self._rows, self._ratios = size, rows, ratios
+        self._size, self._rows, self._ratios, self._columns = size, rows, ratios, columns
 
     def __enter__(self) -> tuple[Any, Any]:
         from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -198,7 +229,7 @@ class _drawing:
         self._context.__enter__()
         figure = Figure(figsize=self._size, layout="constrained")
         FigureCanvasSVG(figure)
-        return figure, figure.subplots(self._rows, 1, height_ratios=self._ratios)
+        return figure, figure.subplots(self._rows, self._columns, height_ratios=self._ratios, squeeze=self._columns == 1)
 
     def __exit__(self, *error: Any) -> None:
         self._context.__exit__(*error)

@@ -27,6 +27,7 @@ from shadowpuppet.evaluation.report.sections import (
 )
 from shadowpuppet.evaluation.summary_text import coverage_text
 from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.table import dof_unit
 from shadowpuppet.motion.limbs import doubtful_limbs
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
@@ -69,11 +70,20 @@ def _parts(of: Evaluation, name: str) -> Iterator[str]:
         yield from _joints(of)
         yield from _motion(of)
         yield body_tables(of)
+    if len(of.run.motion) and any(dof_unit(name) == "rad" for name in of.run.motion.dof_names):
+        yield _angles(of)
     yield _silhouettes(of)
     if of.errors is not None:
         yield _intervals(of)
     yield definitions_section(of)
     yield run_facts(of)
+
+
+def _angles(of: Evaluation) -> str:
+    note = ("Degrees, as in angles.csv (there in radians); x, y and z are the components of a rotation vector about the axes forward, left "
+            "and up. Bands hold 90 % by the run's own statement: a wide one is an angle that the "
+            "silhouettes hardly show. A gap is a frame without a pose.")
+    return f"<h2>Angles</h2>{figure(charts.angles_over_time(of), note)}"
 
 
 def _silhouettes(of: Evaluation) -> str:

@@ -19,6 +19,8 @@ def cards(of: Evaluation) -> str:
 
 def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
     measured = of.measured
+    if (verdict := of.run.metrics.get("verdict")) is not None:
+        yield "The run's own verdict", plain(verdict["word"]), "", plain("; ".join(verdict["reasons"]) or "nothing speaks against it")
     if of.errors is not None:
         errors, aligned, human, moves = (measured[key] for key in ("errors", "aligned_mm", "humaneva", "acceleration"))
         yield "Joint error", f"{errors['mean_mm']:.1f}", "mm", f"mean of {len(errors['joints'])} joints; rmse {errors['rmse_mm']:.1f}"

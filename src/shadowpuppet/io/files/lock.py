@@ -49,8 +49,8 @@ def _opened(path: Path, what: str) -> BinaryIO:
             if not held:
                 file.seek(0)
                 owner = "".join(filter(str.isprintable, file.read(200).decode("utf-8", "replace")))
-                raise ShadowPuppetError(f"{path.parent}: found another {what} at work in it ({owner or 'unknown process'}), expected a "
-                                        "folder for each; wait for its end, or choose another folder")
+                raise ShadowPuppetError(f"{path.parent}: found another {what} at work in it ({owner or 'unknown process'}), expected its "
+                                        "end first: wait for that, or choose another folder")
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                     return file

@@ -51,7 +51,7 @@ def _cautions(motion: Motion, cameras: int) -> Iterator[Caution]:
         return
     lost, kind = lost_share(motion), min(cameras, 2)
     if lost > OFTEN_LOST:
-        short = f"person lost in {100 * lost:.0f} % of frames: see --overlay"
+        short = f"person lost in {100 * lost:.0f} % of frames: run with --overlay to see"
         yield Caution(short, short, RUINOUS if lost > MOSTLY_LOST else HARMFUL)
     error = expected_error(motion)
     if error > WIDE[kind]:

@@ -11,9 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.motion.motion_files import read_motion
-from shadowpuppet.io.motion.opensim import COORDINATES, MARKERS, Ball, Coordinates, coordinates, marker_names, read_mot, write_mot
+from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, Ball, coordinates
+from shadowpuppet.io.motion.opensim.markers import MARKERS, marker_names
+from shadowpuppet.io.motion.opensim.mot import Coordinates, read_mot, write_mot
 from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation
 
 TEXT = """walk
@@ -40,7 +43,7 @@ def ball(q: Coordinates, *names: str, left: bool = False) -> np.ndarray:
 @pytest.mark.parametrize("name", runs.BODIES)
 def test_the_models_joints_lie_where_the_runs_did(tmp_path, name):
     motion = read_run(runs.make_run(tmp_path / "run", name)).motion
-    write_mot(tmp_path / "a.mot", motion.times, coordinates(motion_animation(runs.body_of(name), motion)[0]))
+    write_mot(tmp_path / "a.mot", motion.times, coordinates(motion_animation(runs.body_of(name), motion)[0], "own"))
     q = read_mot(tmp_path / "a.mot")
     at = dict(zip(motion.joint_names, np.moveaxis(motion.joints @ MODEL.T, 1, 0)))
     pelvis = ball(q, "pelvis_tilt", "pelvis_list", "pelvis_rotation")
@@ -78,9 +81,76 @@ def test_signs_are_those_that_opensim_and_people_use():
     assert value("lumbar_extension", chest_y=0.3) == pytest.approx(-np.degrees(0.3))
 
 
+def turning(degrees: float, across: float = 20.0) -> tuple[np.ndarray, Animation]:
+    """A walk that turns from `degrees` by `across`, and the way of its pelvis."""
+    body = runs.body_of("anatomical")
+    headings = np.radians(np.linspace(degrees, degrees + across, 9))
+    poses = np.stack([body.skeleton.pose(root_heading=heading, root_z=0.9, root_x=x) for x, heading in enumerate(headings)])
+    return poses[:, :3], BodyTree(body).animation(np.arange(9) / 10, poses, np.eye(4))
+
+
+@pytest.mark.parametrize("model", [name for name, model in MODELS.items() if model.hip is not None])
+def test_the_pelvis_origin_is_the_models(model):
+    _, animation = turning(0)
+    q, ours = coordinates(animation, model), coordinates(animation, "own")
+    hip = np.array(MODELS[model].hip)
+    offsets = animation.offsets[[animation.names.index(f"{side}_hip") for side in ("left", "right")]]
+    scale = (offsets[0, 0] - offsets[1, 0]) / (2 * hip[2])
+    pelvis = Rotation.from_euler("ZXY", np.stack([q[name] for name in ("pelvis_tilt", "pelvis_list", "pelvis_rotation")], 1))
+    hips = np.stack([q[name] for name in PELVIS_POSITION], 1) + pelvis.apply(scale * np.array([hip[0], hip[1], 0.0]))
+    own = np.stack([ours[name] for name in PELVIS_POSITION], 1)
+    middle = offsets.mean(0) @ np.array([[0.0, 0, 1], [0, 1.0, 0], [-1.0, 0, 0]]).T
+    np.testing.assert_allclose(hips, own + pelvis.apply(middle), atol=1e-9)
+    assert 0.07 < np.linalg.norm(np.stack([q[name] for name in PELVIS_POSITION], 1) - own, axis=1).max() < 0.12
+
+
+def test_a_bent_knee_is_negative_in_gait2392_which_has_no_arms():
+    body = runs.body_of("anatomical")
+    animation = BodyTree(body).animation(np.zeros(1), body.skeleton.pose(left_knee_flexion=1.0, left_elbow_flexion=1.0)[None], np.eye(4))
+    q = coordinates(animation, "gait2392")
+    assert q["knee_angle_l"][0] == pytest.approx(-1.0)
+    assert "elbow_flex_l" not in q
+    assert coordinates(animation, "pose2sim")["elbow_flex_l"][0] == pytest.approx(1.0)
+
+
+def test_a_sole_that_turns_inward_is_positive():
+    body = runs.body_of("anatomical")
+    for side in ("left", "right"):
+        pose = body.skeleton.pose(**{f"{side}_ankle_flexion": 0.3, f"{side}_ankle_inversion": 0.2})
+        q = coordinates(BodyTree(body).animation(np.zeros(1), pose[None], np.eye(4)), "own")
+        assert q[f"subtalar_angle_{side[0]}"][0] == pytest.approx(0.2)
+        assert q[f"ankle_angle_{side[0]}"][0] == pytest.approx(-0.3)
+
+
+def test_the_world_is_rotated_where_the_model_would_clamp():
+    way, animation = turning(120)
+    with pytest.warns(ShadowPuppetWarning, match="the world is rotated by -130 degrees about the vertical"):
+        q = coordinates(animation, "rajagopal")
+    np.testing.assert_allclose(np.degrees(q["pelvis_rotation"]), np.linspace(-10, 10, 9), atol=1e-9)
+    plain = coordinates(animation, "own")
+    np.testing.assert_allclose(np.degrees(plain["pelvis_rotation"]), np.linspace(120, 140, 9), atol=1e-9)
+    moved, before = (np.stack([found[name] for name in PELVIS_POSITION], 1) for found in (q, plain))
+    shift = Rotation.from_euler("y", -130, degrees=True).apply(before[-1] - before[0])  # the models' pelvis origins turn with the pelvis
+    assert np.linalg.norm(moved[-1] - moved[0] - shift) < 0.05
+    assert np.ptp(way[:, 0]) == 8
+
+
+def test_a_whole_turn_is_said_to_be_clamped():
+    _, animation = turning(-150, 300)
+    with pytest.warns(ShadowPuppetWarning, match=r"pelvis_rotation runs from -150 to 150 degrees; 'gait2392' clamps"):
+        q = coordinates(animation, "gait2392")
+    np.testing.assert_allclose(np.degrees(q["pelvis_rotation"])[[0, -1]], [-150, 150], atol=1e-9)
+
+
+def test_an_unknown_model_is_said(tmp_path):
+    with pytest.raises(ShadowPuppetError, match=r"model: found 'gait', expected one of rajagopal, gait2392, pose2sim, own"):
+        coordinates(turning(0)[1], "gait")
+
+
 def test_names_in_the_tables_stand_once():
-    names = [name for part in COORDINATES for name in (part.names if isinstance(part, Ball) else (part.name,))]
-    assert len(set(names)) == len(names)
+    for model in MODELS.values():
+        names = [name for part in model.parts for name in (part.names if isinstance(part, Ball) else (part.name,))]
+        assert len(set(names)) == len(names)
     assert len(set(MARKERS.values())) == len(MARKERS)
 
 
@@ -100,7 +170,7 @@ def test_markers_have_names_of_opensim_and_y_up_and_come_back(tmp_path, rng):
 def test_opensim_reads_both_files(tmp_path):
     opensim = pytest.importorskip("opensim")
     motion = read_run(runs.make_run(tmp_path / "run", lost=(3,))).motion
-    values = coordinates(motion_animation(runs.body_of("anatomical"), motion)[0])
+    values = coordinates(motion_animation(runs.body_of("anatomical"), motion)[0], "own")
     write_mot(tmp_path / "a.mot", motion.times, values)
     write_trc(tmp_path / "a.trc", marker_names(motion.table))
     table, markers = opensim.TimeSeriesTable(str(tmp_path / "a.mot")), opensim.TimeSeriesTableVec3(str(tmp_path / "a.trc"))
@@ -115,7 +185,7 @@ def test_opensim_reads_both_files(tmp_path):
 
 def test_frames_that_are_not_known_have_no_row(tmp_path):
     motion = read_run(runs.make_run(tmp_path / "run", lost=(0, 5, 6))).motion
-    write_mot(tmp_path / "a.mot", motion.times, coordinates(motion_animation(runs.body_of("anatomical"), motion)[0]))
+    write_mot(tmp_path / "a.mot", motion.times, coordinates(motion_animation(runs.body_of("anatomical"), motion)[0], "own"))
     found = read_mot(tmp_path / "a.mot")
     np.testing.assert_allclose(found.times, np.delete(motion.times, [0, 5, 6]))
 
