@@ -251,7 +251,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> S
     refusal = _rig_refusal(look, first)
     doubts = [*_rig_doubts(look, several > 0), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
     if several:
-        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... in the run's folder",
+        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
     return Survey(rig, silhouettes, silhouettes, first, look, census)
