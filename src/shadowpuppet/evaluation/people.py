@@ -44,7 +44,7 @@ def identities(truth: Array, found: Array) -> Identities:
 
     away = np.linalg.norm(truth[:, :, None] - found[:, None], axis=-1)
     near = np.nan_to_num(away, nan=np.inf) < REACH
-    there, tracked = (np.isfinite(places).all(-1) for places in (truth, found))
+    there, tracked = np.asarray(np.isfinite(truth).all(-1)), np.asarray(np.isfinite(found).all(-1))
     last, misses, swaps, matched = dict[int, int](), 0, 0, 0
     for t in range(len(truth)):
         now = {g: p for g, p in last.items() if near[t, g, p]}

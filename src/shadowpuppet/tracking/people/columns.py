@@ -85,7 +85,7 @@ def _in_disc(plan: Array, radius: float) -> Array:
 
     side = max(1, int(radius))
     x, y = np.mgrid[-side : side + 1, -side : side + 1]
-    return np.asarray(cv2.filter2D(plan, -1, (np.hypot(x, y) <= radius).astype(float), borderType=cv2.BORDER_CONSTANT))
+    return np.asarray(cv2.filter2D(plan, -1, (np.hypot(x, y) <= radius).astype(float), borderType=cv2.BORDER_CONSTANT), float)
 
 
 def _cores(dense: Array, apart: float) -> NDArray[np.int64]:

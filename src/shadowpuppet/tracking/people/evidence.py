@@ -44,11 +44,11 @@ class Drawn(NamedTuple):
 
     def distances(self, points: Array) -> Array:
         """Distances (P,), metres, of points (P, 3) from the body; negative inside."""
-        from scipy.spatial import cKDTree
+        from scipy.spatial import KDTree
 
         if not len(points):
             return np.zeros(0)
-        away, which = cKDTree(self.centres).query(points)
+        away, which = KDTree(self.centres).query(points)
         return np.asarray(away) - self.radii[which]
 
 
@@ -93,7 +93,8 @@ def nearest_to(drawn: Drawn, others: Sequence[Drawn], surface: SurfacePoints) ->
 
 def picked(surface: SurfacePoints, which: NDArray[np.bool_]) -> SurfacePoints:
     """Some of the surface points, (P,) true or false."""
-    return SurfacePoints(*(values[which] for values in surface))
+    points, normals, weights, cameras = surface
+    return SurfacePoints(points[which], normals[which], weights[which], cameras[which])
 
 
 def ignored_pixels(drawn: Drawn, others: Sequence[Drawn], masks: Sequence[Mask | None]) -> list[Mask | None]:
