@@ -217,8 +217,8 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     return Summary(Path(folder), written.motion, metrics, prepared.look)
 
 
-def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: Listener, rngs: tuple[np.random.Generator, np.random.Generator],
-                resume: bool) -> Summary:
+def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: Listener,
+                rngs: tuple[np.random.Generator, np.random.Generator], resume: bool) -> Summary:
     """Track several people, each into a folder of their own."""
     assert survey.census is not None
     check_people(options, resume)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -56,18 +56,19 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
 
     One after the other, each on what the others' bodies leave: in their new poses, or the predicted ones of those whose turn is to come.
+    Nobody knows where a lost person's body is, so it explains nothing.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
-    states = dict[int, MultiviewState]()
+    states, lost = dict[int, MultiviewState](), {n for n, person in people.items() if person.state.status == "lost"}
     for n, person in people.items():
-        states[n] = _followed(person, drawn, n, points, masks)
+        states[n] = _followed(person, drawn[n], _others(drawn, n, lost), points, masks)
         drawn[n] = draw_person(person.tracker, states[n].pose)
     for n in touching(drawn):
-        states[n] = _followed(people[n], drawn, n, points, masks)
+        states[n] = _followed(people[n], drawn[n], _others(drawn, n, lost), points, masks)
         drawn[n] = draw_person(people[n].tracker, states[n].pose)
     shares = dict[int, Share]()
     for n in people:
-        others = _others(drawn, n)
+        others = _others(drawn, n, lost)
         own = picked(points, nearest_to(drawn[n], others, points))
         shares[n] = Share(states[n], own, own_masks(drawn[n], others, masks), drawn[n])
     return shares
@@ -107,16 +108,15 @@ def explained(drawn: Mapping[int, Drawn], number: int) -> list[Mask]:
     return [np.logical_or.reduce([near(one.masks[n])[::2, ::2] for one in drawn.values()]) for n in range(number)]
 
 
-def _others(drawn: Mapping[int, Drawn], n: int) -> list[Drawn]:
-    return [other for m, other in drawn.items() if m != n]
+def _others(drawn: Mapping[int, Drawn], n: int, lost: Container[int]) -> list[Drawn]:
+    return [other for m, other in drawn.items() if m != n and m not in lost]
 
 
-def _followed(person: Person, drawn: Mapping[int, Drawn], n: int, points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
-    """A person's state after a frame, given how all people are `drawn`."""
+def _followed(person: Person, drawn: Drawn, others: Sequence[Drawn], points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
+    """A person's state after a frame, given how this person and the others are drawn."""
     tracker, state = person.tracker, person.state
-    others = _others(drawn, n)
-    own = picked(points, nearest_to(drawn[n], others, points))
-    observation = PersonObservation(tracker.views, own, masks, None, ignored_pixels(drawn[n], others, masks))
+    own = picked(points, nearest_to(drawn, others, points))
+    observation = PersonObservation(tracker.views, own, masks, None, ignored_pixels(drawn, others, masks))
     return _judged(tracker.follow(person.rng, state, observation))
 
 
