@@ -111,6 +111,16 @@ def test_people_who_hold_hands_are_two(rig):
     assert len(find_people(room, seen(made, body(-0.8, 0.15), body(0.8, 0.15), arm))) == 2
 
 
+def test_a_hole_in_a_silhouette_carves_nobody_away(rig):
+    made, room = rig
+    masks = seen(made, body(-1, 0), body(1, 0.3))
+    rows, columns = np.nonzero(masks[1])
+    high, wide = np.ptp(rows) // 4, 2
+    middle = int(np.median(columns[columns < np.median(columns)]))
+    masks[1][rows.min() + high : rows.max() - high, middle - wide : middle + wide] = False
+    assert len(find_people(room, masks)) == 2
+
+
 def test_a_box_is_no_person(rig):
     made, room = rig
     assert find_people(room, seen(made, [Ellipsoid((0, 0, 0.3), (0.25, 0.25, 0.3))])) == []

@@ -44,8 +44,19 @@ class Column(NamedTuple):
 def find_people(room: Room, masks: Sequence[Mask | None], explained: Sequence[Mask | None] = ()) -> list[Column]:
     """The people in one frame's masks (H, W), one per camera, the most certain first. `explained`: pixels (H / 4, W / 4), by camera, that
     people who are known already explain; columns there are not needed, but may be theirs."""
-    columns = [part for group in _groups(room, carve(room, masks)) for part in _divided(room, group)]
+    whole = [None if mask is None else solid(mask) for mask in masks]
+    columns = [part for group in _groups(room, carve(room, whole)) for part in _divided(room, group)]
     return _needed(room, columns, masks, explained)
+
+
+def solid(mask: Mask) -> Mask:
+    """A mask (H, W) with all of its holes filled: clothes like the background would carve a person in two."""
+    import cv2
+
+    contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = np.zeros(mask.shape, np.uint8)
+    cv2.drawContours(filled, contours, -1, 1, cv2.FILLED)
+    return filled.view(np.bool_)
 
 
 def _groups(room: Room, occupied: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
