@@ -65,10 +65,10 @@ class Segmenter:
     """From a frame to labels (H, W): 0 background, 1 perhaps a person, 2 a person."""
     correction: Correction | None = None
     """Undoes what has changed since the empty scene; None: nothing."""
-    several: bool = False
-    """Whether masks keep all parts of a person's size, for several people, or the largest part, one person's."""
     covered: NDArray[np.bool_] | None = None
     """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
+    several: bool = False
+    """Whether masks keep all parts of a person's size, for several people, or the largest part, one person's."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if it shows no person.
