@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from shadowpuppet.cli.flags import AsJson, Quiet, Switch, flag, output, switch
-from shadowpuppet.cli.tables import error_table, metrics_table, pairs, show, show_json, table
+from shadowpuppet.cli.tables import error_table, metrics_table, pairs, people_table, show, show_json, table
 
 DOFS_IN_ROW = 2
 
@@ -44,12 +44,15 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.evaluation.evaluation import Comparison, check_output, measure_run, update_metrics, write_evaluation
     from shadowpuppet.evaluation.report.page import check_report, write_report
+    from shadowpuppet.io.people import person_folders
 
     names = [name.strip() for name in joints.split(",")] if joints else None
     if file is not None:
         check_output(file, run, ".json")
     if report is not None:
         check_report(report, run)
+    if person_folders(run):
+        return _of_people(run, truth, file, report, update, quiet, as_json)
     written = {}
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
@@ -67,6 +70,36 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         show_json(found.measured)
     elif not quiet:
         show(*_tables(found.measured), pairs([*_rows(found.measured), *((name, str(path)) for name, path in written.items())]))
+
+
+def _of_people(run: Path, truth: Path | None, file: Path | None, report: Path | None, update: bool, quiet: bool, as_json: bool) -> None:
+    """Evaluate a run of several people."""
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.errors import SettingsError
+    from shadowpuppet.evaluation.evaluation import write_evaluation
+    from shadowpuppet.evaluation.people import measure_people
+
+    if wrong := next((name for name, given in (("TRUTH", truth), ("--report", report), ("--update", update)) if given), None):
+        raise SettingsError(f"{wrong}: found it for a run of several people, expected it for one of them, such as {run / 'person-1'}")
+    with terminal(quiet or as_json) as listener:
+        listener.begin("measuring")
+        measured = measure_people(run)
+        if file is not None:
+            write_evaluation(file, measured, run)
+    if as_json:
+        show_json(measured)
+    elif not quiet:
+        show(people_table(measured["person"]), pairs(_people_rows(measured)))
+
+
+def _people_rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "people", str(measured["people"])
+    if who := measured.get("identities"):
+        yield "who is who", f"MOTA {who['mota']:.3f}, IDF1 {who['idf1']:.3f}, {who['swaps']} swaps"
+        yield "count", (f"right in {100 * who['count_right']:.1f} % of {who['frames']} frames; {who['misses']} misses, "
+                        f"{who['false_positives']} false positives")
+    if measured.get("mean_mm") is not None:
+        yield "mean error", f"{measured['mean_mm']:.1f} mm of matched people (MPJPE)"
 
 
 def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:

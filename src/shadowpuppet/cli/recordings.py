@@ -47,7 +47,8 @@ else:
     SPEC_GROUPS = {
         **dict.fromkeys(("motion", "seconds", "posture", "body", "height"), PERSON),
         **dict.fromkeys(("cameras", "ring_radius", "distance", "camera_height", "fov", "fisheye"), CAMERAS),
-        **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "chair", "second_person"), SCENE),
+        **dict.fromkeys(("background", "room", "clothing", "camouflage", "shadow", "occluder", "chair", "second_person", "people",
+                         "together"), SCENE),
         **dict.fromkeys(("empty_seconds",), SCENE),
         **dict.fromkeys(("size", "rate", "noise", "flicker", "drift", "crf", "faults"), PICTURES),
     }
@@ -208,7 +209,8 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
     first, cameras = views[0], f"{len(views)} cameras" if len(views) > 1 else "1 camera"
     extras = [thing.kind for thing in spec.scene.obstacles] + ["another person"] * len(spec.scene.bystanders)
     one_camera = f" --camera {first.name}" if len(views) > 1 else ""
-    also = {"people/": spec.scene.bystanders, "training.csv, training.trc": recording.training, "references/": recording.references}
+    also = {"people/, truth_1.csv, ...": spec.scene.bystanders, "training.csv, training.trc": recording.training,
+            "references/": recording.references}
     return pairs([
         ("recording", str(path)),
         ("person", f"{spec.body.stature:.2f} m: {_gestures(spec)}" + (f"; in the scene: {', '.join(extras)}" if extras else "")),

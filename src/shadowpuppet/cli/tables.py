@@ -110,5 +110,15 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     return pairs(rows)
 
 
+def people_table(people: Mapping[Any, Mapping[str, Any]]) -> RenderableType:
+    """A row for each of several people, from their metrics."""
+    def row(number: Any, one: Mapping[str, Any]) -> tuple[str, ...]:
+        overlap, errors = one["overlap"], one.get("errors")
+        return (f"person {number}", str(one["frames"]), ", ".join(f"{count} {status}" for status, count in one["status"].items() if count),
+                f"{overlap['mean']:.2f}" if overlap["count"] else "", "" if errors is None else f"{errors['mean_mm']:.1f}")
+
+    return table("people", ("", "frames", "status", "overlap", "error, mm"), [row(*each) for each in people.items()], right=(1, 3, 4))
+
+
 def _number(value: float | None) -> str:
     return "unknown" if value is None or not isfinite(value) else f"{value:.2f}"

@@ -25,7 +25,7 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, show, table, verdict_table
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, people_table, show, table, verdict_table
 from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
@@ -74,11 +74,32 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     except CompleteRun as error:
         print(error, file=sys.stderr)
         motion, metrics = read_run(folder).motion, read_run(folder).metrics
+    if "people" in metrics:
+        return _people_done(folder, metrics, quiet)
     if not quiet:
         _show_run(folder, metrics)
     if lost_share(motion) <= MOSTLY_LOST:
         return 0
     print(f"the person is lost: {'; '.join(metrics.get('verdict', {}).get('reasons', ()))}", file=sys.stderr)
+    return PERSON_LOST
+
+
+def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
+    """Print the people of a run and its files; returns the exit code."""
+    from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST
+
+    def is_lost(status: Mapping[str, int], frames: int) -> bool:
+        return status.get("lost", 0) > MOSTLY_LOST * (frames - status.get("absent", 0))
+
+    people = metrics["people"]
+    if not quiet:
+        names = [f"person-{number}" for number in people]
+        show(people_table(people), pairs([("speed", f"{metrics['frames_per_s']:.1f} frame sets/s"),
+                                          files_in(folder, "people.csv", "overlay.mp4", *names)]))
+    lost = [number for number, each in people.items() if is_lost(each["status"], each["frames"])]
+    if len(lost) < len(people):
+        return 0
+    print("all people are lost in most frames", file=sys.stderr)
     return PERSON_LOST
 
 

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -84,6 +85,8 @@ class Recording:
     """Duration used, seconds from time 0; None for all."""
     begin: float = 0.0
     """First moment used, seconds after time 0; the frames before are passed over, and times stay those after time 0."""
+    truths: tuple[Path, ...] = ()
+    """With several people: truth_1.csv, truth_2.csv, ..., one for each."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
@@ -140,7 +143,14 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
     rate = notes.number("rate", RATES, "frames/s")
     duration = notes.number("duration", DURATIONS, "seconds")
     references = _references(folder / "references")
-    return Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration)
+    return Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration,
+                     truths=_truths(folder))
+
+
+def _truths(folder: Path) -> tuple[Path, ...]:
+    """truth_1.csv, truth_2.csv, ..., up to the first that is missing."""
+    found = takewhile(Path.exists, (folder / f"truth_{n}.csv" for n in count(1)))
+    return tuple(found)
 
 
 class _Notes:

@@ -35,6 +35,7 @@ from shadowpuppet.io.files.text import errors_named, read_limited, read_toml, wr
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
 from shadowpuppet.io.motion.table import read_raw, read_run_tables, run_headers, run_rows, write_raw
+from shadowpuppet.io.people import PEOPLE, person_folders, remove_people
 from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
 
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
@@ -99,6 +100,7 @@ class RunWriter:
         self._tables: Sequence[BinaryIO] = ()
         self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
         self._before: list[MotionFrame] | None = None
+        self._people = False
 
     def __enter__(self) -> Self:
         """Make the folder, and lock it. Raises `ShadowPuppetError` if it cannot be used."""
@@ -120,7 +122,9 @@ class RunWriter:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Write the remaining files, after an error as far as possible."""
         with self._stack:
-            if kind is None:
+            if self._people:
+                self._write_info(complete=kind is None)
+            elif kind is None:
                 self.begin()
                 self._finish(complete=True)
             elif self._tables:
@@ -128,7 +132,7 @@ class RunWriter:
                     self._finish(complete=False)
             else:
                 self._leave()
-        if not self._tables and not self._earlier:
+        if not self._tables and not self._earlier and not self._people:
             with contextlib.suppress(OSError):  # others put files into it
                 self.folder.rmdir()
 
@@ -137,6 +141,19 @@ class RunWriter:
         with contextlib.suppress(OSError):
             if not self._earlier and {path.name for path in self.folder.iterdir()} <= {"run.toml", LOCK}:
                 (self.folder / "run.toml").unlink()
+
+    def hand_over(self) -> None:
+        """Make the folder that of several people: an earlier run is removed, and only run.toml is written in it, with `people`; their
+        runs go into folders of their own (`io.people`)."""
+        if self._earlier:
+            _unmark(self.folder)
+            remove_people(self.folder, (*FILES, "run.toml"))
+        with self._system_errors():
+            for name in FILES:
+                (self.folder / name).unlink(missing_ok=True)
+        self._people = True
+        self.info["people"] = 0
+        self._write_info(complete=False)
 
     def resumed(self, types: Iterable[type]) -> tuple[Any, list[MotionFrame]] | None:
         """The state that the last `checkpoint` of the earlier run got, and its frames until then, from which `begin` goes on; None if the
@@ -214,6 +231,8 @@ class RunWriter:
         with self._system_errors():
             for name in () if not self._earlier else FILES if self._before is None else MADE:
                 (self.folder / name).unlink(missing_ok=True)
+            if self._earlier:
+                remove_people(self.folder, (*FILES, "run.toml"))
         if self._before is None:
             self._write_info(complete=False)
         with self._system_errors():
@@ -287,6 +306,9 @@ def read_run(folder: str | Path) -> Run:
         raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it{hint}")
     info = read_toml(folder / "run.toml", FormatError)
     _check_info(folder / "run.toml", info)
+    if people := person_folders(folder):
+        raise FormatError(f"{folder}: found the runs of {len(people)} people, expected one of them: "
+                          f"{', '.join(path.name for path in people.values())} in it")
     if (folder / "motion.npz").exists():
         motion = read_motion_npz(folder / "motion.npz")
     elif not info["complete"] and (folder / RAW).exists():  # killed while its tables were revised
@@ -333,7 +355,7 @@ def _difference(where: str, before: Any, now: Any) -> str:
 def earlier_run(folder: str | Path) -> dict[str, Any] | None:
     """The contents of run.toml of the run in a folder, None if there is no run with frames. Raises `FormatError` if it is malformed."""
     folder = Path(folder)
-    if not (folder / "run.toml").exists() or not (folder / TABLES[0]).exists():
+    if not (folder / "run.toml").exists() or not any((folder / name).exists() for name in (TABLES[0], PEOPLE)):
         return None
     info = read_toml(folder / "run.toml", FormatError)
     return info if {"complete", "versions"} <= set(info) else None

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import Caution
+from shadowpuppet.pipeline.people.census import Census
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.correction.condition import FilmCondition
@@ -144,6 +145,13 @@ class Survey:
     first: FirstSeconds
     """Silhouettes of the beginning, made by `clean`."""
     look: Look | RigLook
+    census: Census | None = None
+    """The number of people and their room, with several cameras."""
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several people, each to be tracked."""
+        return self.census is not None and self.census.number > 1
 
     def look_with(self, person: dict[str, Any], doubts: tuple[Caution, ...]) -> Look | RigLook:
         """A copy of `look` with the fitted person and the doubts about the fit."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,18 +27,33 @@ def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Pictur
     `pictures`: the body as each camera sees it; limbs that are not vouched for are pale. A camera without a frame is black; without a
     pose no model is drawn.
     """
-    columns, rows, (width, height) = grid_of([picture.camera.size for picture in pictures])
+    named = ", ".join(doubtful_limbs(pictures[0].body.landmark_names, found.limb_status)).replace("_", " ")
+    return _grid(frames, [(found, pictures)], found.status if not named else f"{found.status}, {named} doubtful")
+
+
+def overlay_of_people(frames: FrameSet, people: Sequence[tuple[int, MotionFrame, Sequence[Picture]]]) -> Image:
+    """As `overlay_grid`, with several people: number, frame and the body as each camera sees it. Without people the images alone."""
+    words = ", ".join(f"person {number} {found.status}" for number, found, _ in people)
+    return _grid(frames, [(found, pictures) for _, found, pictures in people], words or "nobody yet")
+
+
+def _grid(frames: FrameSet, people: Sequence[tuple[MotionFrame, Sequence[Picture]]], words: str) -> Image:
+    """Tiles of all cameras with the models of people."""
+    if people:
+        sizes = [picture.camera.size for picture in people[0][1]]
+        names = [picture.camera.name for picture in people[0][1]]
+    else:
+        sizes = [(64, 48) if image is None else image.shape[1::-1] for image in frames.images]
+        names = [f"camera {n + 1}" for n in range(len(sizes))]
+    columns, rows, (width, height) = grid_of(sizes)
     out = np.zeros((rows * height, columns * width, 3), np.uint8)
-    pose = None if found.pose is None else np.asarray(found.pose, float)
-    doubtful = doubtful_names(pictures[0].body, found.limb_status)
-    for n, picture in enumerate(pictures):
+    for n, name in enumerate(names):
         y, x = divmod(n, columns)
         tile = out[y * height : (y + 1) * height, x * width : (x + 1) * width]
         image, mask = frames.images[n], frames.masks[n]
-        _fit(tile, None if image is None else _tile(image, mask, picture, pose, doubtful))
-        write_text(tile, picture.camera.name if image is not None else f"{picture.camera.name}: no picture", 0, WHITE, size=height)
-    named = ", ".join(doubtful_limbs(pictures[0].body.landmark_names, found.limb_status)).replace("_", " ")
-    words = found.status if not named else f"{found.status}, {named} doubtful"
+        drawn = [(pictures[n], found) for found, pictures in people if found.pose is not None]
+        _fit(tile, None if image is None else _tile(image, mask, drawn))
+        write_text(tile, name if image is not None else f"{name}: no picture", 0, WHITE, size=height)
     write_text(out, f"{frames.time:.2f} s  {words}", out.shape[0] - 40, WHITE, size=max(360, height))
     return out
 
@@ -53,13 +68,16 @@ def grid_of(sizes: Sequence[tuple[int, int]]) -> tuple[int, int, tuple[int, int]
     return columns, rows, (max(2, 2 * round(scale * wide / 2)), max(2, 2 * round(scale * high / 2)))
 
 
-def _tile(image: Image, mask: Mask | None, picture: Picture, pose: np.ndarray | None, doubtful: Container[str]) -> Image:
+def _tile(image: Image, mask: Mask | None, people: Sequence[tuple[Picture, MotionFrame]]) -> Image:
     import cv2
 
     image = in_colour(image).copy()
-    if pose is not None and np.isfinite(pose).all():
+    poses = [(picture, np.asarray(found.pose, float), found) for picture, found in people if found.pose is not None]
+    if any(np.isfinite(pose).all() for _, pose, _ in poses):
         drawn = image.copy()
-        draw_model(drawn, picture, pose, doubtful)
+        for picture, pose, found in poses:
+            if np.isfinite(pose).all():
+                draw_model(drawn, picture, pose, doubtful_names(picture.body, found.limb_status))
         image = np.asarray(cv2.addWeighted(drawn, SHOWN, image, 1 - SHOWN, 0), np.uint8)
     if mask is not None:
         contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]

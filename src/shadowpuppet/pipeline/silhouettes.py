@@ -57,6 +57,11 @@ class Silhouettes:
 
         return mask_of
 
+    def of_several(self) -> Silhouettes:
+        """A copy whose masks keep everybody in the picture, not only the largest part."""
+        wide = [None if one is None else replace(one, several=True) for one in (self.segmenter, self.before)]
+        return replace(self, segmenter=wide[0], before=wide[1])
+
     def elsewhere(self, frame: CameraFrame) -> Mask:
         """The mask (H, W) in a picture that is none of the film's, so that what the person always covers there need not be covered."""
         segmenter = self.before or self.segmenter

@@ -19,6 +19,7 @@ from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.footage import FIRST, LOOKED_AT, CameraFrame, Footage, Sample, take_sample
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import count_in_picture, sampled_sets, take_census
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
@@ -158,8 +159,17 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    doubts = (*_doubts(look, footage), *_recovery_doubts([camera.name], [film.silhouettes]), *_clutter_warnings(look.left_out))
+    doubts = (*_several_people(film), *_doubts(look, footage),
+              *_recovery_doubts([camera.name], [film.silhouettes]), *_clutter_warnings(look.left_out))
     return replace(look, doubts=(*doubts, *look.quality.warnings()))
+
+
+def _several_people(film: FilmSurvey) -> list[Caution]:
+    number = count_in_picture(film.sample, film.silhouettes)
+    if number < 2:
+        return []
+    return [Caution(f"{number} people are in the picture: one camera tracks one, the nearest, who is the largest in the picture; two "
+                    "calibrated cameras or more track all", f"{number} people; the nearer one is tracked", HARMFUL)]
 
 
 def _doubted(silhouettes: Silhouettes) -> str | None:
@@ -232,14 +242,26 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> S
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
     silhouettes = tuple(film.silhouettes for film in films)
+    census, wide = None, tuple(each.of_several() for each in silhouettes)
+    if any(_shows_person(film) for film in films):
+        census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide))
+    several = census.number if census is not None and census.number > 1 else 0
+    silhouettes = wide if several else silhouettes
     first = _first_sets(rig, silhouettes, options.masks)
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    doubts = [*_rig_doubts(look), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    doubts = [*_rig_doubts(look, several > 0), *_recovery_doubts([camera.name for camera in look.cameras], silhouettes)]
+    if several:
+        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
+                                 f"{several} people: each is tracked", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
-    return Survey(rig, silhouettes, silhouettes, first, look)
+    return Survey(rig, silhouettes, silhouettes, first, look, census)
+
+
+def _shows_person(film: FilmSurvey) -> bool:
+    return any(may_be_person(mask) for mask in film.masks)
 
 
 def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> FirstSeconds:
@@ -269,7 +291,8 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     return look.agreement.refusal()
 
 
-def _rig_doubts(look: RigLook) -> list[Caution]:
+def _rig_doubts(look: RigLook, several: bool = False) -> list[Caution]:
+    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing."""
     doubts = list(look.agreement.doubts())
     rates = np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
@@ -285,7 +308,8 @@ def _rig_doubts(look: RigLook) -> list[Caution]:
     for camera in look.cameras:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(_unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
-        warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *camera.quality.warnings())
+        quality = () if several else camera.quality.warnings()
+        warnings = (*_poor(camera.condition), *_clutter_warnings(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
         doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]

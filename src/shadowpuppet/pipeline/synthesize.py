@@ -60,7 +60,8 @@ def files_of(spec: Spec, folder: Path) -> list[Path]:
     ends = {"video": "mp4", "background": "mp4", "masks": "mkv", "people": "mkv"}
     films = [folder / kind / f"{view.name}{part}.{end}" for kind, end in ends.items() for view in spec.views() for part in ("", ".part")]
     postures = [folder / "references" / f"{name}{end}" for name in POSTURES for end in (".png", "_mask.png", ".csv", ".trc")]
-    tables = [folder / f"{name}.{end}" for name in ("truth", "training") for end in ("csv", "trc")]
+    truths = [f"truth_{n}" for n in range(1, 2 + len(spec.scene.bystanders))] if spec.scene.bystanders else []
+    tables = [folder / f"{name}.{end}" for name in ("truth", "training", *truths) for end in ("csv", "trc")]
     return [*films, *postures, *tables, *(folder / name for name in ("calibration.toml", "recording.toml", SPEC_FILE))]
 
 

@@ -15,12 +15,14 @@ import numpy as np
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.person import write_person
-from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.io.run import OWN_KEYS, RunWriter, read_run, write_metrics
 from shadowpuppet.jit import is_compiled
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.people.run import PeopleRun, check_people
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import (
@@ -147,12 +149,21 @@ def kind_of(rig: Rig) -> Kind:
     return MULTIVIEW if rig.is_multiview else MONOCULAR
 
 
+def look_around(rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None, listener: Listener | None = None) -> Survey:
+    """Survey a recording. Raises a `ShadowPuppetError` if something cannot be used."""
+    (listener or Listener()).begin(f"looking at {len(rig.footage)} film{'s' if rig.is_multiview else ''}")
+    return kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
+
+
 def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
             listener: Listener | None = None) -> Prepared:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
-    listener = listener or Listener()
-    listener.begin(f"looking at {len(rig.footage)} film{'s' if rig.is_multiview else ''}")
-    survey = kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
+    return _fitted(rng, look_around(rig, options, kind, cache, listener), options, kind, cache, listener or Listener())
+
+
+def _fitted(rng: np.random.Generator, survey: Survey, options: Options, kind: Kind, cache: SilhouetteCache | None,
+            listener: Listener) -> Prepared:
+    """The surveyed recording and the person in it."""
     if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
     listener.begin("measuring the person" if is_compiled() else "compiling, once (a minute or two), and measuring the person")
@@ -187,7 +198,10 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
             "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
     with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume) as writer:
         start = time.perf_counter()
-        prepared = prepare(for_look, rig, options, kind, cache, listener)
+        survey = look_around(rig, options, kind, cache, listener)
+        if survey.several and (survey.look.refusal is None or options.anyway):
+            return _run_people(writer, survey, options, listener, (for_look, for_track), resume)
+        prepared = _fitted(for_look, survey, options, kind, cache, listener)
         writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
@@ -202,6 +216,24 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     warn_of_set_aside(metrics.get("set_aside", []))
     write_metrics(folder, metrics)
     return Summary(Path(folder), written.motion, metrics, prepared.look)
+
+
+def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: Listener,
+                rngs: tuple[np.random.Generator, np.random.Generator], resume: bool) -> Summary:
+    """Track several people, each into a folder of their own."""
+    assert survey.census is not None
+    check_people(options, resume)
+    listener.look(survey.look)
+    _check_cutoff(options, survey.look.rate)
+    writer.hand_over()
+    entries = {key: value for key, value in writer.info.items() if key not in (*OWN_KEYS, "people", "truth")}
+    people = PeopleRun(writer.folder, survey, survey.census, options, entries, listener)
+    found = people.track(*rngs, _smooth)
+    if not found:
+        raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
+    writer.info["people"] = len(found)
+    first = read_run(person_folder(writer.folder, min(found)))
+    return Summary(writer.folder, first.motion, people.metrics | {"people": found}, survey.look)
 
 
 def _write_beside(folder: Path, prepared: Prepared) -> None:

@@ -11,37 +11,40 @@ from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfil
 
 MIN_PART_SHARE = 0.02
 """Least size of another part of the person (a hand), over the largest part's."""
+MIN_PERSON_SHARE = 0.06
+"""Least size of another person over the largest part's: one four times as far away."""
 MAX_PART_GAP = 0.06
 """Greatest distance of such a part (half a neck), over the square root of the largest part's area."""
 MAX_HOLE_SHARE = 0.004
 """Holes of up to this share of the person's area are filled."""
 
 
-def clean(label: Labels, contrast: Callable[[Window], Contrast], outline: EdgeProfile) -> Labels:
-    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely); empty if there is none."""
-    mask = coarse_person(label)
+def clean(label: Labels, contrast: Callable[[Window], Contrast], outline: EdgeProfile, several: bool = False) -> Labels:
+    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely), or `several` people; empty if there is none."""
+    mask = coarse_person(label, several)
     out = np.zeros_like(mask)
     if mask.any():
         window = bounding_window(mask, outline.width + OUTWARD_REACH + 1)
         inside = at_half_contrast(np.ascontiguousarray(mask[window]), contrast(window), outline)
-        out[window] = fill_small_holes(main_part(inside, inside > 0))
+        out[window] = fill_small_holes(main_part(inside, inside > 0, several))
     return out
 
 
-def coarse_person(label: Labels) -> Labels:
-    """The connected part, without specks, with the most pixels labelled 2."""
+def coarse_person(label: Labels, several: bool = False) -> Labels:
+    """The connected part, without specks, with the most pixels labelled 2; with `several` also other parts of a person's size."""
     import cv2
 
     likely = cv2.medianBlur((label > 0).astype(np.uint8), 3)
     likely = np.asarray(cv2.morphologyEx(likely, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8)
     out, window = np.zeros_like(likely), bounding_window(likely, 0)
     if likely[window].size:
-        out[window] = main_part(likely[window], (label[window] == 2) & (likely[window] > 0))
+        out[window] = main_part(likely[window], (label[window] == 2) & (likely[window] > 0), several)
     return out
 
 
-def main_part(mask: Labels, sure: NDArray[np.bool_]) -> Labels:
-    """The connected part with the most `sure` pixels, and parts that nearly touch it, such as a head if the neck is lost.
+def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> Labels:
+    """The connected part with the most `sure` pixels, and parts that nearly touch it, such as a head if the neck is lost; with `several`
+    also other parts of a person's size, and what nearly touches them.
 
     Empty if no pixel is sure.
     """
@@ -55,8 +58,9 @@ def main_part(mask: Labels, sure: NDArray[np.bool_]) -> Labels:
     if number == 2:
         return mask.copy()
     counts[0] = 0
-    kept = (parts == counts.argmax()).astype(np.uint8)
-    others = np.flatnonzero((counts >= MIN_PART_SHARE * counts.max()) & (counts < counts.max()))
+    least = MIN_PERSON_SHARE * counts.max() if several else counts.max()
+    kept = np.isin(parts, np.flatnonzero(counts >= least)).astype(np.uint8) if several else (parts == counts.argmax()).astype(np.uint8)
+    others = np.flatnonzero((counts >= MIN_PART_SHARE * counts.max()) & (counts < least))
     if len(others):
         near = cv2.dilate(kept, disc(max(1, round(MAX_PART_GAP * counts.max() ** 0.5))))
         touching = np.intersect1d(others, parts[near > 0])

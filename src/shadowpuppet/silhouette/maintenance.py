@@ -87,7 +87,7 @@ class MaintainedSegmenter:
 
         classifier = self.segmenter.classifier
         assert isinstance(classifier, ChannelClassifier)
-        held = _held(mask.view(np.uint8) if self.segmenter.settings.cleaned else coarse_person(seen.label))
+        held = _held(mask.view(np.uint8) if self.segmenter.settings.cleaned else coarse_person(seen.label, self.segmenter.several))
         if np.count_nonzero(seen.label[held == 0]) > MAX_SHARE * held.size:
             self._age[:] = 0
             return

@@ -67,6 +67,8 @@ class Segmenter:
     """Undoes what has changed since the empty scene; None: nothing."""
     covered: NDArray[np.bool_] | None = None
     """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
+    several: bool = False
+    """Whether masks keep all parts of a person's size, for several people, or the largest part, one person's."""
 
     def __call__(self, image: Image) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3), blue green red, or (H, W), grey; empty if it shows no person.
@@ -90,7 +92,7 @@ class Segmenter:
         """The mask (H, W) that step 4 makes of it."""
         image, label, gap = labelled
         if self.settings.cleaned:
-            label = clean(label, lambda window: self.contrast(image, window), self.edge)
+            label = clean(label, lambda window: self.contrast(image, window), self.edge, self.several)
         mask = label > 0 if self.covered is None else (label > 0) | self.covered
         return mask if gap is None else gap.filled(mask)
 

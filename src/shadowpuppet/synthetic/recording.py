@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
-from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, posture, trunk
+from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEAD_SECONDS, LEVEL, TAIL_SECONDS, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import Figure, pose
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
@@ -49,11 +49,14 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     times, figure = perform(spec, for_motion)
     feet = feet_of(spec, times, figure, same_motion)
     company = spec.scene.bystanders
-    others = [_bystander(spec, someone, len(times), own) for someone, own in zip(company, for_others.spawn(len(company)))]
+    others = [_bystander(spec, someone, len(times), own, figure) for someone, own in zip(company, for_others.spawn(len(company)))]
     wrong = [CameraFaults(spec.faults, camera, len(times), spec.rate, own, spec.scene.flicker_hz)
              for camera, own in zip(cameras, for_faults.spawn(len(cameras)))]
     absent = wrong[0].absent()
-    write_truth(folder / "truth", times, figure.joints, spec.rate, feet, absent)
+    for name in ("truth", *["truth_1"][: len(others)]):
+        write_truth(folder / name, times, figure.joints, spec.rate, feet, absent)
+    for n, other in enumerate(others, 2):
+        write_truth(folder / f"truth_{n}", times, other.joints, spec.rate)
     figure = _away(figure, absent)
     _write_given(folder, spec, cameras, for_training)
     hidden = 0
@@ -101,14 +104,18 @@ def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> Figure:
     return animate(spec.body, spec.motion, t, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
 
 
-def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator) -> Figure:
-    """The figure of a bystander in `count` frames, at the bystander's place."""
+def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator, person: Figure | None = None) -> Figure:
+    """The figure of a bystander in `count` frames, at the bystander's place beside the `person`, who else is at the origin."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
-    gestures = (replace(someone.motion, seconds=max(2.0, count / spec.rate / again)),) * again
+    length = count / spec.rate - (LEAD_SECONDS + TAIL_SECONDS if someone.from_start else 0.0)  # they begin and end together
+    gestures = (replace(someone.motion, seconds=max(2.0, length / again)),) * again
     always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None,
                      posture="standing", scene=Scene())
     _, figure = perform(always, rng)
     place = np.array([someone.left, -someone.ahead, 0])
+    if someone.from_start:
+        begin, own = (np.zeros(2) if one is None else one.joints[0, 0, :2] for one in (person, figure))
+        place[:2] += begin - own
     parts = [part[np.minimum(np.arange(count), len(part) - 1)] for part in figure]  # a file may be shorter than the film
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
 
@@ -216,6 +223,8 @@ def _write_subject(path: Path, spec: Spec) -> None:
     if "distance" in spec.tells and len(views) == 1:
         distance = views[0].distance
         lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
+    if spec.scene.bystanders and len(views) > 1:
+        lines += ["", "[masks]          # of all people", *(f'{view.name} = "people/{view.name}.mkv"' for view in views)]
     write_lines(path, lines)
 
 

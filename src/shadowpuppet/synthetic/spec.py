@@ -25,7 +25,7 @@ from shadowpuppet.synthetic.walls import WallStyle
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Bystander:
-    """Another person in the picture, not to be tracked; absent from the film of the empty scene."""
+    """Another person in the picture, with a truth of their own; absent from the film of the empty scene."""
 
     kind: Literal["woman", "man", "child", "random"] = "random"
     """Kind of person; body and clothes are drawn."""
@@ -39,10 +39,13 @@ class Bystander:
     """Distance to the person's left, metres."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Rotation to their left, degrees; 0 looks where the person looks."""
+    from_start: bool = False
+    """Whether they stand in the first frame at that distance from where the person stands then; else the middle of the area over which they
+    walk is that far from the middle of the person's."""
 
     def __post_init__(self) -> None:
-        """Check that the bystander does not stand at the person's place."""
-        if np.hypot(self.ahead, self.left) < 0.5:
+        """Check that the bystander does not stand at the person's place; one who walks passes over it at other times."""
+        if np.hypot(self.ahead, self.left) < 0.5 and self.motion.motion not in ("walk", "jog"):
             raise ValueError(f"ahead, left: found {self.ahead:g}, {self.left:g}, where the person stands; expected 0.5 m of distance")
 
 

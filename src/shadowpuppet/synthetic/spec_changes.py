@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
+from shadowpuppet.synthetic.company import RING_FOV, RING_RADIUS, RING_RADIUS_EACH, SEED, Together, members
 from shadowpuppet.synthetic.faults.fault import faults_from_text
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.movement.script import Gesture
@@ -87,6 +88,11 @@ class SpecChanges:
     """Length of the film of the empty scene, seconds; 0: there is none."""
     second_person: Literal["behind", "aside", "passing"] | None = None
     """A second person: standing behind or aside, or passing to and fro behind."""
+    people: Annotated[int, Field(ge=2, le=6)] | None = None
+    """Number of people, 2 to 6, each with a body, clothes, motion and truth of their own."""
+    together: Together | None = None
+    """What they do: walk round each other, walk past each other, dance on the spot, or shake_hands; two people if --people does not say
+    how many."""
     faults: str | None = None
     """Faults of the pictures: kind, amount, @begin-end in seconds, drift, cameras, such as "gain 1.3 @3-6, nudge 20 @4 cam2, black @5"; all
     but the kind may be left out."""
@@ -112,6 +118,8 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
     if "body" in said:
         kind = None if said["body"] == "random" else said["body"]
         values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))
+    if "people" in said or "together" in said:
+        _gather(values, said, spec, source)
     _place_cameras(values, said, source)
     if "faults" in said:
         values["faults"] = faults_from_text(said["faults"], f"{source}: faults")
@@ -124,6 +132,27 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
     if "second_person" in said:
         values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
     return spec_from(values, source)
+
+
+def _gather(values: dict[str, Any], said: dict[str, Any], spec: Spec, source: str) -> None:
+    """Add people to a spec's plain values: the first person's motion unless --motion gives it, and bystanders. Cameras in a ring stand
+    back to see them all, unless they were placed."""
+    if "second_person" in said:
+        raise SettingsError(f"{source}: found --second-person and --people or --together, expected one of them")
+    count = said.get("people", 2)
+    first, *others = members(said.get("together", "round"), count)
+    seconds = said.get("seconds", sum(gesture.seconds for gesture in spec.motion))
+    if "motion" not in said:
+        values["motion"] = [first.motion | {"seconds": seconds}]
+    values["turn_deg"], values["training"] = first.turn_deg, []
+    values["scene"]["bystanders"] = [
+        {"motion": other.motion, "ahead": -other.y, "left": other.x, "turn_deg": other.turn_deg, "seed": SEED + n,
+         "from_start": True}
+        for n, other in enumerate(others)
+    ]  # fmt: skip
+    if "ring" not in values and said.get("cameras", 1) > 1:
+        said.setdefault("ring_radius", RING_RADIUS + RING_RADIUS_EACH * (count - 2))
+        said.setdefault("fov", RING_FOV)
 
 
 def parse_gestures(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:

@@ -121,6 +121,18 @@ def overhead(seconds: float, rng: np.random.Generator) -> Keys:
     return _swings(seconds, rng, [both(side=152, elbow=14, roll=20)], both(side=60, elbow=10), 2.4)
 
 
+def shake_hands(seconds: float, rng: np.random.Generator) -> Keys:
+    """The right hand held out to another person at arm's length, shaken up and down, and lowered; again after a while."""
+    keys: Keys = []
+    for begin in np.arange(0.0, max(seconds - 3.4, 0.1), 4.2):
+        keys.append((float(begin) + 0.2, {}))
+        for n, t in enumerate(np.arange(begin + 0.9, min(begin + 2.9, seconds - 0.4), 0.3)):
+            up = (-1) ** n * rng.uniform(2, 4)
+            keys.append((float(t), right(front=34 + up, side=4, roll=0, elbow=52 + up, supination=0, curl=30) | trunk(spine_bow=6)))
+        keys.append((float(min(begin + 3.5, seconds)), {}))
+    return keys
+
+
 RANDOM_LIMITS = {"spine_bow": (-5, 24), "spine_side": (-17, 17), "spine_twist": (-26, 26), "pelvis_bow": (-2, 12),
                  "pelvis_twist": (-10, 10), "head_nod": (-15, 22), "head_tilt": (-10, 10), "head_turn": (-35, 35), "side": (2, 130),
                  "front": (-18, 100), "roll": (-25, 75), "elbow": (6, 125), "supination": (-30, 70), "wrist_flex": (-30, 35),
@@ -176,7 +188,7 @@ def _off(points: Array, start: Array, end: Array) -> Array:
 
 
 GESTURES: dict[str, Callable[[float, np.random.Generator], Keys]] = {
-    f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random)
+    f.__name__: f for f in (stand, wave_hands, bend_aside, bow_forward, twist, reach, forearms_up, overhead, random, shake_hands)
 }
 """All gestures by name."""
 

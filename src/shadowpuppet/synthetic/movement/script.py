@@ -13,6 +13,7 @@ from shadowpuppet.synthetic.movement.paths import PathName
 MotionName = Literal[
     "stand", "wave_hands", "bend_aside", "bow_forward", "twist", "reach", "forearms_up", "overhead", "random",
     "walk", "jog", "box", "lift", "squat", "sit", "march", "jump", "turn_around", "random_body", "mocap", "sit_down", "kneel",
+    "shake_hands",
 ]  # fmt: skip
 
 

@@ -79,12 +79,15 @@ class MultiviewTracker:
         If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
         (N, D) to m^2 (N,), added to that of the surface.
         """
-        observation = self.observe(state, points, masks, also)
-        found = track_or_recover(
+        found = self.follow(rng, state, self.observe(state, points, masks, also))
+        return found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
+
+    def follow(self, rng: np.random.Generator, state: MultiviewState, observation: MultiviewObservation) -> MultiviewState:
+        """The state after a frame's observation, as `step`, which makes it."""
+        return track_or_recover(
             state, is_absent=not self.is_present(observation), recover=self.settings.recover, drop=OVERLAP_DROP,
             hold=lambda state: state._replace(cost=np.nan, overlap=0.0, status="absent", velocity=np.zeros_like(state.pose)),
             cycle=lambda state: self.cycle(rng, state, observation), search=lambda: self.search(rng, observation))  # fmt: skip
-        return found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
               also: Cost | None = None) -> MultiviewState:

@@ -1,0 +1,136 @@
+"""Whose pixel: what a frame shows of one person among others.
+
+A silhouette does not tell which of two people who overlap is in front: it says "one of them". So pixels that the other people's bodies
+explain are no evidence about this person, neither for nor against them, in whichever order they stand. Surface points belong to the body
+that is nearest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import count
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation, half_size
+from shadowpuppet.tracking.multiview.refinement.free_space import spheres_in
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.unexplained import near
+
+FAR = 0.6
+"""Distance (m) from a body beyond which surface points are not that person's."""
+OWN_REACH = 0.5
+"""Distance beside the drawn body beyond which silhouettes are not that person's, over the square root of its area (some 40 cm)."""
+SHOWN = 0.2
+"""Least share of the drawn body that a view must show apart from other people to count in the overlap."""
+
+
+class Drawn(NamedTuple):
+    """A person in a pose, among the others."""
+
+    masks: tuple[Mask, ...]
+    """The body in each camera's picture of half the size, (H, W) each."""
+    centres: Array
+    """Centres of spheres along the limbs, world, of shape (K, 3), metres."""
+    radii: Array
+    """Radii of these spheres, of shape (K,), metres."""
+
+    def distances(self, points: Array) -> Array:
+        """Distances (P,), metres, of points (P, 3) from the body; negative inside."""
+        from scipy.spatial import KDTree
+
+        if not len(points):
+            return np.zeros(0)
+        away, which = KDTree(self.centres).query(points)
+        return np.asarray(away) - self.radii[which]
+
+
+class PersonObservation(MultiviewObservation):
+    """What a frame shows of one person among others; views that hardly show them do not count in the overlap."""
+
+    def overlap(self, pose: Array) -> float:
+        """Intersection over union of a drawn pose (D,) and the silhouettes, mean of the views that show the person apart from others."""
+        overlaps = list[float]()
+        for picture, observation in self.silhouettes:
+            drawn = picture.draw(pose)
+            if count(drawn & ~observation.ignore) >= SHOWN * max(count(drawn), 1):
+                overlaps.append(observation.cost_and_overlap(drawn)[1])
+        return float(np.mean(overlaps)) if overlaps else np.nan
+
+
+def draw_person(tracker: MultiviewTracker, pose: Array) -> Drawn:
+    """A person in a pose (D,)."""
+    limbs = tracker.body.limbs
+    assert limbs is not None
+    spheres = spheres_in(limbs)
+    centres = tracker.body.skeleton.points(pose[None], spheres.joints, spheres.places)[0]
+    return Drawn(tuple(picture.mask(pose) for picture in tracker.views.pictures), centres, spheres.radii)
+
+
+def predicted(body: Body, state: MultiviewState) -> Array:
+    """The pose (D,) expected in the next frame: the last one, moved on as the body moved."""
+    place = body.skeleton.dof_indices(GLOBAL_DOFS[:2])
+    pose = state.pose.copy()
+    pose[place] += state.velocity[place]
+    return pose
+
+
+def nearest_to(drawn: Drawn, others: Sequence[Drawn], surface: SurfacePoints) -> NDArray[np.bool_]:
+    """Whether each surface point (P,) is near a person, and nearer to them than to the others."""
+    own = drawn.distances(surface.points)
+    mine = own < FAR
+    for other in others:
+        mine &= own <= other.distances(surface.points)
+    return mine
+
+
+def picked(surface: SurfacePoints, which: NDArray[np.bool_]) -> SurfacePoints:
+    """Some of the surface points, (P,) true or false."""
+    points, normals, weights, cameras = surface
+    return SurfacePoints(points[which], normals[which], weights[which], cameras[which])
+
+
+def ignored_pixels(drawn: Drawn, others: Sequence[Drawn], masks: Sequence[Mask | None]) -> list[Mask | None]:
+    """For each camera the pixels (H, W), at half size, that say nothing of a person: where other people are drawn, or what is silhouette
+    far from this one."""
+    ignored = list[Mask | None]()
+    for n, mask in enumerate(masks):
+        if mask is None:
+            ignored.append(None)
+            continue
+        small, out = half_size(mask), ~_around(drawn.masks[n])
+        out &= small
+        for other in others:
+            if other.masks[n].any():
+                out |= near(other.masks[n]) & (small | other.masks[n])
+        ignored.append(out)
+    return ignored
+
+
+def _around(drawn: Mask) -> Mask:
+    """Pixels (H, W) about a drawn body in which the person may be in the next frame."""
+    import cv2
+
+    if not drawn.any():
+        return np.ones_like(drawn)
+    radius = max(2, round(OWN_REACH * np.count_nonzero(drawn) ** 0.5))
+    return np.asarray(cv2.dilate(drawn.view(np.uint8), np.ones((2 * radius + 1,) * 2, np.uint8)), np.uint8).view(np.bool_)
+
+
+def own_masks(drawn: Drawn, others: Sequence[Drawn], masks: Sequence[Mask | None]) -> list[Mask | None]:
+    """For each camera the silhouette (H, W) of one person: without pixels that say nothing of them, unless they are drawn there."""
+    found = list[Mask | None]()
+    for mask, out, body in zip(masks, ignored_pixels(drawn, others, masks), drawn.masks):
+        if mask is None or out is None:
+            found.append(None)
+            continue
+        wide = (out & ~body).repeat(2, 0).repeat(2, 1)[: mask.shape[0], : mask.shape[1]]
+        found.append(mask & ~wide)
+    return found

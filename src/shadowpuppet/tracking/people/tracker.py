@@ -1,0 +1,132 @@
+"""Several people tracked together: each by a tracker of their own, on evidence that is divided among them."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.people.columns import Column
+from shadowpuppet.tracking.people.evidence import (
+    Drawn,
+    PersonObservation,
+    draw_person,
+    ignored_pixels,
+    nearest_to,
+    own_masks,
+    picked,
+    predicted,
+)
+from shadowpuppet.tracking.unexplained import near
+
+TOUCHING = 0.25
+"""Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
+ROUND_COLUMN = 0.6
+"""Distance (m) from a column's axis up to which surface points are searched for its person."""
+
+
+class Person(NamedTuple):
+    """One of several people: how they are tracked, and where they are."""
+
+    tracker: MultiviewTracker
+    rng: np.random.Generator
+    state: MultiviewState
+
+
+class Share(NamedTuple):
+    """A person's share of a frame: the new state and the evidence for it."""
+
+    state: MultiviewState
+    points: SurfacePoints
+    """Surface points that are nearest to this person."""
+    masks: list[Mask | None]
+    """This person's silhouettes (H, W), one per camera."""
+    drawn: Drawn
+    """The body in its new pose."""
+
+
+def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None]) -> dict[int, Share]:
+    """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
+
+    One after the other, each on what the others' bodies leave: in their new poses, or the predicted ones of those whose turn is to come.
+    Nobody knows where a lost person's body is, so it explains nothing.
+    """
+    drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
+    states, lost = dict[int, MultiviewState](), {n for n, person in people.items() if person.state.status == "lost"}
+    for n, person in people.items():
+        states[n] = _followed(person, drawn[n], _others(drawn, n, lost), points, masks)
+        drawn[n] = draw_person(person.tracker, states[n].pose)
+    for n in touching(drawn):
+        states[n] = _followed(people[n], drawn[n], _others(drawn, n, lost), points, masks)
+        drawn[n] = draw_person(people[n].tracker, states[n].pose)
+    shares = dict[int, Share]()
+    for n in people:
+        others = _others(drawn, n, lost)
+        own = picked(points, nearest_to(drawn[n], others, points))
+        shares[n] = Share(states[n], own, own_masks(drawn[n], others, masks), drawn[n])
+    return shares
+
+
+def start(person: MultiviewTracker, rng: np.random.Generator, column: Column, drawn: Mapping[int, Drawn], points: SurfacePoints,
+          masks: Sequence[Mask | None]) -> MultiviewState | None:
+    """The first state of a person in a column of the coarse hull, beside those who are `drawn`; None if there are too few points. Points
+    and masks (H, W) as in `step`."""
+    mine = np.linalg.norm(points.points[:, :2] - column.place, axis=1) < ROUND_COLUMN
+    for other in drawn.values():
+        mine &= other.distances(points.points) > 0.05
+    own = picked(points, mine)
+    rough = PersonObservation(person.views, own, masks)
+    if not person.is_present(rough):
+        return None
+    found = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
+    body = draw_person(person, found.pose)
+    observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
+    return _judged(person.search(rng, observation))
+
+
+def touching(drawn: Mapping[int, Drawn]) -> list[int]:
+    """Numbers of the people whose bodies are nearly in touch with another's."""
+    close = set[int]()
+    for n, one in drawn.items():
+        for m, other in drawn.items():
+            if m > n and float((one.distances(other.centres) - other.radii).min()) < TOUCHING:
+                close |= {n, m}
+    return sorted(close)
+
+
+def explained(drawn: Mapping[int, Drawn], number: int) -> list[Mask]:
+    """Pixels (H / 4, W / 4) of each of a `number` of cameras that people's bodies explain; empty without people."""
+    if not drawn:
+        return []
+    return [np.logical_or.reduce([near(one.masks[n])[::2, ::2] for one in drawn.values()]) for n in range(number)]
+
+
+def _others(drawn: Mapping[int, Drawn], n: int, lost: Container[int]) -> list[Drawn]:
+    return [other for m, other in drawn.items() if m != n and m not in lost]
+
+
+def _followed(person: Person, drawn: Drawn, others: Sequence[Drawn], points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
+    """A person's state after a frame, given how this person and the others are drawn."""
+    tracker, state = person.tracker, person.state
+    own = picked(points, nearest_to(drawn, others, points))
+    observation = PersonObservation(tracker.views, own, masks, None, ignored_pixels(drawn, others, masks))
+    return _judged(tracker.follow(person.rng, state, observation))
+
+
+def _judged(state: MultiviewState) -> MultiviewState:
+    """A state with the status of a person among others: hidden by them is uncertain, and without evidence lost, not absent."""
+    if state.status == "absent":
+        return state._replace(status="lost", overlap=0.0)
+    return state._replace(status="uncertain", overlap=0.0) if np.isnan(state.overlap) else state
+
+
+def place_of(body: Body, state: MultiviewState) -> Array:
+    """Where a person is on the floor plan, of shape (2,), metres: the root of the body."""
+    return np.asarray(state.pose[body.skeleton.dof_indices(GLOBAL_DOFS[:2])], float)

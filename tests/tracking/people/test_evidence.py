@@ -1,0 +1,103 @@
+"""Whose pixel and whose surface point: what others explain is no evidence, and points belong to the nearest body."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shadowpuppet.camera.rasterize import pack
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.people.evidence import Drawn, PersonObservation, ignored_pixels, nearest_to, own_masks, picked
+from shadowpuppet.tracking.people.tracker import explained, touching
+from shadowpuppet.tracking.silhouette_cost import Observation
+
+SIZE = (60, 80)
+"""Rows and columns of a silhouette; bodies are drawn at half of it."""
+
+
+def block(*columns: tuple[int, int], rows: tuple[int, int] = (10, 50), size: tuple[int, int] = SIZE) -> np.ndarray:
+    """A mask with the columns from ... to."""
+    mask = np.zeros(size, bool)
+    for left, right in columns:
+        mask[rows[0] : rows[1], left:right] = True
+    return mask
+
+
+def drawn(left: int, right: int, x: float = 0.0) -> Drawn:
+    """A person drawn in one camera's columns (of the whole size), who stands at x."""
+    centres = np.column_stack([np.full(5, x), np.zeros(5), np.linspace(0.2, 1.6, 5)])
+    return Drawn((block((left, right))[::2, ::2],), centres, np.full(5, 0.15))
+
+
+def test_a_pixel_of_another_says_nothing():
+    one, other = drawn(10, 22), drawn(40, 52)
+    (ignored,) = ignored_pixels(one, [other], [block((10, 22), (40, 52))])
+    assert ignored is not None
+    assert ignored[10:20, 20:26].all()
+    assert not ignored[10:20, 5:11].any()
+
+
+def test_where_people_overlap_it_is_one_of_them():
+    one, other = drawn(20, 40), drawn(30, 50)
+    mask = block((20, 50))
+    for person, rest in ((one, other), (other, one)):
+        (ignored,) = ignored_pixels(person, [rest], [mask])
+        assert ignored is not None
+        assert ignored[10:20, 15:20].all()  # the shared columns
+        (own,) = own_masks(person, [rest], [mask])
+        assert own is not None
+        assert np.count_nonzero(own & block((30, 40))) == np.count_nonzero(block((30, 40)))
+
+
+def test_silhouette_far_from_a_person_is_not_theirs():
+    far = block((2, 14), (70, 78))
+    (ignored,) = ignored_pixels(drawn(2, 14), [], [far])
+    assert ignored is not None
+    assert ignored[10:20, 36:39].all()
+    assert not ignored[10:20, 1:7].any()
+
+
+def test_an_empty_pixel_beside_others_still_counts():
+    (ignored,) = ignored_pixels(drawn(10, 22), [drawn(60, 70)], [block((10, 22), (60, 70))])
+    assert ignored is not None
+    assert not ignored[0:4].any()
+
+
+def test_no_mask_no_evidence():
+    assert ignored_pixels(drawn(1, 9), [], [None]) == [None]
+    assert own_masks(drawn(1, 9), [], [None]) == [None]
+
+
+def test_points_belong_to_the_nearest_body():
+    one, other = drawn(0, 1, -0.4), drawn(0, 1, 0.4)
+    points = np.array([[-0.5, 0, 1.0], [-0.1, 0, 1.0], [0.1, 0, 1.0], [0.5, 0, 1.0], [3.0, 0, 1.0]])
+    surface = SurfacePoints(points, points, np.ones(5), np.arange(5))
+    assert nearest_to(one, [other], surface).tolist() == [True, True, False, False, False]
+    assert nearest_to(other, [one], surface).tolist() == [False, False, True, True, False]
+    assert picked(surface, nearest_to(one, [other], surface)).cameras.tolist() == [0, 1]
+    assert nearest_to(one, [], SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))).tolist() == []
+
+
+@pytest.mark.parametrize(("apart", "numbers"), [(0.4, [1, 2]), (2.0, [])])
+def test_who_touches(apart, numbers):
+    assert touching({1: drawn(0, 1, 0.0), 2: drawn(0, 1, apart)}) == numbers
+
+
+def test_what_is_explained():
+    assert explained({}, 1) == []
+    (found,) = explained({1: drawn(0, 12), 2: drawn(40, 52)}, 1)
+    assert found.shape == (15, 20)
+    assert found[3:12, 0:3].all()
+    assert not found[:, 6:8].any()
+
+
+def test_views_that_hide_a_person_do_not_count_in_the_overlap():
+    body, mask = block((10, 22)), block((10, 22), (40, 52))
+    picture = SimpleNamespace(draw=lambda pose: pack(body))
+    seen = PersonObservation.__new__(PersonObservation)
+    seen.__dict__["silhouettes"] = ((picture, Observation.of(mask, block((40, 52)))), (picture, Observation.of(mask, block((8, 24)))))
+    assert seen.overlap(np.zeros(1)) == 1.0
+    seen.__dict__["silhouettes"] = seen.__dict__["silhouettes"][1:]
+    assert np.isnan(seen.overlap(np.zeros(1)))
