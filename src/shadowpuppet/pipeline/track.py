@@ -228,7 +228,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     writer.hand_over()
     entries = {key: value for key, value in writer.info.items() if key not in (*OWN_KEYS, "people", "truth")}
     people = PeopleRun(writer.folder, survey, survey.census, options, entries, listener)
-    found = people.track(*rngs, _smooth)
+    found = people.track(*rngs, smooth_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
     writer.info["people"] = len(found)
@@ -250,9 +250,9 @@ def _check_cutoff(options: Options, rate: float) -> None:
 
 
 def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]], options: Options, listener: Listener,
-               leans: Sequence[float]) -> None:
+               leans: Sequence[float] | None = None) -> None:
     """Replace the tracked motion by the smoothed one: of each of `subjects` from its first frame to the next one's. If that is impossible,
-    the motion stays as it is, with a warning. `leans`: of the head in each frame (`TrackedSubject.lean`)."""
+    the motion stays as it is, with a warning. `leans`: of the head in each frame (`TrackedSubject.lean`), if they are known."""
     method, gaps = options.smoothing
     if method == "off" and gaps == 0:
         writer.info["smoothing"] = {"method": "off"}
@@ -262,7 +262,7 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
     parts = [(begin, MotionSmoother(subject.body.skeleton, subject.joints, method, options.cutoff, gaps, away))
              for begin, subject in subjects]
     try:
-        found = smoothed_parts(writer.motion, parts, np.array(leans))
+        found = smoothed_parts(writer.motion, parts, np.full(len(writer.motion), np.nan) if leans is None else np.array(leans))
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
         writer.info["smoothing"] = {"method": "off"}
