@@ -151,8 +151,8 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     for_fit, for_start = rng.spawn(2)
     rate = survey.look.rate if np.isfinite(survey.look.rate) else FALLBACK_RATE
     (footage,), (clean,), masks = survey.rig.footage, survey.clean, [mask for (mask,) in survey.first.masks if mask is not None]
-    later = [mask for (mask,) in survey.first.later if mask is not None]
-    moments = [*_few(masks, max(LOOKED_FOR_IN - len(later), FEWEST_EARLY)), *later]
+    spread = [mask for (mask,) in survey.first.spread if mask is not None]
+    moments = [*_few(masks, max(LOOKED_FOR_IN - len(spread), FEWEST_EARLY)), *spread]
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
     try:

@@ -54,6 +54,14 @@ def test_the_place_of_most_moments_counts():
     assert fits == [False] * 2 + [True] * 6
 
 
+def test_who_is_turned_away_is_found_where_they_are():
+    picture = PersonEstimate(SIZES, 1.75, 2.2, -0.35).picture(CAMERA)
+    pose = BODIES["rounded"](SIZES).skeleton.pose(torso_twist=1.2, left_shoulder_abduction=0.2, left_shoulder_forward=1.2,
+                                                  right_shoulder_forward=1.2, left_elbow_flexion=0.6, right_elbow_flexion=0.6)
+    mask = picture.mask(pose) | picture.legs(pose, spread=np.radians(8))
+    assert find_place(CAMERA, [mask], None, None, SIZES)[0].distance == pytest.approx(2.2, rel=0.15)
+
+
 def test_given_distances_are_kept():
     assert find_place(CAMERA, [seen(ARMS[0])], 1.75, 2.5, None)[0].distance == 2.5
 
