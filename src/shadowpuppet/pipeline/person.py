@@ -38,6 +38,7 @@ from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
@@ -179,6 +180,10 @@ def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Cauti
     doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
                       "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
               for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
+    if fit.place_overlap < UNCERTAIN_OVERLAP:
+        doubts.append(Caution(f"at no distance a person who faces the camera overlaps the silhouettes by more than {fit.place_overlap:.2f}: "
+                              "turned, or hidden in part, they may be a quarter nearer or farther; measure the distance and give --distance",
+                              "distance uncertain: measure it, give --distance", HARMFUL))
     apart = 0 if source == "references" else moments - len(fit.overlaps)
     if apart >= ELSEWHERE * moments:
         doubts.append(Caution(f"in {apart} of {moments} moments of the film the person is at another distance or height than in most: they "

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +41,19 @@ PRUNED, WELL = 0.15, 0.15
 overlap is at most this much under the median."""
 
 
+class Place(NamedTuple):
+    """Result of `find_place`."""
+
+    estimate: PersonEstimate
+    fits: list[bool]
+    """For each mask whether it fits the place."""
+    overlap: float
+    """The greatest median overlap of coarse poses with the masks at any distance."""
+
+
 def find_place(camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None, sizes: CardboxSizes | None,
-               body: str | Make = "rounded") -> tuple[PersonEstimate, list[bool]]:
-    """The place that fits most of some masks (H, W), and for each mask whether it fits there.
+               body: str | Make = "rounded") -> Place:
+    """The place that fits most of some masks (H, W).
 
     Height and distance (m) are kept if given, and so are `sizes`, whose silhouettes are taken to be as large as the person's. The median
     of the overlaps counts: the moments of a person who walks in and sits down may be any share but the most. The overlap, not eq. 2:
@@ -61,14 +72,14 @@ def find_place(camera: Camera, masks: Sequence[Mask], height: float | None, dist
             found_aside, overlap_aside = _compared(camera, from_masks, compared, heights, distances, sizes, drawn, other)
             if overlap_aside.max() > overlap.max():
                 found, overlap, turn = found_aside, overlap_aside, other
-    best = found[int(np.argmax(overlap))]
+    best, reached = found[int(np.argmax(overlap))], float(overlap.max())
     if distance is None and sizes is None:
         far = _peak(np.array([each.distance for each in found]), overlap) / CLOTHED
         found, overlap = _compared(camera, from_masks, compared, heights, [far], None, drawn, turn)
         best = found[int(np.argmax(overlap))]
     picture = best.picture(camera, body)
     overlaps = np.array([_overlap(picture, mask, turn) for mask in masks])
-    return best, (overlaps >= np.median(overlaps) - WELL).tolist()
+    return Place(best, (overlaps >= np.median(overlaps) - WELL).tolist(), reached)
 
 
 def _compared(camera: Camera, from_masks: Sequence[Mask], compared: Sequence[Mask], heights: Sequence[float], distances: Sequence[float],
