@@ -181,8 +181,9 @@ def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Cauti
                       "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
               for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
     if fit.place_overlap < UNCERTAIN_OVERLAP:
-        doubts.append(Caution(f"at no distance a person who faces the camera overlaps the silhouettes by more than {fit.place_overlap:.2f}: "
-                              "turned, or hidden in part, they may be a quarter nearer or farther; measure the distance and give --distance",
+        doubts.append(Caution("at no distance a person who faces the camera overlaps the silhouettes by more than "
+                              f"{fit.place_overlap:.2f}: turned, or hidden in part, they may be a quarter nearer or farther; measure the "
+                              "distance and give --distance",
                               "distance uncertain: measure it, give --distance", HARMFUL))
     apart = 0 if source == "references" else moments - len(fit.overlaps)
     if apart >= ELSEWHERE * moments:
