@@ -38,6 +38,8 @@ from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.smoothing.facing import NEAR, TWIST
+from shadowpuppet.tracking.smoothing.head_lean import head_lean
 from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
@@ -115,6 +117,13 @@ class MonocularSubject(TrackedSubject):
         if state is None:
             return self.tracker.start(rng, observation) if observation.any() else None
         return self.tracker.step(rng, state, observation)
+
+    def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
+        """The lean of the head where an upper body is twisted into a profile, else NaN."""
+        if found.pose is None or masks[0] is None or TWIST not in self.body.skeleton.dof_names:
+            return np.nan
+        twist = np.asarray(found.pose)[self.body.skeleton.dof_names.index(TWIST)]
+        return head_lean(masks[0]) if abs(twist) > NEAR else np.nan
 
     def left_out(self, state: State | None) -> tuple[Mask | None, ...]:
         """The pixels (H, W) that a state leaves out of the silhouette; None for none."""
