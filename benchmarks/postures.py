@@ -121,7 +121,6 @@ def films() -> tuple[Film, ...]:
         _one("sits, turned by 60 degrees", woman, "seated", "forearms_up 2.5, reach 2.5", seed=90, chair="known", turn=60),
         _one("sits down", woman, "standing", home, seed=91, chair="known"),
         _one("kneels", man, "kneeling", "wave_hands 2.5, forearms_up 2.5", seed=92),
-        _one("lies", woman, "lying", "reach 2.5, wave_hands 2.5", seed=93),
         _one("stands, whole", tall, "standing", "reach 3, wave_hands 2", seed=94, whole=True),
         _one("sits, whole", man, "seated", "reach 2.5, wave_hands 2.5", seed=95, chair="known", whole=True),
         _one("sits, turned by 60 degrees, whole", woman, "seated", "reach 2.5, wave_hands 2.5", seed=96, chair="known", turn=60,

@@ -13,7 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.pipeline.person import DEEP, wrong_posture
+from shadowpuppet.pipeline.person import DEEP, _doubts, wrong_posture
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes, read_masks
 from shadowpuppet.pipeline.survey import _look, quality_of, survey_film
@@ -417,3 +417,23 @@ def test_wrong_settings_are_said_with_what_is_possible(values, said):
 def test_live_cameras_are_for_later():
     with pytest.raises(ShadowPuppetError, match="camera"):
         open_footage("camera:99", Options(fov=60))
+
+
+def found_without_references(overlaps: int, place: float) -> SizeFit:
+    guess = PersonEstimate(sizes_from_height(1.7), 1.7, 2.0, 0.0)
+    return SizeFit(guess, {}, {str(k): 0.85 for k in range(overlaps)}, np.zeros((overlaps, 12)), place)
+
+
+def test_a_distance_that_silhouettes_do_not_show_is_doubted():
+    certain, uncertain = (_doubts(found_without_references(12, place), "proportions", 0.85, 12) for place in (0.8, 0.6))
+    assert not certain
+    assert [doubt.startswith("at no distance a person who faces the camera") for doubt in uncertain] == [True]
+    assert not _doubts(found_without_references(12, np.nan), "proportions", 0.85, 12)
+
+
+def test_somebody_who_is_elsewhere_in_many_moments_is_doubted():
+    (doubt,) = _doubts(found_without_references(8, 0.8), "proportions", 0.2, 12)
+    assert doubt.startswith("in 4 of 12 moments of the film the person is at another distance or height")
+    assert not _doubts(found_without_references(10, 0.8), "proportions", 0.85, 12)
+    known = replace(found_without_references(1, np.nan), overlaps={"front_t_pose": 0.9})
+    assert not _doubts(known, "references", 0.85, 12)

@@ -40,6 +40,7 @@ from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.smoothing.facing import NEAR, TWIST
 from shadowpuppet.tracking.smoothing.head_lean import head_lean
+from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
@@ -160,8 +161,8 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     for_fit, for_start = rng.spawn(2)
     rate = survey.look.rate if np.isfinite(survey.look.rate) else FALLBACK_RATE
     (footage,), (clean,), masks = survey.rig.footage, survey.clean, [mask for (mask,) in survey.first.masks if mask is not None]
-    later = [mask for (mask,) in survey.first.later if mask is not None]
-    moments = [*_few(masks, max(LOOKED_FOR_IN - len(later), FEWEST_EARLY)), *later]
+    spread = [mask for (mask,) in survey.first.spread if mask is not None]
+    moments = [*_few(masks, max(LOOKED_FOR_IN - len(spread), FEWEST_EARLY)), *spread]
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
     try:
@@ -188,6 +189,11 @@ def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Cauti
     doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
                       "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
               for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
+    if fit.place_overlap < UNCERTAIN_OVERLAP:
+        doubts.append(Caution("at no distance a person who faces the camera overlaps the silhouettes by more than "
+                              f"{fit.place_overlap:.2f}: turned, or hidden in part, they may be a quarter nearer or farther; measure the "
+                              "distance and give --distance",
+                              "distance uncertain: measure it, give --distance", HARMFUL))
     apart = 0 if source == "references" else moments - len(fit.overlaps)
     if apart >= ELSEWHERE * moments:
         doubts.append(Caution(f"in {apart} of {moments} moments of the film the person is at another distance or height than in most: they "

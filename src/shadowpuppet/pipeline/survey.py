@@ -137,15 +137,14 @@ def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (Scen
 
 
 def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
-    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film; and those
-    of the later runs of the sample, the first of each."""
+    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film; and
+    silhouettes spread over the whole film, of the first frame of each of the sample's runs but the first."""
     def seen(frame: CameraFrame) -> tuple[float, Mask]:
         return frame.time, clean(frame)
 
     people = list(islice((each for each in map(seen, chain(sample.first, sample.frames)) if may_be_person(each[1])), FIRST))
-    last = people[-1][0] if people else 0.0
-    later = [each for each in (seen(run[0]) for run in sample.runs if run[0].time > last) if may_be_person(each[1])]
-    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in later))
+    spread = [each for each in (seen(run[0]) for run in sample.runs[1:]) if may_be_person(each[1])]
+    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in spread))
 
 
 def _look(footage: Footage, film: FilmSurvey) -> Look:

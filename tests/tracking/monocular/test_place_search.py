@@ -26,17 +26,18 @@ def seen(arms: tuple[float, float], distance: float = 2.2, elevation: float = -0
 
 
 def test_a_person_of_known_sizes_is_found_at_their_place():
-    found, fits = find_place(CAMERA, [seen(arms) for arms in ARMS[:3]], None, None, SIZES)
+    found, fits, _ = find_place(CAMERA, [seen(arms) for arms in ARMS[:3]], None, None, SIZES)
     assert found.distance == pytest.approx(2.2, rel=0.07)
     assert found.elevation == pytest.approx(-0.35, abs=0.1)
     assert found.sizes is SIZES
     assert fits == [True] * 3
+    assert find_place(CAMERA, [seen(arms) for arms in ARMS[:3]], None, None, SIZES).overlap > 0.75
 
 
 def test_the_clothes_of_a_person_of_unknown_sizes_are_allowed_for():
     """Bodies without clothes, drawn by the model, are thus found too far away by the clothes; the fit never ends far off, where legs would
     explain all of the silhouette."""
-    found, _ = find_place(CAMERA, [seen(arms) for arms in ARMS], 1.75, None, None)
+    found, *_ = find_place(CAMERA, [seen(arms) for arms in ARMS], 1.75, None, None)
     assert found.distance == pytest.approx(2.2 / CLOTHED, rel=0.07)
 
 
@@ -49,9 +50,17 @@ def test_the_place_of_most_moments_counts():
     """Whoever stands first and then sits down is measured where they sit."""
     standing = [seen(arms, elevation=0.1) for arms in ARMS[:2]]
     sitting = [seen(arms) for arms in (*ARMS, *ARMS[:1])]
-    found, fits = find_place(CAMERA, [*standing, *sitting], None, None, SIZES)
+    found, fits, _ = find_place(CAMERA, [*standing, *sitting], None, None, SIZES)
     assert found.distance == pytest.approx(2.2, rel=0.07)
     assert fits == [False] * 2 + [True] * 6
+
+
+def test_who_is_turned_away_is_found_where_they_are():
+    picture = PersonEstimate(SIZES, 1.75, 2.2, -0.35).picture(CAMERA)
+    pose = BODIES["rounded"](SIZES).skeleton.pose(torso_twist=1.2, left_shoulder_abduction=0.2, left_shoulder_forward=1.2,
+                                                  right_shoulder_forward=1.2, left_elbow_flexion=0.6, right_elbow_flexion=0.6)
+    mask = picture.mask(pose) | picture.legs(pose, spread=np.radians(8))
+    assert find_place(CAMERA, [mask], None, None, SIZES)[0].distance == pytest.approx(2.2, rel=0.15)
 
 
 def test_given_distances_are_kept():

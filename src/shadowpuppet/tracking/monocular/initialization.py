@@ -47,6 +47,8 @@ class SizeFit:
     """For each picture, intersection over union of the drawn body and the silhouette, without legs."""
     poses: Array
     """Poses (K, D) in the pictures."""
+    place_overlap: float = np.nan
+    """Overlap of coarse poses with the pictures (`place_search.Place`), if the distance was searched for; else not a number."""
 
 
 def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping[str, Mask], *, height: float | None = None,
@@ -104,11 +106,12 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     usable = [mask for mask in checked if may_be_person(mask)]
     if not usable:
         raise TrackingError("nobody is found: the silhouettes of the first seconds are empty, or nearly all of the picture")
-    initial, fits = find_place(camera, usable, height, distance, sizes, body)
+    initial, fits, overlap = find_place(camera, usable, height, distance, sizes, body)
     usable = [mask for mask, well in zip(usable, fits, strict=True) if well]
     poses = np.array([search_turned(initial.picture(camera, body), mask).pose for mask in usable])
     free = distance is None and sizes is not None
-    return refine(rng, camera, initial, usable, poses, free_sizes=sizes is None, free_distance=free, body=body, settings=settings)
+    fit = refine(rng, camera, initial, usable, poses, free_sizes=sizes is None, free_distance=free, body=body, settings=settings)
+    return replace(fit, place_overlap=overlap if distance is None else np.nan)
 
 
 def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,11 @@ from shadowpuppet.body.models import Make
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import place
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
+from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 
 RATIO, DISTANCES_TRIED = 1.07, 36
 """Ratio of one tried distance to the one before, and how many are tried from 0.8 m on."""
@@ -30,6 +32,8 @@ RAISED = (0.0, 0.1, 0.25, 0.4)
 CLOTHED = 0.89
 """The distance at which an average body in coarse poses fits best, over the true one: 0.891 with a standard deviation of 0.029 for twelve
 made people, men, women and children who stand, sit and kneel, 1.3 to 2.4 m away."""
+ASIDE = (0.87, -0.87)
+"""Directions (rad) to both sides that are tried if the person who faces the camera fits badly."""
 COMPARED = 5
 """Number of moments in which places are compared."""
 PRUNED, WELL = 0.15, 0.15
@@ -37,9 +41,19 @@ PRUNED, WELL = 0.15, 0.15
 overlap is at most this much under the median."""
 
 
+class Place(NamedTuple):
+    """Result of `find_place`."""
+
+    estimate: PersonEstimate
+    fits: list[bool]
+    """For each mask whether it fits the place."""
+    overlap: float
+    """The greatest median overlap of coarse poses with the masks at any distance."""
+
+
 def find_place(camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None, sizes: CardboxSizes | None,
-               body: str | Make = "rounded") -> tuple[PersonEstimate, list[bool]]:
-    """The place that fits most of some masks (H, W), and for each mask whether it fits there.
+               body: str | Make = "rounded") -> Place:
+    """The place that fits most of some masks (H, W).
 
     Height and distance (m) are kept if given, and so are `sizes`, whose silhouettes are taken to be as large as the person's. The median
     of the overlaps counts: the moments of a person who walks in and sits down may be any share but the most. The overlap, not eq. 2:
@@ -51,24 +65,38 @@ def find_place(camera: Camera, masks: Sequence[Mask], height: float | None, dist
     heights = [height or AVERAGE_HEIGHT] if known else np.arange(1.0, 2.1, 0.08).tolist()
     distances = [distance] if distance is not None else (0.8 * RATIO ** np.arange(DISTANCES_TRIED)).tolist()
     drawn: str | Make = "rounded" if sizes is None and distance is None else body
-    found, overlap = _compared(camera, from_masks, compared, heights, distances, sizes, drawn)
-    best = found[int(np.argmax(overlap))]
+    turn = 0.0
+    found, overlap = _compared(camera, from_masks, compared, heights, distances, sizes, drawn, turn)
+    if overlap.max() < UNCERTAIN_OVERLAP:
+        for other in ASIDE:
+            found_aside, overlap_aside = _compared(camera, from_masks, compared, heights, distances, sizes, drawn, other)
+            if overlap_aside.max() > overlap.max():
+                found, overlap, turn = found_aside, overlap_aside, other
+    best, reached = found[int(np.argmax(overlap))], float(overlap.max())
     if distance is None and sizes is None:
         far = _peak(np.array([each.distance for each in found]), overlap) / CLOTHED
-        found, overlap = _compared(camera, from_masks, compared, heights, [far], None, drawn)
+        found, overlap = _compared(camera, from_masks, compared, heights, [far], None, drawn, turn)
         best = found[int(np.argmax(overlap))]
     picture = best.picture(camera, body)
-    overlaps = np.array([search_pose(picture, mask).overlap for mask in masks])
-    return best, (overlaps >= np.median(overlaps) - WELL).tolist()
+    overlaps = np.array([_overlap(picture, mask, turn) for mask in masks])
+    return Place(best, (overlaps >= np.median(overlaps) - WELL).tolist(), reached)
 
 
 def _compared(camera: Camera, from_masks: Sequence[Mask], compared: Sequence[Mask], heights: Sequence[float], distances: Sequence[float],
-              sizes: CardboxSizes | None, body: str | Make) -> tuple[list[PersonEstimate], Array]:
-    """Places that fit one of the masks (H, W), and the median of their overlaps in all that are `compared`, (N,)."""
+              sizes: CardboxSizes | None, body: str | Make, turn: float) -> tuple[list[PersonEstimate], Array]:
+    """Places that fit one of the masks (H, W), and the median of their overlaps in all that are `compared`, (N,); the person is turned
+    (rad)."""
     places = [(each, mask) for mask in from_masks for each in _candidates(camera, mask, heights, distances, sizes)]
-    own = np.array([search_pose(each.picture(camera, body), mask).overlap for each, mask in places])
+    own = np.array([_overlap(each.picture(camera, body), mask, turn) for each, mask in places])
     kept = [places[n][0] for n in np.flatnonzero(own >= own.max() - PRUNED)]
-    return kept, np.array([np.median([search_pose(each.picture(camera, body), mask).overlap for mask in compared]) for each in kept])
+    pictures = [each.picture(camera, body) for each in kept]
+    return kept, np.array([np.median([_overlap(picture, mask, turn) for mask in compared]) for picture in pictures])
+
+
+def _overlap(picture: Picture, mask: Mask, turn: float) -> float:
+    """Overlap of the best coarse pose of an upper body that is turned (rad) with a mask (H, W)."""
+    skeleton = picture.body.skeleton
+    return search_pose(picture, mask, skeleton.pose(torso_twist=turn) if turn else None).overlap
 
 
 def _candidates(camera: Camera, mask: Mask, heights: Sequence[float], distances: Sequence[float],
