@@ -13,7 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.pipeline.person import DEEP, _doubts, wrong_posture
+from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes, read_masks
 from shadowpuppet.pipeline.survey import _look, quality_of, survey_film
@@ -437,3 +437,16 @@ def test_somebody_who_is_elsewhere_in_many_moments_is_doubted():
     assert not _doubts(found_without_references(10, 0.8), "proportions", 0.85, 12)
     known = replace(found_without_references(1, np.nan), overlaps={"front_t_pose": 0.9})
     assert not _doubts(known, "references", 0.85, 12)
+
+
+def test_only_forearms_in_the_picture_count():
+    near = PersonEstimate(sizes_from_height(1.75), 1.75, 1.2, -0.3)
+    camera = Camera.from_fov((160, 120), np.radians(50))
+    picture = near.picture(camera)
+    pose = picture.body.skeleton.pose(**POSTURES["front_t_pose"])
+    ends = camera.project(picture.points_world(pose[None])[0])
+    hands = ends[[picture.body.landmark_names.index(f"{s}_wrist") for s in ("left", "right")]]
+    assert hands[:, 0].min() < -1
+    assert hands[:, 0].max() > 161
+    assert _forearms_seen(camera, picture.mask(pose), near, pose) == 1
+    assert _forearms_seen(camera, np.zeros((120, 160), bool), near, pose) == 0

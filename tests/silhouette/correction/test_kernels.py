@@ -53,6 +53,25 @@ def test_a_movement_next_to_none_leaves_the_picture(slope, sign):
     np.testing.assert_array_equal(out[inside, :-1], image[inside, :-1])
 
 
+def test_points_differ_as_by_plain_interpolation(rng):
+    height, width, number = 20, 30, 200
+    picture = rng.uniform(-1, 1, (height, width)).astype(np.float32)
+    xy, value = rng.uniform(-1.1, 1.1, (number, 2)).astype(np.float32), rng.uniform(-1, 1, number).astype(np.float32)
+    movement = (np.eye(3) + rng.normal(0, 0.03, (3, 3))).astype(np.float32)
+    out = np.empty(number, np.float32)
+    kernels.point_differences(xy, value, picture, movement, np.float32(9), out)
+    x, y, w = (movement.astype(float) @ np.column_stack([xy, np.ones(number)]).T).astype(float)
+    x, y = (x / w + 1) * width / 2 - 0.5, y / w * width / 2 + height / 2 - 0.5
+    inside = (x >= 0) & (x < width - 1) & (y >= 0) & (y < height - 1)
+    clear = np.minimum(np.abs(x - np.rint(x)), np.abs(y - np.rint(y))) > 1e-4
+    j, i = np.clip(x.astype(int), 0, width - 2), np.clip(y.astype(int), 0, height - 2)
+    p, q = x - j, y - i
+    above, below = (picture[r, j] * (1 - p) + picture[r, j + 1] * p for r in (i, i + 1))
+    wanted = np.where(inside, above * (1 - q) + below * q - value, 9)
+    assert 0.2 < inside.mean() < 0.9
+    np.testing.assert_allclose(out[clear], wanted[clear], atol=1e-3)
+
+
 @pytest.mark.parametrize("bands", [1, 2, 24])
 @pytest.mark.parametrize("clips", [False, True])
 def test_a_picture_is_divided_as_by_plain_arithmetic(bands, clips):
