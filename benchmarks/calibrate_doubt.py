@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise, product
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
@@ -25,8 +25,10 @@ from typing import NamedTuple
 import numpy as np
 import smallest
 from doubt_runs import BUILD, MADE, Tracked, collect, read_runs
+from doubt_tables import WIDTH, alarm_table, dof_table, fit_dofs, fit_modes, mode_table
 from faults import into_page
 
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.evaluation.interval_coverage import rank_histogram
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limb_of
@@ -34,8 +36,6 @@ from shadowpuppet.motion.metrics import FAR_ERROR
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
 
 TABLE = Path(__file__).resolve().parent.parent / "src" / "shadowpuppet" / "tracking" / "doubt" / "factors.toml"
-WIDTH = 1.6448536269514722
-"""Half width of a 90 % interval, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,20 +235,18 @@ def limb_table(tested: Sequence[LimbJoint]) -> str:
     return "\n".join(lines)
 
 
-def mode_table(runs: Sequence[Tracked]) -> str:
-    """How often the truth is nearest to places of an arm by their stated weight, as Markdown."""
-    weights, nearest = np.concatenate([run.modes for run in runs]).T
-    lines = ["| stated weight | places | mean weight, % | the truth is nearest, % |", "|---|" + "---:|" * 3]
-    for low, high in pairwise(WEIGHTS):
-        own = (weights >= low) & (weights < high)
-        if own.any():
-            lines.append(f"| {100 * low:.0f} to {100 * min(high, 1):.0f} % | {own.sum()} | {100 * weights[own].mean():.0f} | "
-                         f"{100 * nearest[own].mean():.0f} |")
-    return "\n".join(lines)
-
-
-WEIGHTS = (0.05, 0.15, 0.25, 0.35, 0.5, 0.65, 0.8, 1.01)
-"""Limits of the rows of `mode_table`."""
+def arm_alarms(runs: Sequence[Tracked], factors: Factors) -> str:
+    """`doubt_tables.alarm_table` of the arms in some runs, with factors of the same runs."""
+    variances, errors = dict[str, list[Array]](), list[Array]()
+    for run, side in product(runs, SIDES):
+        off = np.sqrt((run.errors**2).sum(2))
+        own = [j for j, name in enumerate(run.joints) if limb_of(name) == f"{side}_arm" and np.isfinite(off[:, j]).any()]
+        known = np.isfinite(off[:, own]).all(1)
+        errors.append(off[known][:, own])
+        rows = np.array([[factors[group_of(run.joints[j])][axis] for axis in range(3)] for j in own])
+        for n, (name, lengths) in enumerate(run.components.items()):
+            variances.setdefault(name, []).append(((lengths[known][:, own] * rows[..., n]) ** 2).sum(2))
+    return alarm_table({name: np.concatenate(parts) for name, parts in variances.items()}, np.concatenate(errors), SILENT, NEAR, FAR_ERROR)
 
 
 def draw(path: Path, joints: Sequence[Tested], limbs: Sequence[LimbJoint]) -> None:
@@ -289,10 +287,14 @@ def _rank_correlation(one: Array, other: Array) -> float:
     return float(spearmanr(one, other).statistic)  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def factors_text(kind: str, names: Iterable[str], factors: Factors, limits: dict[str, float]) -> str:
+def factors_text(kind: str, runs: Sequence[Tracked], factors: Factors, limits: dict[str, float]) -> str:
     """The table of a kind in factors.toml."""
-    lines = [f"[{kind}]", "components = [" + ", ".join(f'"{name}"' for name in names) + "]"]
+    lines = [f"[{kind}]", "components = [" + ", ".join(f'"{name}"' for name in runs[0].components) + "]"]
     lines.append("limits = { " + ", ".join(f"{limb} = {limit:.3f}" for limb, limit in limits.items()) + " }")
+    if any(len(run.modes) for run in runs):
+        modes = fit_modes(runs)
+        lines.append(f"modes = {{ temperature = {modes.temperature:.0f}, odds = {modes.odds:.3f}, growth = {modes.growth:.3f} }}")
+        lines.append("dofs = { " + ", ".join(f"{name} = {factor:.2f}" for name, factor in fit_dofs(runs).items()) + " }")
     for group, axes in factors.items():
         rows = {axis: ", ".join(f"{value:.3f}" if value >= NEGLIGIBLE else "0" for value in axes[n]) for n, axis in enumerate("xyz")}
         lines.append(f"{group} = {{ " + ", ".join(f"{axis} = [{row}]" for axis, row in rows.items()) + " }")
@@ -330,14 +332,17 @@ def main() -> None:
             print(f"\n{kind}, {title}\n\n{text}", flush=True)
             if args.markdown:
                 into_page(args.markdown, f"{kind}, {title}", text)
+        factors = fit_all(errors_of(runs))
         if any(len(run.modes) for run in runs):
-            print(f"\n{mode_table(runs)}", flush=True)
-            if args.markdown:
-                into_page(args.markdown, f"{kind}, modes", mode_table(runs))
+            parts = list(folds(runs))
+            tables = {"modes": mode_table(parts), "degrees of freedom": dof_table(parts), "rules": arm_alarms(runs, factors)}
+            for title, text in tables.items():
+                print(f"\n{kind}, {title}\n\n{text}", flush=True)
+                if args.markdown:
+                    into_page(args.markdown, f"{kind}, {title}", text)
         if args.markdown:
             draw(args.markdown.parent / "assets" / f"doubt_{kind}.png", joints, limbs)
-        factors = fit_all(errors_of(runs))
-        texts[kind] = factors_text(kind, runs[0].components, factors, fit_limits(limb_joints(runs, factors)))
+        texts[kind] = factors_text(kind, runs, factors, fit_limits(limb_joints(runs, factors)))
         print("\n" + texts[kind])
     if args.write:
         kept = re.split(r"(?m)^(?=\[)", TABLE.read_text("utf-8"))[1:] if TABLE.exists() else []

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from cases import Case
+from numpy.typing import NDArray
 from proving_ground import HERE as GROUND
 from proving_ground import made as made_ground
 from spoiled import SPOILS
 
+from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.evaluation.joint_angles import wrapped
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import BLANK, JointTable, Mode
@@ -22,8 +25,10 @@ from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
 from shadowpuppet.pipeline.survey import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
+from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
+from shadowpuppet.tracking.doubt.variance import ModeWeights, variance_model
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 
 RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
@@ -104,6 +109,16 @@ class Tracked:
     """Truth less estimate (T, L, 3), metres; not a number where there is none."""
     modes: Array
     """Of every place of an arm in every frame, the estimate and its modes (N, 2): the stated weight, and 1 if the truth is nearest."""
+    dofs: tuple[str, ...] = ()
+    """Names of the D degrees of freedom."""
+    pose_errors: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """True poses less the estimates (T, D), rad or m; not a number where there is none."""
+    pose_sd: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """Standard deviations (T, D) of the degrees of freedom before calibration, rad or m."""
+    statuses: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, "<U9"))
+    """The frames' (T,)."""
+    weighting: ModeWeights | None = None
+    """Which weights `modes` states."""
 
 
 def mode_rows(modes: Sequence[Mode], points: Array, truth: Array, names: Sequence[str]) -> list[tuple[float, float]]:
@@ -121,26 +136,52 @@ def mode_rows(modes: Sequence[Mode], points: Array, truth: Array, names: Sequenc
     return found
 
 
+def true_poses(skeleton: Skeleton, points: Points, truth: Array) -> Array:
+    """Poses (T, D) whose landmarks are nearest to the true ones (T, L, 3), by damped Gauss-Newton steps within the joints' limits, each
+    frame from the one before. `points`: from poses to landmarks. Landmarks without truth do not count."""
+    (low, high), pose, found = skeleton.limits, np.zeros(len(skeleton.dofs)), []
+    for n, target in enumerate(truth):
+        known = np.isfinite(target)
+        for _ in range(FIRST_FITS if n == 0 else FITS):
+            moved = points(np.concatenate([pose[None], pose + FIT_STEP * np.eye(len(pose))]))[:, known]
+            J = (moved[1:] - moved[0]) / FIT_STEP
+            step = np.linalg.solve(J @ J.T + FIT_DAMPING * np.eye(len(pose)), J @ (target[known] - moved[0]))
+            pose = np.clip(pose + np.clip(step, -0.5, 0.5), low, high)
+        found.append(pose)
+    return np.array(found)
+
+
+FIRST_FITS, FITS, FIT_STEP, FIT_DAMPING = 60, 8, 1e-4, 1e-4
+"""Steps of the first frame and of every other, step of the derivatives (rad or m), and damping (m^2)."""
+
+
 def track_monocular(path: Path) -> Iterator[Tracked]:
     """A recording of one camera with every fault."""
     case, options = Case.read(path), make_options({})
     picture = case.person(options, np.random.default_rng(0)).picture(case.camera, options.tracker.body)
-    names, rate = picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
+    skeleton, names, rate = picture.body.skeleton, picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
     turn, truth = case.camera.T_camera_world[:3, :3], _places(case.truth, names)
+    right = true_poses(skeleton, picture.points_world, truth)
+    model, angles = variance_model("monocular"), np.array([dof.kind == "rotation" for dof in skeleton.dofs])
     for n, (fault, spoil) in enumerate(FAULTS.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
         tracker = MonocularTracker(picture, options.tracker)
-        doubt, state, before, rows, poses = MonocularDoubt(tracker), None, None, [], []
+        doubt, state, before, rows, poses, deviations, statuses = MonocularDoubt(tracker), None, None, [], [], [], list[str]()
         modes = list[tuple[float, float]]()
         for n, (seconds, mask) in enumerate(zip(case.times.tolist(), masks)):
             state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask)
             found, before = doubt.evidence(state, mask, seconds, before)
             rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
+            deviations.append(pose_deviations(skeleton, picture.points, state.pose, model.sd(names, found.components)))
+            statuses.append(state.status)
             modes += mode_rows(found.modes, picture.points_world(poses[-1][None])[0], truth[n], names)
         errors = (truth[: len(poses)] - picture.points_world(np.array(poses))) @ turn.T
+        off = right[: len(poses)] - np.array(poses)
+        off[:, angles] = wrapped(off[:, angles])
         components = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        yield Tracked(path.name, fault, names, components, errors, np.array(modes).reshape(-1, 2))
+        yield Tracked(path.name, fault, names, components, errors, np.array(modes).reshape(-1, 2), tuple(dof.name for dof in skeleton.dofs),
+                      off, np.array(deviations), np.array(statuses), model.modes)
 
 
 ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
@@ -204,7 +245,8 @@ def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for run in TRACK[kind](path):
             np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
-                                modes=run.modes, names=list(run.components),
+                                modes=run.modes, names=list(run.components), dofs=run.dofs, pose_errors=run.pose_errors,
+                                pose_sd=run.pose_sd, statuses=run.statuses, weighting=run.weighting or (),
                                 components=np.stack(list(run.components.values()), 3).astype(np.float32))
         (folder / "done").touch()
     return sorted(folder.glob("*.npz"))
@@ -221,5 +263,7 @@ def read_runs(files: Iterable[Path]) -> list[Tracked]:
     for file in files:
         data = np.load(file, allow_pickle=False)
         components = dict(zip(data["names"].tolist(), np.moveaxis(data["components"].astype(float), 3, 0)))
-        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"], data["modes"]))
+        found.append(Tracked(file.parent.name, file.stem, tuple(data["joints"].tolist()), components, data["errors"], data["modes"],
+                             tuple(data["dofs"].tolist()), data["pose_errors"], data["pose_sd"], data["statuses"],
+                             ModeWeights(*data["weighting"].tolist()) if data["weighting"].size else None))
     return found

@@ -18,6 +18,7 @@ import runs
 import vicon
 
 from shadowpuppet.body.models import MODELS, average_sizes
+from shadowpuppet.calibration.boards.board import board_from, board_text, read_board
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.io.calibration.calibration_files import examine_calibration, write_calibration
 from shadowpuppet.io.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
@@ -45,6 +46,8 @@ from shadowpuppet.video.images import read_image, write_image
 READERS: dict[str, Callable[[Path], object]] = {
     "calibration": examine_calibration,
     "pair": lambda path: examine_calibration(path.parent),
+    "colmap": lambda path: examine_calibration(path.parent),
+    "board": read_board,
     "person": read_person,
     "prior": read_prior,
     "recording": lambda path: read_recording(path.parent),
@@ -131,11 +134,12 @@ def write(folder: Path) -> None:
 
 def _calibrations(folder: Path, made: list[Camera]) -> None:
     for name, path in calibrations.write_all(folder, made).items():
-        file = next(path.iterdir()) if path.is_dir() and name != "easy" else path
+        file = next(path.iterdir()) if path.is_dir() and name not in ("easy", "colmap") else path
         if file.is_file():
             (folder / "calibration" / file.name).write_bytes(file.read_bytes())
     for name in ("intri.yml", "extri.yml"):
         (folder / "pair" / name).write_bytes((folder / "easy" / name).read_bytes())
+    (folder / "board" / "board.toml").write_text(board_text(board_from("charuco 7x5", 0.04)))
     place = folder / "recording"
     write_calibration(place / "calibration.toml", made)
     (place / "film").mkdir()

@@ -1,8 +1,9 @@
 """Overlap of silhouettes with the exact ones, with the film of the empty scene and with the scene recovered from the film alone.
 
-    python benchmarks/no_empty_scene.py RECORDING... [--cameras cam1,cam4] [--every 8] [--sheets FOLDER]
+    python benchmarks/no_empty_scene.py RECORDING... [--cameras cam1,cam4] [--every 8] [--sheets FOLDER] [--joints FOLDER]
 
 A recording is a folder with video/<camera>.*, background/<camera>.* and masks/<camera>.*; its background is used for the comparison only.
+`--joints` also tracks each recording both ways, all cameras together, into a folder, and prints the errors of its joints.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ from rich.table import Table
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording, take_sample
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.track import kind_of, run
 from shadowpuppet.silhouette import ready_mask
 
 Mask = NDArray[np.bool_]
@@ -85,13 +89,26 @@ def rows(path: Path, arguments: argparse.Namespace) -> Iterator[list[str]]:
         yield [path.name, view.camera.name, *measure(camera_footage(recording, view, options), arguments.every, sheet)]
 
 
+def joint_row(path: Path, folder: Path) -> list[str]:
+    """Mean joint errors, mm, of a recording tracked with its empty scene and without, and their ratio."""
+    options, found = Options(overlay=False), list[float]()
+    for name in ("with", "without"):
+        rig = open_rig(path, options)
+        if name == "without":
+            rig = replace(rig, footage=tuple(replace(each, view=replace(each.view, background=None)) for each in rig.footage))
+        done = run(rig, kind_of(rig), folder / f"{path.name}_{name}", options, Listener())
+        found.append(done.metrics["errors"]["mean_mm"])
+    return [path.name, *(f"{error:.1f}" for error in found), f"{found[1] / found[0]:.2f}"]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING")
     parser.add_argument("--cameras", help="their names, with commas between; all by default")
     parser.add_argument("--every", type=int, default=8, help="measure every Nth frame")
     parser.add_argument("--sheets", metavar="FOLDER", help="draw contact sheets of the silhouettes there")
-    arguments = smallest.parse(parser, lambda folder: [smallest.make(folder / "recording"), "--every", 4])
+    parser.add_argument("--joints", metavar="FOLDER", type=Path, help="track each recording with its empty scene and without, into there")
+    arguments = smallest.parse(parser, lambda folder: [smallest.make(folder / "recording"), "--every", 4, "--joints", folder / "runs"])
     table, console = Table(*COLUMNS, box=None), Console(width=140)
     lost = []
     for recording in arguments.recordings:
@@ -101,6 +118,11 @@ def main() -> None:
     console.print(table)
     if lost:
         console.print(f"lost by the median frame: median {np.median(lost):.3f}, greatest {max(lost):.3f} of {len(lost)} films")
+    if arguments.joints is not None:
+        joints = Table("recording", "mm with", "without", "ratio", box=None)
+        for recording in arguments.recordings:
+            joints.add_row(*joint_row(recording, arguments.joints))
+        console.print(joints)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import smallest
@@ -50,6 +50,14 @@ TURNS = (
     ("three_behind", "woman", 42, "wave_hands 3, turn_around 3, random 3", 3, True),
     ("five_turns", "man", 43, "turn_around 2, turn_around 2, turn_around 2, turn_around 2", 5, False),
     ("four_behind_walk", "woman", 44, "walk 6", 4, True),
+    ("held_a", "man", 61, "turn_around 2.5, wave_hands 2, turn_around 2.5", 1, False),
+    ("held_b", "woman", 62, "turn_around 3.5, reach 2, turn_around 3", 1, False),
+    ("held_c", "child", 63, "turn_around 3, turn_around 2.5", 1, False),
+    ("held_d", "woman", 64, "reach 2, turn_around 3, turn_around 3", 1, True),
+    ("held_e", "man", 65, "random 2, turn_around 2.5, turn_around 3.5", 1, False),
+    ("fresh_a", "woman", 71, "turn_around 2.5, wave_hands 2, turn_around 3", 1, False),
+    ("fresh_b", "man", 72, "wave_hands 2, turn_around 3, reach 2", 1, False),
+    ("fresh_c", "man", 73, "turn_around 3.5, turn_around 2.5", 1, False),
     ("two_turns", "man", 45, "turn_around 3, reach 3, turn_around 3", 2, False),
     ("three_walk", "man", 46, "walk 7", 3, False),
 )
@@ -77,10 +85,11 @@ def made_turns(folder: Path) -> Iterator[Path]:
     for name, kind, seed, gestures, count, behind in TURNS:
         body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
         motion, scene, turn = parse_gestures(gestures), Scene(clothing=seed, room=seed), 180.0 * behind
-        ring = Ring(count=count, radius=4.2, jitter=0.4, seed=seed, size=(320, 240), fov_deg=55)
-        view = (Viewpoint(fov_deg=60, height=0.9 * body.stature, distance=2.2),)
-        spec = (Spec(name=name, body=body, motion=motion, cameras=view, scene=scene, turn_deg=turn, seed=(7, seed)) if count == 1 else
-                Spec(name=name, body=body, motion=motion, ring=ring, scene=scene, rate=30, turn_deg=turn, seed=(8, seed)))  # fmt: skip
+        seen: dict[str, Any] = {"cameras": (Viewpoint(fov_deg=60, height=0.9 * body.stature, distance=2.2),), "seed": (7, seed)}
+        if count > 1:
+            ring = Ring(count=count, radius=4.2, jitter=0.4, seed=seed, size=(320, 240), fov_deg=55)
+            seen = {"ring": ring, "rate": 30, "seed": (8, seed)}
+        spec = Spec(name=name, body=body, motion=motion, scene=scene, turn_deg=turn, **seen)
         if not (folder / name / "made").exists():
             synthesize(spec, folder / name)
             (folder / name / "made").touch()

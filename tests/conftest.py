@@ -11,9 +11,13 @@ import made
 import made_rig
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
+
+settings.register_profile("no deadline", settings.default, deadline=None)  # a loaded machine is no failure
+settings.load_profile("no deadline")
 
 
 @pytest.fixture

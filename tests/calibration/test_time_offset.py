@@ -6,8 +6,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
-from shadowpuppet.calibration.time_offset import _compared, _Pair, _solved
+from shadowpuppet.calibration.time_offset import QUANTILE, _compared, _Pair, _solved
 
 LATE = (0.0, 4.0, -2.0, 1.0)
 
@@ -45,3 +46,36 @@ def test_a_limb_that_is_missing_at_times_hides_no_offset():
     found = _compared(0, 1, both, 30)
     assert found is not None
     assert found.shift == pytest.approx(5, abs=0.2)
+
+
+def wandering(rng, sets: int, size: float, slow: float = 6.0) -> np.ndarray:
+    """A smooth signal (2, F) of the standard deviation `size`, pixels."""
+    smooth = gaussian_filter1d(rng.normal(size=(2, sets)), slow, axis=1)
+    return size * smooth / smooth.std()
+
+
+@pytest.mark.parametrize("memory", [0.1, 4.0, 20.0])
+def test_silhouettes_of_a_person_who_is_still_give_no_offset(memory):
+    rng = np.random.default_rng(8)
+    for _ in range(12):  # noise of each film's own, which changes quickly or drifts
+        noise = np.stack([wandering(rng, 240, 1.0, memory), wandering(rng, 240, 1.0, memory)])
+        assert _compared(0, 1, noise, 120) is None
+
+
+def test_intervals_of_shifts_hold_what_is_true():
+    rng, held = np.random.default_rng(4), []
+    for _ in range(40):
+        late, motion = rng.uniform(-6, 6), wandering(rng, 300, 30.0)
+        x = np.arange(240) + 30.0
+        both = np.stack([[np.interp(x - shift, np.arange(300), each) for each in motion] for shift in (0.0, late)])
+        found = _compared(0, 1, both + np.stack([wandering(rng, 240, 1.5, 1.0), wandering(rng, 240, 1.5, 1.0)]), 120)
+        assert found is not None
+        held.append(abs(found.shift - late) <= QUANTILE * np.sqrt(found.variance))
+    assert 0.78 <= np.mean(held) <= 0.99
+
+
+def test_sway_of_less_than_the_grid_of_pixels_gives_no_offset():
+    rng = np.random.default_rng(5)
+    for _ in range(6):  # the same sway in both, which whole pixels round each in its own way
+        sway = wandering(rng, 240, 1.0, 10.0)
+        assert _compared(0, 1, np.round(np.stack([sway + 0.2, sway - 0.3])), 120) is None

@@ -13,7 +13,7 @@ from follower import followed
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
-from shadowpuppet.live.rig_capture import NewestSet, SnapshotSet
+from shadowpuppet.live.rig_capture import NewestSet, RigCapture, SnapshotSet
 from shadowpuppet.live.rig_session import RigSession
 from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
 from shadowpuppet.live.run import run_live
@@ -138,6 +138,19 @@ class Source:
 
     def give(self, captured: float) -> None:
         self.newest.put(Snapshot(captured, np.full((2, 2), round(10 * captured), np.uint8)))
+
+
+def test_all_cameras_are_opened_again():
+    class Opened:
+        times = 0
+
+        def again(self):
+            self.times += 1
+
+    capture = RigCapture((), 0.1)
+    capture.captures = cameras = [Opened(), Opened()]
+    capture.again()
+    assert [camera.times for camera in cameras] == [1, 1]
 
 
 def test_pictures_of_one_time_are_a_set():

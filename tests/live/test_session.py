@@ -12,6 +12,7 @@ from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.live import base_session
 from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, in_background, moved, unfit
 from shadowpuppet.live.session import Session
 from shadowpuppet.live.settings import LiveSettings
@@ -23,7 +24,7 @@ from shadowpuppet.video.live_source import Snapshot
 
 SIZE = (160, 120)
 OPTIONS = make_options(QUICK | {"height": HEIGHT, "distance": 2.0})
-SETTINGS = LiveSettings(countdown=0.5, learn=1.0, still=0.4)
+SETTINGS = LiveSettings(countdown=0.5, learn=1.0, still=0.4, lag=0)
 
 
 @pytest.fixture(scope="module")
@@ -313,7 +314,49 @@ def test_what_is_no_person_is_not_tracked(pictures):
     assert any("no person's shape" in outcome.view.message for outcome in outcomes)
 
 
+@pytest.mark.parametrize(("overlaps", "phase"), [((0.0, 0.9, 0.9), "tracking"), ((0.0, 0.0, 0.9), "waiting")])
+def test_a_measurement_is_good_if_most_silhouettes_fit(pictures, tracking, overlaps, phase):
+    session = tracking.session
+    fit = replace(session.measured, overlaps=dict(enumerate(overlaps)))
+    session.phase, session._measured = "measuring", lambda: fit
+    assert tracking.give(pictures[1][24]).view.phase == phase
+
+
+def test_who_is_measured_anew_keeps_the_height_that_was_measured(pictures, tracking):
+    session, known = tracking.session, tracking.session.measured
+    session.fit = replace(known, guess=replace(known.guess, height=1.62))
+    task = session._fitting([np.ones((120, 160), bool)])
+    assert (task.keywords["height"], task.keywords["distance"], task.keywords["sizes"]) == (1.62, None, known.guess.sizes)
+
+
+def test_stillness_begins_anew_after_pictures_did_not_come(pictures):
+    stage = Stage()
+    stage.play([*pictures[0], *pictures[1][:8]])  # of which the last stand still, but not for long enough
+    assert not np.isnan(stage.session._still._since)
+    stage.idle(5.0)
+    assert stage.give(pictures[1][8]).view.phase == "waiting"
+    assert stage.play(pictures[1][9:20])[-1].view.phase in ("measuring", "tracking")
+
+
 # Leaving and returning
+
+
+def test_who_is_lost_for_long_is_advised_to_be_measured_anew(pictures, tracking, monkeypatch):
+    plain = base_session.motion_frame
+
+    def lost(*args):
+        frame, before = plain(*args)
+        return frame._replace(status="lost"), before
+
+    def said(count):
+        return [tracking.give(image, after=0.5).view.message for image in pictures[1][25 : 25 + count]]
+
+    advice = "the body does not fit any more: measure anew"
+    for _ in range(2):  # the second time it is counted anew
+        monkeypatch.setattr(base_session, "motion_frame", lost)
+        assert said(7) == [""] * 5 + [advice] * 2
+        monkeypatch.setattr(base_session, "motion_frame", plain)
+        assert said(1) == [""]
 
 
 def test_a_person_who_leaves_is_absent_and_tracked_again_when_they_return(pictures, tracking):
@@ -355,6 +398,62 @@ def test_a_person_can_be_measured_anew_with_the_sizes_known(pictures, tracking):
     assert stage.session.phase == "tracking"
     assert stage.session.newly_measured()
     assert stage.session.measured.guess.sizes == sizes
+
+
+# Smoothed motion, some frames later
+
+
+def lagging(pictures, lag=0.2):
+    return Stage(replace(SETTINGS, lag=lag)).to_tracking(pictures)
+
+
+def shaking(frames):
+    joints = np.array([frame.joints for frame in frames])
+    return np.abs(np.diff(joints, n=2, axis=0)).mean()
+
+
+def test_with_a_lag_the_same_frames_come_later_and_smoother_with_their_own_pictures(pictures):
+    stage = lagging(pictures)
+    before = len(stage.session.rest())  # of the frames until here
+    outcomes = stage.play(pictures[1][20:40], cost=0.01)
+    assert before == 3
+    assert [len(outcome.given) for outcome in outcomes] == [0] * 3 + [1] * 17
+    given = [outcome.given[0] for outcome in outcomes[3:]]
+    raw = [outcome.frame for outcome in outcomes]
+    assert [each.frame.time for each in given] == [frame.time for frame in raw[:-3]]
+    assert shaking([each.frame for each in given]) < 0.8 * shaking(raw)
+    for outcome, first in zip(outcomes[3:], outcomes):
+        (frame, age), view = outcome.given[0], outcome.view
+        assert view.image is first.images[0]
+        assert view.lag == 0.2
+        assert age == view.latency == pytest.approx(3 * (1 / RATE + 0.01) + 0.01)
+        np.testing.assert_array_equal(view.pose, frame.pose)
+    smoothed = stage.session.timing.summary()["smoothed_latency_ms"]
+    assert smoothed["median"] > 3000 / RATE
+
+
+def test_frames_that_wait_are_given_when_the_pictures_break_off_or_the_person_is_measured_anew(pictures):
+    stage = lagging(pictures)
+    stage.session.rest()
+    stage.play(pictures[1][20:30])
+    silent = stage.idle(2.0)
+    assert silent.view.trouble
+    assert len(silent.given) == 3
+    assert not stage.session.rest()
+    stage.play(pictures[1][30:33])
+    stage.session.ask("measure")
+    assert len(stage.give(pictures[1][33]).given) == 3
+
+
+@pytest.mark.parametrize(("lag", "values", "expected"), [(None, {}, 0.1), (None, {"preset": "liu2011"}, 0), (None, {"smooth": "off"}, 0),
+                                                         (0, {}, 0), (0.3, {"smooth": "off"}, 0.3)])  # fmt: skip
+def test_the_default_lag(lag, values, expected):
+    assert Stage(replace(SETTINGS, lag=lag), make_options(values)).session.lag == expected
+
+
+def test_without_a_lag_frames_are_given_at_once_as_tracked(pictures, tracking):
+    outcome = tracking.give(pictures[1][25], cost=0.03)
+    assert outcome.given == ((outcome.frame, pytest.approx(0.03)),)
 
 
 # Cameras that fail

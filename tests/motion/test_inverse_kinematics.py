@@ -14,6 +14,7 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import Array, euler_angles, rotation_about
 from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.motion.ik_initial_guess import _limb
 from shadowpuppet.motion.inverse_kinematics import (
     SMOOTH_PULL,
     TRUNK_SMOOTH_PULL,
@@ -350,3 +351,10 @@ def test_only_what_would_leave_its_limits_is_held_there(rng):
     np.testing.assert_array_equal(step[held], 0)
     free = ~held[0]
     np.testing.assert_allclose(step[0, free], np.linalg.solve(equations.A[0][np.ix_(free, free)], downhill[0, free]))
+
+
+def test_a_limb_whose_bend_is_unknown_is_placed_as_a_straight_one(rng):
+    parent = np.repeat(np.eye(3)[None], 6, axis=0)
+    along = rng.normal(size=(6, 3)) - [0, 0, 3]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    np.testing.assert_array_equal(_limb(parent, along, np.full((6, 3), np.nan)), _limb(parent, along, np.zeros((6, 3))))

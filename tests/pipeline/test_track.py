@@ -358,7 +358,8 @@ def test_memory_does_not_grow_with_the_film(recording):
 
 def test_the_motion_is_smoothed_at_the_end_and_is_one_of_the_body(run):
     raw, found = read_raw(run.folder / "raw.csv", "rounded"), read_run(run.folder)
-    assert found.info["smoothing"] == {"method": "tracker", "gaps_s": 0.5, "bridged_frames": 0, "turned_frames": 0}
+    assert found.info["smoothing"] == {"method": "tracker", "gaps_s": 0.5, "bridged_frames": 0, "turned_frames": 0,
+                                       "reversed_frames": 0}
     assert jitter(found.motion.table) < 0.7 * jitter(raw.table)
     np.testing.assert_array_equal(found.motion.joint_sd, run.motion.joint_sd)
     body = make_body("rounded", read_person(run.folder / "person.toml", "rounded").sizes)

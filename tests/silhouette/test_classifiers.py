@@ -83,6 +83,7 @@ def naive_labels(planes, mean, inverse_sigma, keyed, shadowed, darkest, weak, st
     return squared, plain, np.uint8(squared >= weak**2) + np.uint8(squared >= strong**2)
 
 
+@pytest.mark.kernels
 @given(st.integers(0, 2**32 - 1), st.sampled_from([(1, 0, 0), (0, 1, 1), (1, 1, 1)]), st.sampled_from([0.3, 0.5, 1.0]),
        st.sampled_from([0.0, 0.8]))
 @settings(max_examples=20, deadline=None)
@@ -101,6 +102,7 @@ def test_classify_is_its_naive_twin(seed, keyed, darkest, asked):
     np.testing.assert_array_equal(label[clear], expected[clear])
 
 
+@pytest.mark.kernels
 def test_contrast_and_neighbours_are_their_naive_twins(rng):
     planes, mean = rng.integers(0, 256, (9, 7, 3), dtype=np.uint8), rng.uniform(0, 255, (9, 7, 3)).astype(np.float32)
     out, seen = np.empty((9, 7), np.float32), np.array([1, 0.5, 0], np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from collections.abc import Sequence
 from dataclasses import replace
@@ -152,9 +153,30 @@ def cal(camera: Camera) -> str:
     return "\n".join(" ".join(f"{value:.12g}" for value in line) for line in lines) + "\n"
 
 
+def panoptic(made: Sequence[Camera]) -> str:
+    """JSON as written by CMU Panoptic: centimetres."""
+    return json.dumps({"calibDataSource": "x", "cameras": [
+        {"name": camera.name, "type": "hd", "resolution": list(camera.size), "panel": 0, "node": n, "K": camera.matrix.tolist(),
+         "distCoef": camera.distortion[:5].tolist(), "R": camera.T_camera_world[:3, :3].tolist(),
+         "t": (100 * camera.T_camera_world[:3, 3:]).tolist()} for n, camera in enumerate(made)]})  # fmt: skip
+
+
+def colmap(made: Sequence[Camera]) -> tuple[str, str]:
+    """COLMAP's cameras.txt and images.txt: pixel centres at halves, no k3."""
+    lenses, pictures = ["# Camera list"], ["# Image list"]
+    for n, camera in enumerate(made, 1):
+        K, (x, y, z, w) = camera.matrix, rotation(camera).as_quat()
+        lens = [K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5, *camera.distortion[:4]]
+        lenses.append(f"{n} OPENCV {camera.size[0]} {camera.size[1]} {' '.join(map(repr, map(float, lens)))}")
+        pose = [w, x, y, z, *camera.T_camera_world[:3, 3]]
+        pictures += [f"{n} {' '.join(map(repr, map(float, pose)))} {n} {camera.name}/0001.jpg", "10.5 20.5 -1 30 40 7"]
+    return "\n".join(lenses), "\n".join(pictures)
+
+
 def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
     """Write a file of every kind; returns the path of each by its name."""
     texts = {"anipose.toml": toml(made), "freemocap.toml": freemocap(made), "camera_array.toml": caliscope(made),
+             "panoptic.json": panoptic(made), "colmap/cameras.txt": colmap(made)[0], "colmap/images.txt": colmap(made)[1],
              "Calib.qca.txt": qualisys(made), "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
     for camera in made:
         texts |= {f"cal/{camera.name}.cal": cal(camera), f"yaml/{camera.name}.yml": opencv(camera)}
@@ -163,5 +185,5 @@ def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     (folder / "cameraIntrinsicsExtrinsics.pickle").write_bytes(pickle.dumps({"intrinsicMat": [1]}))
-    whole = {"easy": folder / "easy", "cal": folder / "cal", "yaml": folder / "yaml", "xml": folder / "xml"}
+    whole = {"easy": folder / "easy", "colmap": folder / "colmap", "cal": folder / "cal", "yaml": folder / "yaml", "xml": folder / "xml"}
     return whole | {name: folder / name for name in texts if "/" not in name}

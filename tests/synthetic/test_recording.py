@@ -199,6 +199,13 @@ def test_arms_are_kept_out_of_the_trunk():
     assert gap(gestures.gesture_postures([("random", 19.0)], np.arange(0, 20, 0.1), np.random.default_rng(15))).min() > 0.2
 
 
+def test_distances_from_line_segments_are_those_from_many_places_on_them(rng):
+    points, start, end = rng.normal(1, 1, (3, 40, 3))
+    share = np.linspace(0, 1, 2001)[:, None, None]
+    wanted = np.linalg.norm(points - (start + share * (end - start)), axis=2).min(0)
+    np.testing.assert_allclose(gestures._off(points, start, end), wanted, atol=1e-3)
+
+
 def test_reach_goes_toward_the_camera_one_arm_after_the_other(rng):
     t = np.arange(0, 7.5, 0.1)
     figure = pose(Mannequin(), gestures.gesture_postures([("reach", 6.0)], t, rng))

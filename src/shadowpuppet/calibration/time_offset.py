@@ -26,6 +26,14 @@ TRIM_PERCENTILE = 80
 """Percentile up to which differences are averaged: the greatest come from limbs missing in one silhouette."""
 MAX_RESIDUAL_SHARE = 0.6
 """Two signals give an offset if at most this share of their median difference is left at the best shift."""
+LEAST_MOTION = 2.0
+"""Least standard deviation (robust) of a signal, pixels: the sway of a person at rest stays below, and the grid of the pixels, which is
+alike in no two pictures, then biases a shift by most of a frame."""
+LEAST_SCORE = 2.0
+"""Standard errors by which two signals must be more alike, at their best shift, than chance makes them at the best of all shifts tried."""
+QUANTILE, NOISE_FACTOR = 1.645, 1.56
+"""Half-width of a 90 % interval over the standard deviation, and a factor on the variance from noise: the trimmed minimum is less exact
+than least squares would be; chosen on simulated signals, of whose true shifts the intervals then hold 86 to 91 %."""
 SOLVER_ROUNDS = 30
 """Rounds of iteratively reweighted least squares for all cameras."""
 
@@ -39,7 +47,7 @@ class TimeOffsets:
     frames: tuple[float | None, ...]
     """Sets by which each film is late (negative: early); None if its silhouettes move too little to tell."""
     spread: tuple[float | None, ...]
-    """Uncertainty of each offset: median deviation of the camera's pairs from it, sets."""
+    """Half-width of each offset's 90 % interval, sets: from the noise of the signals, and from how the camera's pairs differ."""
     pairs: tuple[tuple[float | None, ...], ...]
     """Sets by which the second film of a pair is later than the first; None if unknown."""
 
@@ -53,6 +61,8 @@ class _Pair:
     shift: float
     """Sets by which the second camera's film is later."""
     weight: float
+    variance: float = 0.0
+    """Of the shift, from the signals' noise, sets squared."""
 
 
 def time_offsets(cameras: Sequence[Camera], rows: Sequence[Row]) -> TimeOffsets:
@@ -64,11 +74,13 @@ def time_offsets(cameras: Sequence[Camera], rows: Sequence[Row]) -> TimeOffsets:
     late, known = _solved(len(cameras), pairs)
     table = np.full((len(cameras), len(cameras)), np.nan)
     deviations: list[list[float]] = [[] for _ in cameras]
+    variances: list[list[float]] = [[] for _ in cameras]
     for pair in pairs:
         table[pair.first, pair.second], table[pair.second, pair.first] = pair.shift, -pair.shift
         for n in (pair.first, pair.second):
             deviations[n].append(abs(late[pair.second] - late[pair.first] - pair.shift))
-    spread = np.array([np.median(values) if values else np.nan for values in deviations])
+            variances[n].append(pair.variance)
+    spread = np.array([_half_width(off, own) if off else np.nan for off, own in zip(deviations, variances)])
     return TimeOffsets(names=tuple(camera.name for camera in cameras), frames=plain_values(np.where(known, late, np.nan)),
                        spread=plain_values(spread), pairs=tuple(map(plain_values, table)))
 
@@ -87,6 +99,13 @@ def tangent_signals(cameras: Sequence[Camera], outlines: Sequence[Sequence[Outli
     return signals * (float(np.median(levers)) if levers else np.nan)
 
 
+def _half_width(deviations: Sequence[float], variances: Sequence[float]) -> float:
+    """Half-width of a camera's 90 % interval, sets. Noise of its own silhouettes is in all of its pairs: more than two add nothing."""
+    noise = float(np.median(variances)) / min(len(variances), 2)
+    between = (1.4826 * float(np.median(deviations))) ** 2 / len(deviations)
+    return QUANTILE * float(np.sqrt(noise + between))
+
+
 def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
     """Time offset of two cameras: the shift at which their signals differ least; None if there is no distinct minimum."""
     shifts = np.arange(-most, most + 1)
@@ -98,15 +117,58 @@ def _compared(i: int, j: int, signals: Array, most: int) -> _Pair | None:
         return None
     before, least, after = cost[k - 1 : k + 2]
     rise = max(before, after) - least
-    if rise <= 0:
+    variance = _variance(signals, int(shifts[k]), most)
+    if rise <= 0 or variance is None:
         return None
-    return _Pair(i, j, float(shifts[k] + 0.5 * (before - after) / rise), float((rise / max(least, 0.05)) ** 2))
+    return _Pair(i, j, float(shifts[k] + 0.5 * (before - after) / rise), float((rise / max(least, 0.05)) ** 2), variance)
+
+
+def _variance(signals: Array, shift: int, most: int) -> float | None:
+    """Variance of a shift, sets squared, by the signals' slopes and the noise that is left at it; None if nothing moves, or the signals
+    (2, 2, F) are no more alike than the best of all shifts up to `most` makes them by chance."""
+    information, alike = 0.0, False
+    for a, b in zip(*_overlapping(signals, shift)):
+        both = np.isfinite(a) & np.isfinite(b)
+        if both.sum() < MIN_COMMON_SETS:
+            continue
+        a, b = a[both] - np.median(a[both]), b[both] - np.median(b[both])
+        kept = np.abs(a - b - np.median(a - b)) <= np.percentile(np.abs(a - b - np.median(a - b)), TRIM_PERCENTILE)
+        size = min(1.4826 * float(np.median(np.abs(each))) for each in (a, b))
+        if size < LEAST_MOTION:
+            continue
+        left = (a - b)[kept]
+        count = len(left) * _independent(_memory(a) * _memory(b))
+        likeness = float(np.corrcoef(a[kept], b[kept])[0, 1])
+        tries = max(2.0, count * 2 * most / len(a))
+        score = np.arctanh(np.clip(likeness, -0.999999, 0.999999)) * np.sqrt(max(count - 1.0, 0.0))
+        alike |= bool(score > np.sqrt(2 * np.log(tries)) + LEAST_SCORE)
+        slope = np.gradient((a + b) / 2)
+        noise = max(float(left.var()), 0.05**2) / _independent(_memory(left))
+        information += float((np.clip(slope, *np.percentile(slope, (2, 98))) ** 2).sum()) / noise
+    return NOISE_FACTOR / information if alike and information > 0 else None
+
+
+def _memory(signal: Array) -> float:
+    """Correlation of a signal (F,) with itself one set later; 0 to 0.99."""
+    signal = signal - signal.mean()
+    power = float(signal @ signal)
+    return float(np.clip(signal[1:] @ signal[:-1] / power, 0.0, 0.99)) if power > 0 else 0.99
+
+
+def _independent(memory: float) -> float:
+    """Share of a signal's samples that are as good as independent."""
+    return (1 - memory) / (1 + memory)
+
+
+def _overlapping(signals: Array, shift: int) -> tuple[Array, Array]:
+    """The parts (2, F - |shift|) of two signals (2, 2, F) that are left if the second is taken `shift` sets later."""
+    F = signals.shape[2]
+    return signals[0, :, max(0, -shift) : F - max(0, shift)], signals[1, :, max(0, shift) : F + min(0, shift)]
 
 
 def _difference(signals: Array, shift: int) -> float:
     """Trimmed mean difference of two signals (2, 2, F), the second taken `shift` sets later, without its constant part."""
-    F = signals.shape[2]
-    a, b = signals[0, :, max(0, -shift) : F - max(0, shift)], signals[1, :, max(0, shift) : F + min(0, shift)]
+    a, b = _overlapping(signals, shift)
     total, tangents = 0.0, 0
     for d in a - b:
         d = d[np.isfinite(d)]

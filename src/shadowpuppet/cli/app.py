@@ -16,7 +16,8 @@ COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
     "info": "recordings:info", "synthesize": "recordings:synthesize", "humaneva": "recordings:humaneva",
     "masks": "recordings:masks",
-    "check": "calibration:check", "fit-prior": "motion:fit_prior", "export": "motion:export", "convert": "motion:convert",
+    "calibrate": "calibration.calibrate:calibrate",
+    "check": "calibration.check:check", "fit-prior": "motion:fit_prior", "export": "motion:export", "convert": "motion:convert",
     "evaluate": "evaluation:evaluate", "bench": "bench:bench", "batch": "batch:batch", "view": "viewer:view",
     "settings": "app:settings", "completion": "app:completion", "doctor": "doctor:doctor",
 }  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from shadowpuppet.cli import calibration
+from shadowpuppet.cli.calibration import explain as calibration
 from shadowpuppet.cli.flags import (
     CAMERAS,
     PERSON,

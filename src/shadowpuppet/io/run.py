@@ -176,11 +176,16 @@ class RunWriter:
         """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self.begin()
         kept = self._motion.append(frame)
-        self._modes[kept.time] = kept.modes
+        self._keep_modes(kept)
         with self._system_errors():
             _append(self._tables, run_rows(kept), self._intervals.lines(kept), checkpoint.frame_bytes(kept))
             for table in self._tables:
                 table.flush()  # so that a killed run keeps it
+
+    def _keep_modes(self, frame: MotionFrame) -> None:
+        """Keep a frame's other places of limbs, if it has any."""
+        if frame.modes:
+            self._modes[frame.time] = frame.modes
 
     @property
     def motion(self) -> Motion:
@@ -235,7 +240,7 @@ class RunWriter:
             self._tables = tables if self._resume is None else [*tables, checkpoint.open_frames(self.folder, self._before or [])]
             _append(self._tables, run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header())
             for kept in self._before or []:
-                self._modes[kept.time] = kept.modes
+                self._keep_modes(kept)
                 _append(self._tables, run_rows(kept), self._intervals.lines(kept))
             for table in self._tables:
                 table.flush()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -23,10 +24,16 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.smoothing.fixed_lag import FixedLag
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import Image
 
 GONE = 2.0
 """Seconds of being lost after which a new measurement is advised."""
+
+
+LAG = 0.1
+"""Lag (s) of smoothed motion: more takes hardly more of the shaking away (docs/smoothing.md)."""
 
 
 class Outcome(NamedTuple):
@@ -34,9 +41,28 @@ class Outcome(NamedTuple):
 
     view: View
     frame: MotionFrame | None = None
-    """Motion of the frame; None unless a person is tracked."""
+    """Motion of the frame, as tracked; None unless a person is tracked."""
     images: tuple[Image, ...] = ()
     """Each camera's picture, of the working size."""
+    given: tuple[Given, ...] = ()
+    """Frames for other programs, of this picture or of some before, when there is a lag."""
+
+
+class Given(NamedTuple):
+    """A frame for other programs."""
+
+    frame: MotionFrame
+    """Smoothed, if there is a lag."""
+    age: float
+    """Seconds since its picture was captured."""
+
+
+class _Seen(NamedTuple):
+    """What is shown of a frame that waits for the next ones."""
+
+    captured: float
+    images: tuple[Image, ...]
+    masks: tuple[Mask, ...]
 
 
 def at_once(task: Callable[[], Any]) -> Callable[[], Any]:
@@ -67,9 +93,21 @@ class LiveSession(ABC):
     def __post_init__(self) -> None:
         """Set the state before the first picture."""
         self._began, self._lost_since, self._new, self._state, self._before = np.nan, np.nan, False, None, None
+        self._lagging: FixedLag | None = None
+        """Smooths the frames; None without a lag, and before there is a person."""
+        self._seen = dict[float, _Seen]()
+        """What belongs to the frames that wait, by their times."""
+        self.leans = array("d")
+        """`TrackedSubject.lean` of each frame."""
         self._watch: RigWatch | None = None
         """Which of several cameras are set aside."""
         self._measured: Callable[[], Any] = lambda: None
+
+    @property
+    def lag(self) -> float:
+        """Seconds by which frames wait for the next ones; 0: not at all."""
+        usual = 0.0 if self.options.smoothing[0] == "off" else LAG
+        return usual if self.settings.lag is None else self.settings.lag
 
     # Input
 
@@ -81,7 +119,14 @@ class LiveSession(ABC):
         self.trouble = ""
         self.timing.came(shot.captured, shot.number)
         phases = {"learning": self._learn, "waiting": self._wait, "measuring": self._measure, "tracking": self._track}
-        return phases[self.phase](shot, self._scaled(shot))
+        outcome = phases[self.phase](shot, self._scaled(shot))
+        return outcome if outcome.frame is not None else outcome._replace(given=self.rest())
+
+    def rest(self) -> tuple[Given, ...]:
+        """The frames that wait yet, when no more follow at once."""
+        if self._lagging is None:
+            return ()
+        return self._aged(self._lagging.rest())
 
     def idle(self, problem: str = "") -> Outcome:
         """Handle that no picture came for a moment; `problem`: the reason, if known."""
@@ -181,16 +226,38 @@ class LiveSession(ABC):
             self._watch.tracked(self.subject.drawn(self._state))
         seconds = shot.captured - self._began if shot.shown is None else shot.shown
         frame, self._before = motion_frame(self.subject, seconds, self._state, observation, self._before)
+        self.leans.append(self.subject.lean(frame, masks))
         now = self.clock()
         self.timing.done(shot.captured, now, shot.number)
         if frame.status != "lost":
             self._lost_since = np.nan
         elif np.isnan(self._lost_since):
             self._lost_since = shot.captured
-        return Outcome(self._view(images, masks, frame, now - shot.captured), frame, images)
+        if self._lagging is None:
+            late = now - shot.captured
+            return Outcome(self._view(images, masks, frame, late), frame, images, (Given(frame, late),))
+        return self._later(_Seen(shot.captured, images, masks), frame)
+
+    def _later(self, seen: _Seen, frame: MotionFrame) -> Outcome:
+        """The outcome of a frame that waits for the next ones: it shows the newest of those that are due, if any is."""
+        assert self._lagging is not None
+        self._seen[frame.time] = seen
+        before = dict(self._seen)
+        given = self._aged(self._lagging(frame))
+        if not given:
+            return Outcome(self._view(), frame, seen.images)
+        shown = before[given[-1].frame.time]
+        self.timing.given(given[-1].age)
+        return Outcome(self._view(shown.images, shown.masks, *given[-1]), frame, seen.images, given)
+
+    def _aged(self, frames: Sequence[MotionFrame]) -> tuple[Given, ...]:
+        """Frames that wait no more."""
+        now = self.clock()
+        return tuple(Given(frame, now - self._seen.pop(frame.time).captured) for frame in frames)
 
     def _begin_tracking(self, subject: TrackedSubject) -> None:
         self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True
+        self._lagging = FixedLag(MotionSmoother(subject.body.skeleton, subject.joints), self.lag) if self.lag else None
         self.timing.pause()
 
     def _pause(self, trouble: str) -> Outcome:
@@ -198,7 +265,7 @@ class LiveSession(ABC):
         self.trouble = trouble
         self._forget_time()
         self.timing.pause()
-        return Outcome(self._view())
+        return Outcome(self._view(), given=self.rest())
 
     def _view(self, images: tuple[Image, ...] = (), masks: tuple[Mask, ...] = (), frame: MotionFrame | None = None,
               latency: float = np.nan) -> View:
@@ -210,6 +277,7 @@ class LiveSession(ABC):
             phase=self.phase, message=message, countdown=countdown, trouble=self.trouble, status=frame.status if frame else "",
             overlap=frame.overlap if frame and pose is not None else np.nan, angles=angles, latency=latency, rate=self.timing.rate,
             interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, doubtful=doubtful,
+            lag=0.0 if self._lagging is None else self.lag,
             **self._shown(images, masks, frame),
         )  # fmt: skip
 

@@ -15,7 +15,7 @@ import numpy as np
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
-from shadowpuppet.live.base_session import LiveSession, Outcome
+from shadowpuppet.live.base_session import Given, LiveSession, Outcome
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.phases import in_background
@@ -34,7 +34,9 @@ from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names
+from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
+from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video.capture import Capture
 from shadowpuppet.video.live_source import open_feed
 from shadowpuppet.video.network_stream import without_secrets
@@ -57,6 +59,7 @@ class _Nobody(Exception):
     """Nobody was tracked, so there is no run to keep."""
 
 
+@one_blas_thread()
 def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
              listener: LiveListener | None = None, display: Display | None = None,
              clock: Callable[[], float] = time.monotonic, outlets: Outlets | None = None) -> dict[str, Any] | None:
@@ -80,6 +83,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
         with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as run:
             session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
+            smooth_run(run, session.subjects, options, listener, session.session.leans)
     except _Nobody:
         return None
     motion = read_run(folder).motion
@@ -99,6 +103,8 @@ class _Live:
         self.session, self.capture, self.rate, self.is_live = self._several() if is_rig(settings.camera) else self._single()
         self.recorder = Recorder(run.folder / "recording", self.session.worked_cameras, self.rate) if settings.record else None
         self.frames, self.breaks, self.broke, self.said = 0, 0, np.nan, ""
+        self.subjects = list[tuple[int, TrackedSubject]]()
+        """Measured persons, each with its first frame."""
 
     def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
         """The session of one camera, its reader, its frames/s, and whether it is live (not a film)."""
@@ -163,18 +169,25 @@ class _Live:
             if (command := self.display.command()) == "stop":
                 break
             self.session.ask(command)
+        self._give(self.session.rest())
         if self.capture.error is not None:
             raise self.capture.error
+
+    def _give(self, given: tuple[Given, ...]) -> None:
+        for frame, age in given:
+            self.outlets.follow(frame, age)
 
     def _keep(self, outcome: Outcome) -> None:
         if self.session.asks_again(self.clock()):
             self.capture.again()
         if outcome.frame is None:
+            self._give(outcome.given)
             return
         if self.session.newly_measured():
+            self.subjects.append((self.frames, self._person))
             self._write_beside()
             self.outlets.begin(self._stream_subject())
-        self.outlets.follow(outcome.frame, outcome.view.latency)
+        self._give(outcome.given)
         self.run_.write(outcome.frame)
         self.frames += 1
         self.listener.advance(self.frames)

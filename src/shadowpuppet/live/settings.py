@@ -36,5 +36,8 @@ class LiveSettings:
     """Address at which the page is served; any but the loopback address lets other machines see the person."""
     port: Annotated[int, Field(ge=0, le=65535)] | None = None
     """Port of the page; 0 for any that is free. Left out: 8600, or any that is free."""
+    lag: Annotated[float, Field(ge=0, le=2)] | None = None
+    """Seconds by which the motion shown, and sent to other programs, waits for the next pictures, which smooth it; 0: as tracked, at once.
+    By default 0.1, and 0 if nothing is smoothed (`smooth = "off"`, the papers' presets)."""
     record: bool = False
     """Also save the pictures, in RUN/recording, which `track` can read. Without this no picture is saved."""

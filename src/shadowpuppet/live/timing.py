@@ -18,7 +18,7 @@ class Timing:
     def __init__(self, rate: float) -> None:
         """`rate`: frames/s that the camera states; NaN if it does not."""
         self._usual = 1 / rate
-        self.latencies, self._done = array("d"), deque[float](maxlen=RECENT + 1)
+        self.latencies, self._ages, self._done = array("d"), array("d"), deque[float](maxlen=RECENT + 1)
         self.dropped = 0
         """Pictures that came while another was tracked."""
         self._first: tuple[float, int] | None = None
@@ -41,6 +41,10 @@ class Timing:
         self._worked += now - (self._done[-1] if self._done else captured)
         self._done.append(now)
 
+    def given(self, age: float) -> None:
+        """Record that a smoothed frame was given out, `age` seconds after its capture."""
+        self._ages.append(age)
+
     @property
     def interval(self) -> float:
         """Seconds between pictures; by the camera's stated rate before two have come."""
@@ -56,8 +60,13 @@ class Timing:
         """Entries of metrics.json: latencies in milliseconds and in frames of the camera, interval, rate."""
         if not self.latencies:
             return {}
-        late, interval = np.array(self.latencies), self.interval
-        of = {"median": np.median(late), "p95": np.percentile(late, 95), "max": late.max()}
-        return {"latency_ms": {key: round(1000 * float(value), 2) for key, value in of.items()},
-                "latency_frames": {key: round(float(value) / interval, 3) for key, value in of.items()},
+        late, interval, of = np.array(self.latencies), self.interval, _summed(self.latencies)
+        smoothed = {"smoothed_latency_ms": {key: round(1000 * value, 2) for key, value in _summed(self._ages).items()}}
+        return {"latency_ms": {key: round(1000 * value, 2) for key, value in of.items()}, **(smoothed if self._ages else {}),
+                "latency_frames": {key: round(value / interval, 3) for key, value in of.items()},
                 "interval_ms": round(1000 * interval, 2), "frames_per_s": round(len(late) / max(self._worked, 1e-9), 2)}
+
+
+def _summed(late: array[float]) -> dict[str, float]:
+    """Median, 95th percentile and maximum of latencies, seconds; empty without any."""
+    return {"median": float(np.median(late)), "p95": float(np.percentile(late, 95)), "max": max(late)} if late else {}

@@ -29,9 +29,9 @@ MAX_SET_RATE = 31.0
 """Greatest rate of the sets compared, 1/s; a higher one adds nothing."""
 SETS_COMPARED = 12
 """Number of sets, spread over all, in which places are compared."""
-MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 3.0
+MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 1.5
 """Least offset, in sets, of a film that is late; the same for a camera that disagrees about places, so that its time is less certain;
-least ratio of the offset to its spread over camera pairs."""
+least ratio of the offset to the half-width of its 90 % interval."""
 SLIGHT_DISAGREEMENT = 0.004
 """Disagreement, over the picture's longer side, above which the worst camera is tested for a rotation (2.6 of 640 pixels)."""
 STANDOUT_FACTOR = 3.0
@@ -74,6 +74,11 @@ class CalibrationCheck:
     """Problems with their remedies, a sentence each."""
 
     @property
+    def still(self) -> bool:
+        """Whether the person moves too little to tell any film's delay."""
+        return self.lateness is not None and all(value is None for value in self.lateness.frames)
+
+    @property
     def good(self) -> bool:
         """Whether there are no problems."""
         return not self.doubts
@@ -90,12 +95,17 @@ class SilhouetteSets(NamedTuple):
 
 def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
     """Test the calibration of several cameras. Raises a `ShadowPuppetError` if there are no silhouettes, or no person in them."""
+    return check_sets(rig, options, listener)[0]
+
+
+def check_sets(rig: Rig, options: Options, listener: Listener | None = None) -> tuple[CalibrationCheck, SilhouetteSets]:
+    """As `check_calibration`; also returns the silhouettes compared."""
     if not rig.is_multiview:
         raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
     listener = listener or Listener()
     sets = gather_silhouettes(rig, options, listener)
     listener.begin("comparing")
-    return judge_calibration(rig, sets)
+    return judge_calibration(rig, sets), sets
 
 
 def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> SilhouetteSets:
@@ -154,14 +164,14 @@ class _Judgement(NamedTuple):
 def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
     """Compare places, then times, then places again with the films aligned; the aligned result is used if it leaves less disagreement."""
     still = [0.0] * len(rig.cameras)
-    chosen = _spread(rows, still)
+    chosen = aligned_sets(rows, still)
     found = compare_cameras(rig.cameras, chosen)
     if found.remedy is not None:
         return _Judgement(found, {}, None, still)
     first = _with_times(rig, rows, found, chosen)
     if not any(first.shifts):
         return first
-    aligned = _spread(rows, first.shifts)
+    aligned = aligned_sets(rows, first.shifts)
     second = _with_times(rig, rows, compare_cameras(rig.cameras, aligned, remedies=False), aligned)
     return second if second.left() < first.left() else first._replace(shifts=still)  # not a time offset
 
@@ -174,7 +184,7 @@ def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequenc
     return _Judgement(found, rotations, offsets, _certain(offsets, found))
 
 
-def _spread(rows: Sequence[Row], shifts: Sequence[float]) -> list[Row]:
+def aligned_sets(rows: Sequence[Row], shifts: Sequence[float]) -> list[Row]:
     """`SETS_COMPARED` of the sets, evenly spread, in which camera k's silhouette is taken `shifts[k]` sets later."""
     steps, F = [round(shift) for shift in shifts], len(rows)
     first, last = max(0, -min(steps)), F - 1 - max(0, *steps)

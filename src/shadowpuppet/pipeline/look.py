@@ -129,6 +129,8 @@ class FirstSeconds(NamedTuple):
     """F times, seconds."""
     masks: list[tuple[Mask | None, ...]]
     """For each time a mask (H, W) per camera; None for a camera without a frame."""
+    later: tuple[tuple[Mask | None, ...], ...] = ()
+    """With one camera: masks of moments of the rest of the film, in order of time."""
 
 
 @dataclass(frozen=True, eq=False)

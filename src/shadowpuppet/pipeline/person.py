@@ -34,11 +34,12 @@ from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
-from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.smoothing.facing import NEAR, TWIST
+from shadowpuppet.tracking.smoothing.head_lean import head_lean
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
@@ -64,8 +65,10 @@ LONGEST_REFERENCE = 60
 """Greatest number of frames read from a reference's film."""
 MOST = 0.75
 """Share of the first masks in which a part that the body does not explain must be."""
-LOOKED_FOR_IN = 12
-"""Number of masks of the first seconds used to fit a person without references."""
+LOOKED_FOR_IN, FEWEST_EARLY = 12, 3
+"""Number of masks used to fit a person without references, and how many of them at least are of the first seconds."""
+ELSEWHERE = 0.25
+"""Share of the moments that do not fit the person's place from which that is a doubt."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -90,7 +93,7 @@ class MonocularSubject(TrackedSubject):
         unexplained, looks = None, max(1, round(MOST * len(masks)))
         pose = None
         for mask in masks:
-            pose = search_pose(self.picture, mask).pose
+            pose = self.tracker.search(mask).pose
             legs = self.picture.legs(pose) if self.tracker.settings.ignore_legs else None
             unexplained = look_beside(unexplained, mask, self.picture.mask(pose), looks, legs)
         if pose is None or unexplained is None or not unexplained.stays.any():
@@ -113,6 +116,13 @@ class MonocularSubject(TrackedSubject):
         if state is None:
             return self.tracker.start(rng, observation) if observation.any() else None
         return self.tracker.step(rng, state, observation)
+
+    def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
+        """The lean of the head where an upper body is twisted into a profile, else NaN."""
+        if found.pose is None or masks[0] is None or TWIST not in self.body.skeleton.dof_names:
+            return np.nan
+        twist = np.asarray(found.pose)[self.body.skeleton.dof_names.index(TWIST)]
+        return head_lean(masks[0]) if abs(twist) > NEAR else np.nan
 
     def left_out(self, state: State | None) -> tuple[Mask | None, ...]:
         """The pixels (H, W) that a state leaves out of the silhouette; None for none."""
@@ -150,10 +160,12 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     for_fit, for_start = rng.spawn(2)
     rate = survey.look.rate if np.isfinite(survey.look.rate) else FALLBACK_RATE
     (footage,), (clean,), masks = survey.rig.footage, survey.clean, [mask for (mask,) in survey.first.masks if mask is not None]
+    later = [mask for (mask,) in survey.first.later if mask is not None]
+    moments = [*_few(masks, max(LOOKED_FOR_IN - len(later), FEWEST_EARLY)), *later]
     if not masks:
         raise TrackingError(f"{footage.view.video}: the silhouettes are empty or nearly all of the picture, expected a person in them")
     try:
-        fit, source = _fitted(footage, masks, clean, options, for_fit)
+        fit, source = _fitted(footage, moments, clean, options, for_fit)
     except TrackingError as error:
         raise TrackingError(f"{footage.recording.path}: {error}") from None
     subject = MonocularSubject.of(fit, footage.camera, options.tracker, source, rate / options.every)
@@ -167,15 +179,21 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
                "elevation": float(guess.elevation), "overlaps": dict(fit.overlaps), "start_overlap": start,
                "sizes": dict(zip(guess.sizes.names(), guess.sizes.to_array().tolist()))}
     beside = subject.beside_in(_few(masks)) if options.tracker.patience else None
-    return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start)), beside=(beside,))
+    return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start, len(moments))), beside=(beside,))
 
 
-def _doubts(fit: SizeFit, source: str, start: float) -> list[Caution]:
-    """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette."""
+def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Caution]:
+    """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette;
+    `moments`: number of silhouettes that the person was looked for in."""
     doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
                       "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
               for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
-    if start < NOBODY:
+    apart = 0 if source == "references" else moments - len(fit.overlaps)
+    if apart >= ELSEWHERE * moments:
+        doubts.append(Caution(f"in {apart} of {moments} moments of the film the person is at another distance or height than in most: they "
+                              "walk, or sit down; an upper body stays where it was measured, a whole one can sit down (--body anatomical); "
+                              "cut the film with --start and --end", "person changes place: cut with --start, --end", HARMFUL))
+    elif start < NOBODY:
         doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: is anybody in the picture then, and "
                               "does the distance hold? begin where the whole person is seen (--start), give --distance",
                               "no person fits the first silhouette: give --start or --distance", RUINOUS))
@@ -193,9 +211,9 @@ def _fitted(footage: Footage, masks: list[Mask], silhouettes: Silhouettes, optio
     if options.person is not None:
         person = read_person(options.person, body)
         known["height"] = known["height"] or person.height
-        fit = find_person(rng, footage.camera, _few(masks), sizes=person.sizes, **known)
+        fit = find_person(rng, footage.camera, masks, sizes=person.sizes, **known)
         return replace(fit, curves={}), str(options.person)
-    source = "proportions, refined on the first seconds"
+    source = "proportions, refined on moments of the film"
     try:
         if (fit := _by_references(footage, silhouettes, known, rng)) is not None:
             return fit, "references"
@@ -203,7 +221,7 @@ def _fitted(footage: Footage, masks: list[Mask], silhouettes: Silhouettes, optio
         if silhouettes.recovered is None or not silhouettes.recovered.covered.any():
             raise
         source += "; the references' silhouettes need a picture of the empty scene"
-    return find_person(rng, footage.camera, _few(masks), **known), source
+    return find_person(rng, footage.camera, masks, **known), source
 
 
 def _by_references(footage: Footage, silhouettes: Silhouettes, known: dict[str, Any], rng: np.random.Generator) -> SizeFit | None:
@@ -217,9 +235,9 @@ def _by_references(footage: Footage, silhouettes: Silhouettes, known: dict[str, 
     return as_whole(footage.camera, list(references.values()), fit, body) if body in WHOLE else fit
 
 
-def _few(masks: list[Mask]) -> list[Mask]:
-    """At most `LOOKED_FOR_IN` of the masks, evenly spread."""
-    return [masks[k] for k in np.unique(np.linspace(0, len(masks) - 1, LOOKED_FOR_IN).astype(int))]
+def _few(masks: list[Mask], most: int = LOOKED_FOR_IN) -> list[Mask]:
+    """At most `most` of the masks, evenly spread."""
+    return [masks[k] for k in np.unique(np.linspace(0, len(masks) - 1, most).astype(int))]
 
 
 def _references(footage: Footage, silhouettes: Silhouettes) -> dict[str, Mask]:

@@ -103,6 +103,11 @@ class TrackedSubject(ABC):
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
         return ()
 
+    def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
+        """How far the head lies before the neck in a frame in which the person is seen in profile (`head_lean`); NaN in others, and with
+        several cameras."""
+        return np.nan
+
     def kept(self, state: Any) -> Any:
         """A tracker's state without what the next frame does not need."""
         return state
@@ -118,6 +123,10 @@ class TrackedSubject(ABC):
     def landmarks(self, poses: Array) -> Array:
         """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
         return self.body.points(poses)
+
+    def joints(self, poses: Array) -> Array:
+        """The landmarks (N, J, 3) of poses (N, D) that a run writes as joints, in the world, metres."""
+        return self.landmarks(poses)[:, self.joint_columns]
 
     def points(self, pose: Array) -> Array:
         """Landmarks (L, 3) of a pose (D,) in the world, metres."""

@@ -137,12 +137,15 @@ def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (Scen
 
 
 def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
-    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film."""
+    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film; and those
+    of the later runs of the sample, the first of each."""
     def seen(frame: CameraFrame) -> tuple[float, Mask]:
         return frame.time, clean(frame)
 
     people = list(islice((each for each in map(seen, chain(sample.first, sample.frames)) if may_be_person(each[1])), FIRST))
-    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people])
+    last = people[-1][0] if people else 0.0
+    later = [each for each in (seen(run[0]) for run in sample.runs if run[0].time > last) if may_be_person(each[1])]
+    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in later))
 
 
 def _look(footage: Footage, film: FilmSurvey) -> Look:

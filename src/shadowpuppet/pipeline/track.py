@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from array import array
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -53,7 +54,7 @@ from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
-from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_parts
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
@@ -205,8 +206,8 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         _check_cutoff(options, prepared.look.rate)
-        _track(writer, prepared, kind, options, listener, for_track, cache)
-        _smooth(writer, prepared.check(), options, listener)
+        leans = _track(writer, prepared, kind, options, listener, for_track, cache)
+        smooth_run(writer, [(0, prepared.check())], options, listener, leans)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
@@ -227,7 +228,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     writer.hand_over()
     entries = {key: value for key, value in writer.info.items() if key not in (*OWN_KEYS, "people", "truth")}
     people = PeopleRun(writer.folder, survey, survey.census, options, entries, listener)
-    found = people.track(*rngs, _smooth)
+    found = people.track(*rngs, smooth_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
     writer.info["people"] = len(found)
@@ -248,18 +249,20 @@ def _check_cutoff(options: Options, rate: float) -> None:
         check_cutoff(options.cutoff, rate / options.every)
 
 
-def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener) -> None:
-    """Replace the tracked motion by the smoothed one. If that is impossible, the motion stays as it is, with a warning."""
+def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]], options: Options, listener: Listener,
+               leans: Sequence[float]) -> None:
+    """Replace the tracked motion by the smoothed one: of each of `subjects` from its first frame to the next one's. If that is impossible,
+    the motion stays as it is, with a warning. `leans`: of the head in each frame (`TrackedSubject.lean`)."""
     method, gaps = options.smoothing
     if method == "off" and gaps == 0:
         writer.info["smoothing"] = {"method": "off"}
         return
     listener.begin("smoothing")
-    start, columns = time.perf_counter(), subject.joint_columns
-    smoother = MotionSmoother(subject.body.skeleton, lambda poses: subject.landmarks(poses)[:, columns], method, options.cutoff, gaps,
-                              options.facing == "away")
+    start, away = time.perf_counter(), options.facing == "away"
+    parts = [(begin, MotionSmoother(subject.body.skeleton, subject.joints, method, options.cutoff, gaps, away))
+             for begin, subject in subjects]
     try:
-        found = smoother(writer.motion)
+        found = smoothed_parts(writer.motion, parts, np.array(leans))
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
         writer.info["smoothing"] = {"method": "off"}
@@ -269,7 +272,8 @@ def _smooth(writer: RunWriter, subject: TrackedSubject, options: Options, listen
         warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
              "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
     writer.revise(found.motion)
-    writer.info["smoothing"] = {**smoother.summary, "bridged_frames": int(found.bridged.sum()), "turned_frames": int(found.mirrored.sum())}
+    counts = {"bridged_frames": found.bridged, "turned_frames": found.mirrored, "reversed_frames": found.reversed}
+    writer.info["smoothing"] = {**parts[0][1].summary, **{name: int(frames.sum()) for name, frames in counts.items()}}
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
@@ -305,13 +309,14 @@ def _resumed(writer: RunWriter, prepared: Prepared, rng: np.random.Generator) ->
 
 
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
-           cache: SilhouetteCache | None) -> None:
-    """For each frame set: make silhouettes and observation, update the tracker's state, write the result."""
+           cache: SilhouetteCache | None) -> Sequence[float]:
+    """For each frame set: make silhouettes and observation, update the tracker's state, write the result. Returns the `lean` of each."""
     subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
     _write_beside(writer.folder, prepared)
     watch, count, due = RigWatch(len(survey.rig.footage)), len(earlier), 0.0
+    leans = array("d")
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
@@ -326,6 +331,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 frames = (seen._replace(masks=watch(seen.time, seen.masks)) for seen in frames)
             for found, seen in zip(earlier, frames):
                 watch.tracked(subject.drawn(found))
+                leans.append(subject.lean(found, seen.masks))
                 if overlay is not None:
                     overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
             observed = stack.enter_context(closing(subject.observations(frames)))
@@ -337,6 +343,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 left_out = add_left_out(left_out, seen.time, subject.left_out(state))
                 with timer.time("doubt"):
                     found, before = motion_frame(subject, seen.time, state, observation, before)
+                leans.append(subject.lean(found, seen.masks))
                 with timer.time("write"):
                     writer.write(found)
                     if overlay is not None:
@@ -350,3 +357,4 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
         writer.metrics |= timings(timer, kind.stages, count - len(earlier), time.perf_counter() - began)
         writer.metrics |= left_out_metrics(left_out, [footage.view.camera for footage in survey.rig.footage])
         writer.metrics |= set_aside(watch.intervals, survey.rig.names)
+    return leans

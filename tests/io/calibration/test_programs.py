@@ -92,6 +92,12 @@ def test_freemocap_s_board_tells_the_unit(tmp_path, made, square, unit):
     assert any("FreeMoCap" in note for note in found.notes)
 
 
+def test_a_number_too_large_for_any_board_is_none(tmp_path, made):
+    path = tmp_path / "c.toml"
+    path.write_text(calibrations.toml(made, 1.0, f"[metadata]\ncharuco_square_size = {'9' * 400}\n"))
+    assert not any("FreeMoCap" in note for note in examine_calibration(path).notes)
+
+
 @pytest.mark.parametrize("board", ["[metadata.board]\nsquare_length_mm = 54.0\n", "[board]\nsquare_length_mm = 54\n",
                                    '[metadata]\n"board.square_length_mm" = 54.0\n'])
 def test_newer_files_of_freemocap_have_millimetres(tmp_path, made, board):
@@ -299,7 +305,7 @@ def test_a_huge_file_and_no_calibration_are_said(tmp_path):
             file.truncate(11_000_000)
         said(tmp_path / name, "found 11000000 bytes")
     (tmp_path / "notes.txt").write_text("milk, eggs")
-    said(tmp_path / "notes.txt", "found no calibration in it that is known, expected one of: Qualisys")
+    said(tmp_path / "notes.txt", "found no calibration in it that is known, expected one of: JSON")
     assert not is_calibration(tmp_path / "notes.txt")
     assert not is_calibration(tmp_path / "nowhere.toml")
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
+import tracemalloc
 import zipfile
 
+import acclaim
 import numpy as np
 import pytest
 
@@ -13,6 +17,7 @@ from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.files import npz
 from shadowpuppet.io.files.lock import LOCK, locked
 from shadowpuppet.io.files.npz import BrokenArchive, read_arrays
+from shadowpuppet.io.files.table import read_table
 from shadowpuppet.io.files.text import DEEPEST, read_toml
 from shadowpuppet.io.motion.bvh import read_bvh
 from shadowpuppet.io.motion.motion_files import read_motion
@@ -62,6 +67,24 @@ def test_joints_without_channels_are_no_way_to_fill_the_memory(tmp_path):
     (tmp_path / "a.bvh").write_text(f"{head}Frames: 9000\nFrame Time: 0.1\n" + "0\n" * 9000)
     with pytest.raises(FormatError, match="found 501 joints in 9000 frames of 1 channels"):
         read_bvh(tmp_path / "a.bvh")
+
+
+def test_one_long_word_is_not_the_length_of_all(tmp_path):
+    acclaim.write(tmp_path)
+    path = tmp_path / "01_01.amc"
+    path.write_text(re.sub(r"root \S+", f"root {'1' * 100_000}", path.read_text(), count=1))
+    tracemalloc.start()
+    with contextlib.suppress(FormatError):
+        read_motion(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 30 * path.stat().st_size
+
+
+def test_a_table_of_very_many_columns_is_read_in_a_moment(tmp_path):
+    (tmp_path / "a.csv").write_text(f"time,{','.join(f'a{n}' for n in range(300_000))},a7\n")  # minutes, if each is sought in all before
+    with pytest.raises(FormatError, match="column 'a7': found it twice"):
+        read_table(tmp_path / "a.csv")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in files")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import warnings
 
 import c3d
@@ -48,7 +49,7 @@ def test_an_independent_reader_finds_points_residuals_rate_units_and_angles(tmp_
     made.positions[4] = np.nan
     made.positions[6, 1] = np.nan
     spread = rng.uniform(0.002, 0.04, (20, 3))
-    spread[9] = np.nan
+    spread[9], spread[11, 0] = np.nan, 0.9
     angles = {"left_knee_flexion": ("deg", rng.uniform(-90, 90, 20)), "root_z": ("m", rng.uniform(0, 1, 20))}
     angles["root_z"][1][4] = np.nan
     write_c3d(tmp_path / "a.c3d", made, spread, angles)
@@ -63,7 +64,7 @@ def test_an_independent_reader_finds_points_residuals_rate_units_and_angles(tmp_
     np.testing.assert_array_equal(points[..., 3] == -1, ~known)
     np.testing.assert_allclose(points[known][:, :3], 1000 * made.positions[known], atol=1e-3)
     np.testing.assert_array_equal(points[~known][:, :3], 0)
-    wanted = np.round(1000 * np.nan_to_num(spread))
+    wanted = np.minimum(np.round(1000 * np.nan_to_num(spread)), 255)
     np.testing.assert_array_equal(points[known][:, 3], wanted[known])
     np.testing.assert_allclose(analog, np.stack([values for _, values in angles.values()], 1), rtol=1e-6)
 
@@ -115,6 +116,10 @@ def test_long_motions_have_more_frames_than_16_bits_tell(tmp_path, rng):
     found = read_c3d(tmp_path / "long.c3d")
     assert len(found.times) == 70_000
     np.testing.assert_allclose(found.positions[-1], made.positions[-1], atol=1e-6)
+    assert struct.unpack_from("<2H", (tmp_path / "long.c3d").read_bytes(), 6) == (1, 0xFFFF)  # as many as the header can tell
+    with (tmp_path / "long.c3d").open("rb") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert c3d.Reader(file).get("POINT:FRAMES").uint16_value == 0xFFFF
 
 
 def test_more_names_than_one_list_can_hold(tmp_path, rng):

@@ -12,6 +12,7 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 
 distributed = pytest.importorskip("distributed")
+dask = pytest.importorskip("dask")
 pytestmark = pytest.mark.filterwarnings("default")  # theirs are not ours
 QUICK = make_grid({"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}})
 
@@ -93,7 +94,8 @@ def test_a_scheduler_that_ends_is_said(recording, tmp_path, monkeypatch):
             found.scheduler.loop.add_callback(found.scheduler.close)
 
     monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.PATIENCE", 1)
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as found, \
+    with dask.config.set({"distributed.comm.timeouts.connect": "2s"}), \
+            distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as found, \
             pytest.raises(ShadowPuppetError, match=r"scheduler: the connection to .* was lost"):
         run_batch([recording], tmp_path / "out", QUICK, range(50), scheduler=found.scheduler_address, listener=Ends())
     assert (tmp_path / "out" / "summary.csv").exists()

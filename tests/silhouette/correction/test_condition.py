@@ -60,6 +60,11 @@ def test_what_is_too_much_is_named(spoil, noise, said):
     assert said in warnings[0]
 
 
+@pytest.mark.parametrize(("first", "since"), [(0, 0.0), (1, 1 / 25), (12, 3.0)])
+def test_a_camera_is_moved_since_the_frame_after_the_last_unmoved_one(first, since):
+    assert condition(lambda n, empty: shifted(empty, 6, 3) if n >= first else empty).moved_since == pytest.approx(since)
+
+
 def test_compression_stays_from_frame_to_frame():
     still = np.random.default_rng(1).normal(0, 14, (120, 160, 3))
     found = condition(lambda n, empty: empty + still, noise=0)

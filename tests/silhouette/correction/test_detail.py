@@ -35,6 +35,7 @@ def noisy(image: np.ndarray, seed: int, noise: float = 1.0) -> np.ndarray:
     return np.clip(np.rint(image + np.random.default_rng(seed).normal(0, noise, image.shape)), 0, 255).astype(np.uint8)
 
 
+@pytest.mark.kernels
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 99), channels=st.sampled_from([1, 3]), near=st.floats(1, 30), quiet=st.floats(0, 9))
 def test_the_kernel_moves_pixels_along_the_line_as_plain_numpy_does(seed, channels, near, quiet):

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from shadowpuppet.silhouette.correction import _kernels as kernels
 from shadowpuppet.silhouette.correction.registration import Registration
 
+pytestmark = pytest.mark.kernels
+
 
 def interpolated(image: np.ndarray, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The image (H, W, C) at moved places, linear between pixels, and the distance (H, W) of each place to the border, negative outside."""
@@ -30,12 +32,25 @@ def test_a_picture_is_moved_back_as_by_plain_interpolation(turn, shift, bend, ch
     rng = np.random.default_rng(seed)
     image = np.repeat(np.repeat(rng.integers(0, 256, (6, 9, channels)), 8, 0), 8, 1).astype(np.uint8)
     movement = np.array([[np.cos(turn), -np.sin(turn), shift[0] / 36], [np.sin(turn), np.cos(turn), shift[1] / 36], [bend, bend, 1]])
-    back, gap = Registration(image).undone(image, movement)
+    with np.errstate(over="ignore"):  # as in compiled kernels
+        back, gap = Registration(image).undone(image, movement)
     to_pixels = np.array([[36, 0, 35.5], [0, 36, 23.5], [0, 0, 1]])
     plain, inside = interpolated(image.astype(float), to_pixels @ movement @ np.linalg.inv(to_pixels))
     assert np.abs(back - plain)[inside > 0.1].max(initial=0) <= 0.06 * 510 + 1  # places are right to 0.03 pixels in each direction
     assert (back[inside < -0.1] == 0).all()
     assert (inside[gap.unseen == 0] > -0.6).all()
+
+
+@pytest.mark.parametrize("slope", [1e-17, 1e-19, 1e-25, 1e-300])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_movement_next_to_none_leaves_the_picture(slope, sign):
+    image = np.random.default_rng(0).integers(0, 256, (9, 50), dtype=np.uint8)
+    out, matrix = np.empty_like(image), np.eye(3)
+    matrix[1, 0] = sign * slope
+    with np.errstate(over="ignore"):
+        kernels.moved_back(image, matrix, 1, np.arange(32, dtype=np.float32), out)
+    inside = slice(int(sign < 0), -1)  # a place above the first row is outside
+    np.testing.assert_array_equal(out[inside, :-1], image[inside, :-1])
 
 
 @pytest.mark.parametrize("bands", [1, 2, 24])

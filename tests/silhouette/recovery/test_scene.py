@@ -146,3 +146,19 @@ def test_a_striped_skirt_belongs_to_the_person_above(rng):
     always = np.all(masks, axis=0)
     always[:88] = False
     assert (recover_scene(frames).covered & always).sum() > 0.9 * always.sum()
+
+
+def test_legs_that_keep_still_belong_to_the_person_above(rng):
+    wall = scene(rng)
+    frames, masks = film(rng, wall)
+    legs = np.zeros(SIZE, bool)
+    for x in (62, 82):
+        legs[80:108, x : x + 15] = True
+    still = wall.copy()
+    still[legs] = LEGS
+    for frame, mask in zip(frames, masks):
+        frame[80:], mask[80:] = shot(rng, still)[80:], legs[80:]
+    found = recover_scene(frames)
+    always = np.all(masks, axis=0)
+    assert (found.covered & legs).sum() > 0.9 * legs.sum()
+    assert (found.covered & ~np.any(masks, axis=0)).sum() < 0.05 * always.sum()

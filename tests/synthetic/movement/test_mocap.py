@@ -50,6 +50,14 @@ def test_limbs_point_where_the_measured_ones_point_on_the_bodys_own_lengths(capt
         np.testing.assert_allclose(np.linalg.norm(ours, axis=1), length)
 
 
+def test_joints_lie_at_their_segments(capture):
+    figure = retarget(Mannequin(), capture.joints(), capture.at_rest.joints())
+    for side in ("left", "right"):
+        ankle, foot = at(figure)[f"{side}_ankle"], figure.origin[:, SEGMENTS.index(f"{side}_foot")]
+        np.testing.assert_allclose(ankle, foot, atol=1e-9)
+    assert min(at(figure)[f"{side}_ankle"][:, 2].min() for side in ("left", "right")) > -0.1
+
+
 def test_every_segment_is_a_rotation_and_at_rest_none_turns(capture):
     table, rest = capture.joints(), capture.at_rest.joints()
     figure = retarget(Mannequin(), table, rest)

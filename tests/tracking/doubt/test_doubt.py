@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import people
 import pytest
@@ -14,7 +16,7 @@ from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.steps import STILL_ALLOWED, Trail, stillness, surprise
-from shadowpuppet.tracking.doubt.variance import VarianceModel, turned, variance_model
+from shadowpuppet.tracking.doubt.variance import ModeWeights, VarianceModel, turned, variance_model
 
 JOINTS = ("neck", "left_shoulder", "left_elbow", "left_hand", "right_knee")
 LIMITS = {"trunk": 0.3, "arm": 0.2, "leg": 0.3}
@@ -73,6 +75,38 @@ def test_the_roll_of_a_straight_arm_is_unknown_within_its_limits_and_that_of_a_b
     straight, bent = (deviations(skeleton.pose(left_shoulder_abduction=1.2, left_elbow_flexion=angle)) for angle in (0.0, 1.4))
     assert np.isclose(straight["left_elbow_roll"], (high - low) / np.sqrt(12), rtol=0.05)
     assert bent["left_elbow_roll"] < 0.15
+
+
+def test_calibrated_factors_widen_deviations_up_to_those_of_the_limits():
+    picture, pose = people.picture(), people.picture().body.skeleton.pose(left_shoulder_abduction=1.2)
+    skeleton, sd = picture.body.skeleton, np.full((len(picture.body.landmark_names), 3), 0.02)
+    plain, wide, wider = (pose_deviations(skeleton, picture.points, pose, sd, factor) for factor in (1.0, 1.5, 100.0))
+    low, high = skeleton.limits
+    known = np.isfinite(high - low)
+    np.testing.assert_allclose(wide, np.minimum(1.5 * plain, np.where(known, (high - low) / np.sqrt(12), 1.0)))
+    np.testing.assert_allclose(wider[known], ((high - low) / np.sqrt(12))[known])
+
+
+def test_left_and_right_share_their_factor_and_others_have_none():
+    model = replace(variance_model("monocular"), dofs={"torso_bow": 2.0, "elbow_roll": 3.0})
+    names = ["torso_bow", "left_elbow_roll", "right_elbow_roll", "left_knee_flexion"]
+    np.testing.assert_array_equal(model.dof_factors(names), [2, 3, 3, 1])
+
+
+@given(st.lists(st.floats(-1e4, 1e4), max_size=3), st.floats(1, 2000), st.floats(0.1, 10), st.floats(-1, 2))
+def test_weights_of_other_places_leave_some_to_the_estimate_and_fall_with_the_cost(more, temperature, odds, growth):
+    weights = ModeWeights(temperature, odds, growth)
+    shares = weights.shares(np.array(more))
+    assert (shares >= 0).all()
+    assert shares.sum() < 1 or np.isclose(shares.sum(), 1)
+    assert (np.diff(shares[np.argsort(more)]) <= 1e-12).all()
+
+
+def test_the_estimate_of_more_places_is_the_likelier():
+    weights = ModeWeights(400, 1, 1)
+    assert weights.shares(np.zeros(1)).sum() == 0.5
+    assert weights.shares(np.zeros(2)).sum() == 0.5
+    assert ModeWeights(400, 1, 0).shares(np.zeros(2)).sum() == pytest.approx(2 / 3)
 
 
 def test_the_deviation_of_an_angle_follows_from_that_of_what_it_moves():

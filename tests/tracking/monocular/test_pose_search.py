@@ -8,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people import BODIES, camera, picture
 
+from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.segments import coarse_arms, parts_of
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.tracking.monocular.pose_search import search_pose
+from shadowpuppet.camera.rasterize import Picture, place
+from shadowpuppet.tracking.monocular.pose_search import search_pose, search_turned
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 LIBRARY = coarse_arms()
@@ -94,3 +96,44 @@ def test_nobody_is_found_where_nobody_is_but_a_pose_comes_back():
         found = search_pose(VIEW, mask)
         assert np.isfinite(found.pose).all()
         assert overlap(VIEW, found.pose, mask) < 0.5
+
+
+def whole(distance: float = 3.4) -> Picture:
+    view = camera((160, 120))
+    return Picture(make_body("anatomical", average_sizes("anatomical", 1.75)), view, place(view, distance, -0.1))
+
+
+def test_who_sits_lower_than_measured_is_found_lower():
+    view = whole()
+    skeleton = view.body.skeleton
+    pose = skeleton.pose(root_z=-0.4, left_hip_y=-1.4, right_hip_y=-1.4, left_knee_flexion=1.4, right_knee_flexion=1.4,
+                         left_shoulder_x=0.9, right_shoulder_x=-0.9)
+    mask = view.mask(pose)
+    upright, found = search_pose(view, mask), search_turned(view, mask)
+    assert upright.overlap < 0.6
+    assert found.overlap > upright.overlap + 0.1
+    assert found.pose[skeleton.dof_indices(["root_z"])[0]] == pytest.approx(-0.4, abs=0.12)
+
+
+def test_who_fits_is_not_searched_for_elsewhere(monkeypatch):
+    mask = VIEW.mask(np.array([0.1, 0, 0, 0, *LIBRARY[40], *LIBRARY[60]]))
+    monkeypatch.setattr("shadowpuppet.tracking.monocular.pose_search._heights", None)
+    np.testing.assert_array_equal(search_turned(VIEW, mask).pose, search_pose(VIEW, mask).pose)
+
+
+@pytest.mark.parametrize("view", [VIEW, whole()], ids=["upper", "whole"])
+def test_the_turned_search_never_does_worse(view, rng):
+    for _ in range(2):
+        low, high = np.clip(view.body.skeleton.limits, -1.2, 1.2)
+        pose = rng.uniform(low, high)
+        pose[: 3 if view is not VIEW else 1] = 0.0
+        mask = view.mask(pose)
+        assert search_turned(view, mask).overlap >= search_pose(view, mask).overlap
+    nothing = np.zeros((120, 160), bool)
+    np.testing.assert_array_equal(search_turned(view, nothing).pose, search_pose(view, nothing).pose)
+
+
+def test_the_overlap_is_that_of_the_pose():
+    mask = VIEW.mask(np.array([0.1, 0.3, 0, 0, *LIBRARY[7], *LIBRARY[300]]))
+    found = search_pose(VIEW, mask)
+    assert found.overlap == pytest.approx(overlap(VIEW, found.pose, mask), abs=0.02)

@@ -73,6 +73,21 @@ def test_whose_feet_are_cut_off_stays_where_the_upper_body_was(name):
 
 
 @pytest.mark.parametrize("name", WHOLE)
+def test_who_kneels_is_not_taken_for_far_away(name):
+    """The toes of whoever kneels are nearer to the crown than standing: a standing person would be farther away."""
+    view = picture(name)
+    skeleton = view.body.skeleton
+    pose = skeleton.pose(left_knee_flexion=1.6, right_knee_flexion=1.6)
+    mask = view.mask(pose)
+    assert not mask[-2:].any()
+    seated, standing = (whole_from_estimate(CAMERA, [mask], upper_of(view), name, standing=known) for known in (False, True))
+    assert seated.distance == FAR
+    assert standing.distance > 1.1 * FAR
+    upright = whole_from_estimate(CAMERA, [mask, view.mask(skeleton.pose())], upper_of(view, 1.05 * FAR), name, standing=False)
+    assert upright.distance == pytest.approx(FAR, rel=0.08)  # by the moment in which they stand
+
+
+@pytest.mark.parametrize("name", WHOLE)
 def test_widths_follow_the_clothes_and_given_sizes_are_kept(name):
     wide = {size: 1.4 * getattr(average_sizes(name, HEIGHT), size) for size in ("thigh_width", "calf_width", "knee_width", "shank_width")
             if size in average_sizes(name, HEIGHT).names()}  # fmt: skip

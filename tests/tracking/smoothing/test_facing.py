@@ -56,7 +56,7 @@ def test_half_a_turn_is_followed_and_all_that_comes_after():
     away = truth[:, TWIST] > np.pi / 2
     poses[away] = mirror(NAMES, truth[away])  # the side's arms that the silhouette shows
     poses[:, TWIST] = (poses[:, TWIST] + np.pi) % (2 * np.pi) - np.pi
-    found, mirrored = turned_on(motion_of(NAME, poses))
+    found, mirrored, _ = turned_on(motion_of(NAME, poses))
     assert np.abs(np.diff(mirrored.astype(int))).sum() == 1
     right = motion_of(NAME, truth).joints
     joints = body_of(NAME).points(found.poses, root_of(body_of(NAME)))
@@ -79,7 +79,7 @@ def test_a_profile_that_lasts_is_no_turn():
 
 def test_who_looks_away_first_is_mirrored_throughout(rng):
     poses = poses_of(0, 10, 0)
-    found, mirrored = turned_on(motion_of(NAME, poses), away=True)
+    found, mirrored, _ = turned_on(motion_of(NAME, poses), away=True)
     assert mirrored.all()
     assert np.abs(np.abs(found.poses[:, TWIST]) - np.pi).max() < 0.2
     smoothed = smoother(NAME, away=True)(motion_of(NAME, poses))
@@ -91,7 +91,7 @@ def test_doubt_goes_with_the_limb():
     motion = motion_of(NAME, poses_of(0, 0))
     limbs = motion.limb_status.copy()
     limbs[:, motion.limbs.index("left_arm")] = "uncertain"
-    found, _ = turned_on(replace(motion, limb_status=limbs), away=True)
+    found, *_ = turned_on(replace(motion, limb_status=limbs), away=True)
     assert (found.limb_status[:, found.limbs.index("right_arm")] == "uncertain").all()
     assert (found.limb_status[:, found.limbs.index("left_arm")] == "tracked").all()
 
@@ -101,3 +101,41 @@ def test_whole_bodies_and_empty_motions_are_left(rng):
     motion = motion_of("anatomical", np.zeros((5, len(body.skeleton.dofs))))
     assert turned_on(motion, away=True)[0] is motion
     assert turns(motion_of(NAME, np.zeros((0, len(NAMES))))) == []
+
+
+def half_turn() -> tuple[np.ndarray, np.ndarray]:
+    """Half a turn by the profile that faces the image's right, and what a tracker makes of it that takes it for one to the left."""
+    truth = passing()
+    poses = truth.copy()
+    away = truth[:, TWIST] > np.pi / 2
+    poses[away] = mirror(NAMES, truth[away])
+    poses[:, TWIST] = -np.abs(np.arcsin(np.sin(truth[:, TWIST])))
+    return truth, poses
+
+
+@pytest.mark.parametrize(("lean", "turned"), [(0.1, True), (-0.1, False), (0.02, False), (np.nan, False)])
+def test_a_profile_is_turned_to_the_side_of_the_head(lean, turned):
+    truth, poses = half_turn()
+    motion, leans = motion_of(NAME, poses), np.where(np.abs(poses[:, TWIST]) > np.radians(50), lean, np.nan)
+    found, mirrored, reversed_ = turned_on(motion, leans=leans)
+    assert reversed_.any() == turned
+    assert mirrored.any()
+    off = (found.poses[:, TWIST] - truth[:, TWIST] + np.pi) % (2 * np.pi) - np.pi
+    assert (np.abs(off) > np.radians(25)).any() == (not turned)
+    assert np.abs(np.diff(found.poses[:, TWIST])).max() < 0.6
+
+
+def test_few_leans_are_not_enough():
+    _, poses = half_turn()
+    leans = np.full(len(poses), np.nan)
+    leans[np.abs(poses[:, TWIST]).argmax()] = 0.1
+    assert not turned_on(motion_of(NAME, poses), leans=leans).reversed.any()
+
+
+def test_a_turn_is_smoothed_the_way_that_the_head_says():
+    truth, poses = half_turn()
+    right = motion_of(NAME, truth).joints
+    both = [smoother(NAME)(motion_of(NAME, poses), leans) for leans in (None, np.full(len(poses), 0.1))]
+    without, found = (np.abs(each.motion.joints - right).mean() for each in both)
+    assert found < 0.3 * without
+    assert both[1].reversed.any()

@@ -49,7 +49,7 @@ def test_short_gaps_are_predicted_and_long_ones_stay(rng):
     truth, poses = noisy("anatomical", rng, 90, 0.002)
     lost = [*range(20, 30), *range(50, 80)]
     raw, make = motion_of("anatomical", poses, lost), smoother("anatomical", gaps=0.5)
-    found, inside, _ = make(raw)
+    found, inside, *_ = make(raw)
     assert np.flatnonzero(inside).tolist() == lost[:10]
     assert (found.status[inside] == "predicted").all()
     assert (found.limb_status[inside] == "predicted").all()
@@ -65,7 +65,7 @@ def test_short_gaps_are_predicted_and_long_ones_stay(rng):
 def test_off_with_gaps_leaves_known_frames_as_they_are(rng):
     _, poses = noisy("rounded", rng, 40)
     raw = motion_of("rounded", poses, range(10, 14))
-    found, inside, _ = smoother("rounded", method="off")(raw)
+    found, inside, *_ = smoother("rounded", method="off")(raw)
     assert inside.sum() == 4
     np.testing.assert_array_equal(found.joints[~inside], raw.joints[~inside])
     assert np.isfinite(found.joints).all()

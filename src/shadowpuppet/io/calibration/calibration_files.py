@@ -14,7 +14,9 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetError, check_regular, choices, reason
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration.bouguet import read_bouguet
+from shadowpuppet.io.calibration.colmap import is_colmap, read_colmap
 from shadowpuppet.io.calibration.draft import Draft, Drafts
+from shadowpuppet.io.calibration.json_cameras import mentions_cameras, read_json
 from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts, files_of, pair_of, read_opencv
 from shadowpuppet.io.calibration.pose2sim import check_name, read_tables, tables_text
 from shadowpuppet.io.calibration.qualisys import read_qualisys
@@ -79,7 +81,9 @@ OPENCV = Format("OpenCV (YAML, XML)",
 HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
-FORMATS = (QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
+COLMAP = Format("COLMAP (cameras.txt, images.txt)", lambda path, text: is_colmap(path), read_colmap)
+JSON = Format("JSON", lambda path, text: _ends(path, ".json"), read_json)
+FORMATS = (JSON, COLMAP, QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
 """All formats, in the order in which they are tried."""
 
 
@@ -87,7 +91,8 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
                      sizes: Callable[[str], tuple[int, int] | None] | None = None) -> tuple[Camera, ...]:
     """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
-    Formats, recognised by content: TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its own and its export), OpenCV's YAML and XML,
+    Formats, recognised by content: JSON with K, R and t a camera, COLMAP's text, TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its
+    own and its export), OpenCV's YAML and XML,
     EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
     something is missing or impossible.
 
@@ -130,6 +135,8 @@ def format_of(path: Path) -> Format:
     if path.is_dir():
         if any(path.glob("*.cal")):
             return HUMANEVA
+        if is_colmap(path):
+            return COLMAP
         if not files_of(path):
             raise CalibrationError(f"{path}: is a directory, and no calibration is in it that takes a whole one, expected a file, a folder "
                                    "with EasyMocap's intri.yml and extri.yml, or one with a .cal or OpenCV file a camera")
@@ -156,6 +163,8 @@ def is_calibration(path: Path) -> bool:
         kind = format_of(path)
     except CalibrationError:
         return path.suffix.lower() in (".pickle", ".pkl")
+    if kind is JSON:
+        return mentions_cameras(path)
     if path.is_file() and kind is TABLES:
         with path.open("rb") as file:
             return b"matrix" in file.read(HEAD_BYTES)
@@ -278,7 +287,7 @@ def find_calibration(folder: Path) -> Path | None:
     return None
 
 
-ENDINGS = (".toml", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".pickle", ".pkl")
+ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".pickle", ".pkl")
 """Endings of files that may be calibrations."""
 NO_CALIBRATIONS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml")
 """Names of files with such endings that are no calibrations."""
@@ -286,5 +295,7 @@ NO_CALIBRATIONS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Co
 
 def _in_pieces(path: Path, files: list[Path]) -> bool:
     """Whether a file is only a part of its folder's calibration."""
+    if is_colmap(path):
+        return True
     alike = [other for other in files if other.suffix == path.suffix]
     return pair_of(path) is not None or (len(alike) > 1 and len(alike) == len(files) and path.suffix.lower() in (".cal", *SUFFIXES))

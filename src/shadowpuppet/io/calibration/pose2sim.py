@@ -80,7 +80,7 @@ def _freemocap(data: dict[str, Any]) -> tuple[str | None, tuple[str, ...]]:
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300  # greater integers are no floats
 
 
 def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft:

@@ -121,9 +121,10 @@ def shorten(words: Iterable[str], limit: int = 120) -> str:
 
 
 def _check_columns(path: Path, columns: tuple[str, ...]) -> None:
-    named = [name for name in columns if name]
-    twice = [name for i, name in enumerate(named) if name in named[:i]]
-    if twice:
-        raise FormatError(f"{path}: column {twice[0]!r}: found it twice, expected every column once")
+    seen = set[str]()
+    for name in columns:
+        if name and name in seen:
+            raise FormatError(f"{path}: column {name!r}: found it twice, expected every column once")
+        seen.add(name)
     if "time" not in columns:
         raise FormatError(f"{path}: no column 'time', expected a header time,<name>,...; found {shorten(columns)!r}")

@@ -176,7 +176,7 @@ def _parsed(lines: list[str], names: list[str], counts: list[int]) -> Array | No
     width = 1 + len(names) + sum(counts)
     if len(words) % width:
         return None
-    table = np.array(words).reshape(-1, width)
+    table = np.array(words, object).reshape(-1, width)  # as texts of one width, a single long word would be the size of all
     at = 1 + np.cumsum([0, *(count + 1 for count in counts[:-1])])
     if not (table[:, at] == names).all():
         return None

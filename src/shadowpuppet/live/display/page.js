@@ -68,6 +68,7 @@ function showLatencies(view) {
   latencies.forEach(([time, late], n) => n && time - latencies[n - 1][0] < 1 ? pen.lineTo(x(time), y(late)) : pen.moveTo(x(time), y(late)));
   pen.stroke();
   const [last] = latencies.slice(-1);
+  byId("kind").textContent = view.lag ? `capture to smoothed pose, ${view.lag} ms of it lag` : "capture to pose, 20 s";
   byId("frames").textContent = last && view.interval ? (last[1] / view.interval).toFixed(2) + " frames (dashed: one)" : "";
 }
 

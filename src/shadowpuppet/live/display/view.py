@@ -47,7 +47,9 @@ class View:
     """Overlap of body and silhouette, 0..1."""
     angles: tuple[Angle, ...] = ()
     latency: float = np.nan
-    """Seconds from capture to pose."""
+    """Seconds from capture to pose; with a lag, to the smoothed one."""
+    lag: float = 0.0
+    """Seconds of it that the frame waits for the next ones, which smooth it."""
     rate: float = np.nan
     """Pictures processed per second."""
     interval: float = np.nan
@@ -73,7 +75,7 @@ class View:
     def figures(self) -> dict[str, Any]:
         """Everything but the arrays, for JSON: milliseconds and degrees, None if unknown."""
         return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": _number(self.countdown, 1),
-                "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1),
+                "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1), "lag": _number(1000 * self.lag, 0),
                 "interval": _number(1000 * self.interval, 1), "rate": _number(self.rate, 1), "dropped": self.dropped,
                 "angles": [[a.name, _number(a.value, 1), a.low, a.high] for a in self.angles]}
 

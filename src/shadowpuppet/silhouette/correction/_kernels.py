@@ -90,14 +90,15 @@ def moved_back(image, matrix, channels, ramp, out):
             dv = ((matrix[1, 0] * (x + count) + matrix[1, 1] * y + matrix[1, 2]) / w - v) / count
             i, j = int(np.floor(v)), int(np.floor(u))
             p, q = u - j, v - i
+            # at most `longest`: where a place hardly moves the quotient is more than an integer holds
             if du > 1:
-                count = min(count, 1 + int((1 - p) / (du - 1)))
+                count = min(count, 1 + int(min((1 - p) / (du - 1), longest)))
             elif du < 1:
-                count = min(count, 1 + int(p / (1 - du)))
+                count = min(count, 1 + int(min(p / (1 - du), longest)))
             if dv > 0:
-                count = min(count, 1 + int((1 - q) / dv))
+                count = min(count, 1 + int(min((1 - q) / dv, longest)))
             elif dv < 0:
-                count = min(count, 1 + int(q / -dv))
+                count = min(count, 1 + int(min(q / -dv, longest)))
             if not (0 <= i < height - 1):
                 out[y, x * channels : (x + count) * channels] = 0
                 x += count

@@ -15,6 +15,7 @@ from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
 from shadowpuppet.silhouette.recovery.filling import filled
 from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels
+from shadowpuppet.silhouette.recovery.legs import still_legs
 from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, temporal_modes
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
@@ -69,7 +70,8 @@ def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
     2. `movement.find_movement`: pixels that something moved over, and those enclosed by them. All others show the scene.
     3. `modes.temporal_modes`: the colours that each of these pixels shows, with their shares.
     4. `labelling.label_pixels`: which mode is the scene's, or whether the person covers the pixel always. The first time the colours of
-       the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene.
+       the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene. If `legs.still_legs` finds
+       legs that kept still below a trunk, they are added to the pixels of step 2, and all are labelled again.
     5. The scene's picture at full size: the mean of the frames that show the mode. Covered pixels are filled from around.
 
     Raises `SilhouetteError` for fewer than 3 frames, and frames that do not fit together.
@@ -139,6 +141,37 @@ class _Field(NamedTuple):
 
 def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     """The scene's Y, Cr, Cb (h, w, 3), and the pixels (h, w) that are always covered, at the reduced size."""
+    radius = radius_of(movement.noise)
+    found = _rounds(planes, movement)
+    legs = still_legs(found.field.still, movement, found.covered)
+    if legs is not None:
+        movement = movement._replace(region=movement.region | legs, enclosed=movement.enclosed | legs)
+        found = _rounds(planes, movement)
+    field, region = found.field, movement.region
+    passing = (np.abs(planes - _scene(field, found.labels)) > radius).any(axis=3) & region
+    covered = _persons_parts(found.covered, passing, region, found.ratio[:, 0])
+    cost = _costs(field, found.ratio, found.below)
+    cost[..., COUNT] = np.where(covered, 0, NEVER)
+    cost[covered, :COUNT] = NEVER
+    return _scene(field, label_pixels(*_on_picture(field), cost, region)[region]), covered
+
+
+class _Found(NamedTuple):
+    """Labels of the region's pixels, and what they were chosen from."""
+
+    field: _Field
+    labels: NDArray[np.intp]
+    """Of shape (M,)."""
+    ratio: NDArray[np.float64]
+    """As `_colour_ratio` finds it (M, K)."""
+    below: NDArray[np.bool_]
+    """As `_below` finds it (M,)."""
+    covered: Mask
+    """Pixels (H, W) that are labelled as always covered."""
+
+
+def _rounds(planes: Floats, movement: Movement) -> _Found:
+    """The labels after `ROUNDS` rounds on frames' planes (N, H, W, 3)."""
     modes = temporal_modes(planes[:, movement.region], radius_of(movement.noise))
     field = _Field(modes, movement, np.median(planes, axis=0).astype(np.float32), len(planes))
     colour, share = _on_picture(field)
@@ -150,12 +183,7 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     assert labels is not None
     covered = np.zeros(movement.region.shape, bool)
     covered[movement.region] = labels == COUNT
-    passing = (np.abs(planes - _scene(field, labels)) > radius_of(movement.noise)).any(axis=3) & movement.region
-    covered = _persons_parts(covered, passing, movement.region, ratio[:, 0])
-    cost = _costs(field, ratio, below)
-    cost[..., COUNT] = np.where(covered, 0, NEVER)
-    cost[covered, :COUNT] = NEVER
-    return _scene(field, label_pixels(colour, share, cost, movement.region)[movement.region]), covered
+    return _Found(field, labels, ratio, below, covered)
 
 
 def _scene(field: _Field, labels: NDArray[np.intp]) -> Floats:

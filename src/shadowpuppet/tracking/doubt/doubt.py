@@ -59,21 +59,24 @@ def state_doubt(kind: str, evidence: Evidence, names: Sequence[str], skeleton: S
     model = variance_model(kind)
     sd = model.sd(names, evidence.components)
     statuses = limb_statuses(model.limits, names, sd, evidence, status)
-    return Doubt(turned(sd, R), pose_deviations(skeleton, points, pose, sd), statuses, evidence.modes)
+    pose_sd = pose_deviations(skeleton, points, pose, sd, model.dof_factors(skeleton.dof_names))
+    return Doubt(turned(sd, R), pose_sd, statuses, evidence.modes)
 
 
-def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array) -> Array:
+def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array, factors: Array | float = 1.0) -> Array:
     """Standard deviations (D,) of a pose's degrees of freedom, from those of its landmarks, `sd` (L, 3), metres.
 
     To first order the landmarks tell J' diag(1/sd^2) J, to which is added what the joints' limits tell (uniform between them): a degree
-    of freedom that moves no landmark, such as the roll of a straight arm, may be anywhere between its limits.
+    of freedom that moves no landmark, such as the roll of a straight arm, may be anywhere between its limits. Landmarks err together,
+    though, for which the deviations are multiplied by calibrated `factors` (D,); they stay below those of the limits.
     """
     number = len(pose)
     moved = points(np.concatenate([pose[None], pose + STEP * np.eye(number)]))
     jacobian = ((moved[1:] - moved[0]) / STEP / sd).reshape(number, -1)
     low, high = skeleton.limits
     width = np.where(np.isfinite(high - low), (high - low) / np.sqrt(12), UNBOUNDED)
-    return np.sqrt(np.diag(np.linalg.inv(jacobian @ jacobian.T + np.diag(1 / np.maximum(width, STEP) ** 2))))
+    width = np.maximum(width, STEP)
+    return np.minimum(factors * np.sqrt(np.diag(np.linalg.inv(jacobian @ jacobian.T + np.diag(1 / width**2)))), width)
 
 
 def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, evidence: Evidence, status: str) -> tuple[str, ...]:

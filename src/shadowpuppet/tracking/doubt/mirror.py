@@ -16,6 +16,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.motion import Mode
+from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -27,9 +28,6 @@ DERIVATIVE = 1e-3
 """Step of its derivatives, rad."""
 ALLOWED = 60.0
 """A mirror image counts half in the joints' variances if it costs this much more (pixels at 320 x 240), times ln 3."""
-TEMPERATURE, ODDS = 400.0, 2.0
-"""Of modes: cost (pixels at 320 x 240) for which one is less probable by the factor e, as neighbouring pixels err together; and how much
-more probable the estimate is than one that costs the same. Both by the logarithmic score of the weights on made recordings."""
 APART = 0.1
 """Distance (m) of elbow or wrist from which on two poses of an arm are different modes."""
 MOVED = 0.03
@@ -127,6 +125,6 @@ def _weights(ends: Array, images: Array, more: Array) -> dict[int, float]:
         if all(np.linalg.norm(images[n] - place, axis=1).max() >= APART for place in places):
             places.append(images[n])
             kept.append(n)
-    likely = np.exp(-np.clip(more[kept] / TEMPERATURE, -10, 30))
-    shares = likely / (ODDS + likely.sum())
-    return {n: share for n, share in zip(kept, shares.tolist()) if share >= LEAST}
+    weights = variance_model("monocular").modes
+    assert weights is not None
+    return {n: share for n, share in zip(kept, weights.shares(more[kept]).tolist()) if share >= LEAST}

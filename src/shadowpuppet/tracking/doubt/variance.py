@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
+from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
 
@@ -37,12 +39,42 @@ class VarianceModel:
     """Of shape (G, 3, F), no unit."""
     limits: Mapping[str, float]
     """Of each kind of limb, `trunk`, `arm` or `leg`: deviation of a joint, all axes together (m), above which it is doubtful."""
+    dofs: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Factors of the deviations of degrees of freedom, by name without side; 1 of those that are not named."""
+    modes: ModeWeights | None = None
+    """How probable an arm's other places are; None with several cameras."""
 
     def sd(self, joints: Sequence[str], components: Components) -> Array:
         """Standard deviations (L, 3), metres, of joints along the components' axes."""
         rows = [self.groups.index(group_of(joint)) for joint in joints]
         lengths = np.stack([components[name] for name in self.names], axis=2)
         return np.sqrt(((self.factors[rows] * lengths) ** 2).sum(2))
+
+    def dof_factors(self, names: Sequence[str]) -> Array:
+        """Factors (D,) of the deviations of degrees of freedom."""
+        return np.array([self.dofs.get(without_side(name), 1.0) for name in names])
+
+
+class ModeWeights(NamedTuple):
+    """How probable the other places of an arm are."""
+
+    temperature: float
+    """Cost (pixels at 320 x 240) for which a place is less probable by the factor e: neighbouring pixels err together."""
+    odds: float
+    """How much more probable the estimate is than the only other place if that costs the same."""
+    growth: float
+    """Exponent of the number of other places in the odds: the estimate was chosen from more."""
+
+    def shares(self, more: Array) -> Array:
+        """Probabilities (K,) of K other places that cost `more` (K,) pixels than the estimate; the rest is the estimate's."""
+        likely = np.exp(-np.clip(more / self.temperature, -10, 30))
+        return likely / (self.odds * len(more) ** self.growth + likely.sum()) if len(more) else likely
+
+
+def without_side(name: str) -> str:
+    """A degree of freedom's name without left or right."""
+    side, _, rest = name.partition("_")
+    return rest if side in SIDES else name
 
 
 @cache
@@ -51,7 +83,8 @@ def variance_model(kind: str) -> VarianceModel:
     table = tomllib.loads(resources.files("shadowpuppet.tracking.doubt").joinpath(TABLE).read_text("utf-8"))[kind]
     own = [table[group if group in table else LIKE[group]] for group in GROUPS]
     factors = np.array([[group[axis] for axis in "xyz"] for group in own], float)
-    return VarianceModel(tuple(table["components"]), tuple(GROUPS), factors, {"leg": table["limits"]["arm"], **table["limits"]})
+    return VarianceModel(tuple(table["components"]), tuple(GROUPS), factors, {"leg": table["limits"]["arm"], **table["limits"]},
+                         table.get("dofs", {}), ModeWeights(**table["modes"]) if "modes" in table else None)
 
 
 def turned(sd: Array, R: Array) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
@@ -16,7 +15,8 @@ from shadowpuppet.camera.mask import NEARLY_ALL, Mask, check_mask, may_be_person
 from shadowpuppet.camera.rasterize import place
 from shadowpuppet.errors import TrackingError, choices, shown
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.monocular.pose_search import align_sideways, search_pose
+from shadowpuppet.tracking.monocular.place_search import find_place
+from shadowpuppet.tracking.monocular.pose_search import align_sideways, search_turned
 from shadowpuppet.tracking.monocular.settings import InitializationSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate, SizeSearch
 from shadowpuppet.tracking.monocular.whole_body import whole_from_estimate
@@ -88,11 +88,12 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
 def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], *, height: float | None = None,
                 distance: float | None = None, sizes: Sizes | None = None, body: str | Make = "rounded",
                 settings: InitializationSettings | None = None) -> SizeFit:
-    """Place and sizes without references, from masks (H, W) of the first seconds in any posture.
+    """Place and sizes without references, from masks (H, W) of some moments in any posture.
 
-    Initial sizes are the average person's for the height (m, shoes on), or those given; places are tried with coarse poses in the first
-    masks; then place, poses and, unless given, sizes are fitted together. `body`: a name, or a function of `CardboxSizes`. Raises
-    `TrackingError` if no mask shows a person or one is not of the camera's size, or for an impossible height or distance.
+    Initial sizes are the average person's for the height (m, shoes on), or those given; the place is the one that fits most of the masks
+    (`find_place`); then poses and sizes, or the place of a person of given sizes, are fitted to the masks that it fits. `body`: a name, or
+    a function of `CardboxSizes`. Raises `TrackingError` if no mask shows a person or one is not of the camera's size, or for an impossible
+    height or distance.
     """
     settings = settings or InitializationSettings()
     if isinstance(body, str) and body in WHOLE:
@@ -103,14 +104,11 @@ def find_person(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     usable = [mask for mask in checked if may_be_person(mask)]
     if not usable:
         raise TrackingError("nobody is found: the silhouettes of the first seconds are empty, or nearly all of the picture")
-    first, middle, last = 0, len(usable) // 2, len(usable) - 1
-    candidates = [each for k in sorted({first, middle}) for each in _candidates(camera, usable[k], height, distance, sizes)]
-    compared = [usable[k] for k in sorted({first, middle, last})]
-    costs = [sum(search_pose(each.picture(camera, body), mask).cost for mask in compared) for each in candidates]
-    initial = candidates[int(np.argmin(costs))]
-    poses = np.array([search_pose(initial.picture(camera, body), mask).pose for mask in usable])
-    return refine(rng, camera, initial, usable, poses, free_sizes=sizes is None, free_distance=distance is None, body=body,
-                  settings=settings)
+    initial, fits = find_place(camera, usable, height, distance, sizes, body)
+    usable = [mask for mask, well in zip(usable, fits, strict=True) if well]
+    poses = np.array([search_turned(initial.picture(camera, body), mask).pose for mask in usable])
+    free = distance is None and sizes is not None
+    return refine(rng, camera, initial, usable, poses, free_sizes=sizes is None, free_distance=free, body=body, settings=settings)
 
 
 def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask], height: float | None, distance: float | None,
@@ -120,16 +118,16 @@ def _find_whole(rng: np.random.Generator, camera: Camera, masks: Sequence[Mask],
     if height is None and sizes is not None:
         height = stature_of(dict(zip(sizes.names(), sizes.to_array().tolist()))) + SOLE
     fit = find_person(rng, camera, masks, height=height, distance=distance, settings=settings)
-    return as_whole(camera, list(filter(may_be_person, masks)), fit, body, sizes, distance)
+    return as_whole(camera, list(filter(may_be_person, masks)), fit, body, sizes, distance, standing=False)
 
 
 def as_whole(camera: Camera, masks: Sequence[Mask], fit: SizeFit, body: str, sizes: BoneSizes | None = None,
-             distance: float | None = None) -> SizeFit:
-    """The fit of an upper body converted to that of a whole one, with new poses, and new sizes and distance (m) unless given. Overlaps
-    stay the upper body's: they show how well the person was measured."""
-    guess = whole_from_estimate(camera, masks, fit.guess, body, sizes, distance)
+             distance: float | None = None, standing: bool = True) -> SizeFit:
+    """The fit of an upper body converted to that of a whole one, with new poses, and new sizes and distance (m) unless given; arguments as
+    in `whole_from_estimate`. Overlaps stay the upper body's: they show how well the person was measured."""
+    guess = whole_from_estimate(camera, masks, fit.guess, body, sizes, distance, standing)
     picture = guess.picture(camera, body)
-    return replace(fit, guess=guess, poses=np.array([search_pose(picture, mask).pose for mask in masks]))
+    return replace(fit, guess=guess, poses=np.array([search_turned(picture, mask).pose for mask in masks]))
 
 
 def refine(rng: np.random.Generator, camera: Camera, initial: PersonEstimate, masks: Sequence[Mask], poses: Array, *,
@@ -174,24 +172,6 @@ def _checked(camera: Camera, references: Mapping[str, Mask]) -> dict[str, Mask]:
             raise TrackingError(f"references: {name}: the silhouette covers {100 * mask.mean():.0f} % of the picture, expected a "
                                 f"person before the background, under {100 * NEARLY_ALL:.0f} %")
     return masks
-
-
-def _candidates(camera: Camera, mask: Mask, height: float | None, distance: float | None,
-                sizes: CardboxSizes | None) -> list[PersonEstimate]:
-    """Candidates of plausible sizes at plausible places, with the crown at the mask's upper edge or, for raised arms, below it."""
-    top = np.flatnonzero(mask.any(1))[0]
-    centre = np.flatnonzero(mask.any(0)).mean()
-    known = height is not None or sizes is not None or distance is None
-    heights: list[float] = [height or AVERAGE_HEIGHT] if known else np.arange(1.0, 2.1, 0.08).tolist()
-    distances: list[float] = [distance] if distance is not None else (0.8 * 1.07 ** np.arange(36)).tolist()
-    up, out = place(camera, 0.0, 0.0)[:3, 2], []
-    ray = camera.rays(np.array([centre, top], float))
-    for tall, far in product(heights, distances):
-        of = sizes or sizes_from_height(tall)
-        crown = of.torso_height + of.neck_gap + of.head_height
-        for raised in (0.0, 0.1, 0.25, 0.4):
-            out.append(PersonEstimate(of, tall, far, float(ray / ray[2] * far @ up) - crown - raised * tall))
-    return out
 
 
 def _span(sizes: CardboxSizes) -> float:

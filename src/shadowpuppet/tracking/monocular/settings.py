@@ -71,6 +71,8 @@ class MonocularSettings:
     """Keep joint limits."""
     recover: bool = True
     """Search for the person again after a loss or an absence. The papers' filters continue from their last particles."""
+    turned: bool = True
+    """Search for a person who is turned, and with a whole body sits, kneels or squats, where one who faces the camera fits badly."""
     patience: NonNegative = 1.0
     """Seconds after which a part of the silhouette that the body does not explain, such as a chair, is left out; 0: never."""
     ignore_legs: bool = True
@@ -91,6 +93,7 @@ PRESETS: dict[str, dict] = {
         "estimate": "best",
         "motion_weight": 0.0,
         "posture_weight": 0.0,
+        "turned": False,
         "patience": 0.0,
     },
 }

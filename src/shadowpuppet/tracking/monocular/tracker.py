@@ -92,7 +92,7 @@ class MonocularTracker:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` if no
         person is visible. `also` and errors: as in `step`."""
         mask = check_mask(mask, self.picture.camera.size)
-        found = pose_search.search_pose(self.picture, mask)
+        found = self.search(mask)
         observation, particles = self.observe(mask, found.pose, also), []
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
@@ -105,6 +105,10 @@ class MonocularTracker:
         if self.is_absent(mask, found.pose):
             return self.absent(state)
         return settle(state, lambda state: self.cycle(rng, state, mask, also))
+
+    def search(self, mask: Mask) -> pose_search.CoarsePose:
+        """The best coarse pose in a mask (H, W); with `turned` of all directions and heights if the upright person fits badly."""
+        return (pose_search.search_turned if self.settings.turned else pose_search.search_pose)(self.picture, mask)
 
     def observe(self, mask: Mask, pose: Array, also: Cost | None = None, unexplained: Unexplained | None = None) -> Observation:
         """The observation of a mask (H, W) without what is left out beside `pose` (D,); with `ignore_legs` without the region where the

@@ -21,6 +21,9 @@ CUT_OFF_ROWS = 2
 """A silhouette that reaches this many last rows of the picture is cut off there."""
 DISTANCE_FACTORS = np.arange(0.8, 1.5, 0.01)
 """Distances that are tried, relative to that of the upper body."""
+UPRIGHT = 0.12
+"""Relative difference of the distances by the soles and by the upper body above which the person does not stand: whoever sits or kneels
+shows only some three quarters of a standing person's height."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
 WIDTH_GROUPS = (
@@ -32,21 +35,25 @@ WIDTH_GROUPS = (
 
 
 def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEstimate, body: str, sizes: BoneSizes | None = None,
-                        distance: float | None = None) -> PersonEstimate:
+                        distance: float | None = None, standing: bool = True) -> PersonEstimate:
     """The whole-body estimate for an upper-body one, with the neck at the same place, from masks (H, W) of a person facing the camera. The
-    distance (m), if not given, comes from visible soles: trunk and arms alone determine it worse, as clothes can make them wide. Given
-    sizes are kept."""
+    distance (m), if not given, comes from visible soles: trunk and arms alone determine it worse, as clothes can make them wide. Unless the
+    person is known to be `standing`, only soles that are about as far below the crown as a standing person's count. Given sizes are
+    kept."""
     found = upper.sizes
     assert isinstance(found, CardboxSizes)
     whole: BoneSizes = sizes or whole_from_upper(body, found, upper.height)
     made = make_body(body, whole)
     neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
     estimate = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck)
-    soles = [np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()]
-    if distance is None and soles:
+    soles = np.array([np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()])
+    if distance is None and len(soles):
         candidates = [_at_distance(estimate, factor, neck) for factor in DISTANCE_FACTORS]
         rows = np.array([_soles_row(each.picture(camera, body), whole) for each in candidates])
-        estimate = candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
+        factors = DISTANCE_FACTORS[np.abs(rows - soles[:, None]).argmin(1)]
+        soles = soles[standing | (np.abs(factors - 1) <= UPRIGHT)]
+        if len(soles):
+            estimate = candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
     return estimate if sizes is not None else _with_clothes(camera, masks, estimate, whole, body)
 
 

@@ -49,18 +49,18 @@ class Smoothed(NamedTuple):
     """Of the third derivatives between four frames, of shape (T - 3, M)."""
 
 
-def smooth(times: Array, points: Array, sd: Array, least: Array) -> Smoothed:
+def smooth(times: Array, points: Array, sd: Array, least: Array, rounds: int = ROUNDS) -> Smoothed:
     """Points (T, M, 3) at times (T,), seconds, smoothed over the whole interval; unknown ones, not a number, are interpolated.
 
-    `sd`: stated deviations (T, M, 3), in the points' unit; `least` (M,): acceleration of each point of a person who stands still. Fewer
-    than four frames are only interpolated.
+    `sd`: stated deviations (T, M, 3), in the points' unit; `least` (M,): acceleration of each point of a person who stands still;
+    `rounds` of estimating speeds and outliers. Fewer than four frames are only interpolated.
     """
     known: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(2))
     measured = x = filled(times, points)
     precision, variances = np.where(known[..., None], 1.0, FAINT) / (INDEPENDENT * sd) ** 2, np.ones((0, points.shape[1]))
     if len(times) > ORDER:
         given, radius, third = precision, (sd**2).sum(2), differences(times)
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             variances = jerks(times, x, least)
             x = solve(third, measured, precision, variances)
             trust = 1 / (1 + ((x - measured) ** 2).sum(2) / (OUTLIER**2 * radius)) ** 2

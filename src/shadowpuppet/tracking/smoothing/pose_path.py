@@ -16,7 +16,7 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.smoothing.projection import Points, at_limits, derivatives
 
-ROUNDS, LEAST_GAIN = 10, 1e-3
+STEPS, LEAST_GAIN = 10, 1e-3
 """Steps at most, and the share of the cost by which a step must lower it for another to follow."""
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
 """Damping, as a share of the equations' diagonal."""
@@ -63,8 +63,10 @@ class PathCost(NamedTuple):
         return out
 
 
-def likeliest_poses(skeleton: Skeleton, points: Points, poses: Array, cost: PathCost, free: NDArray[np.bool_]) -> Array:
-    """Poses (T, D) of least cost near given ones, within the joints' limits. Only `free` (D,) degrees of freedom change."""
+def likeliest_poses(skeleton: Skeleton, points: Points, poses: Array, cost: PathCost, free: NDArray[np.bool_],
+                    steps: int = STEPS) -> Array:
+    """Poses (T, D) of least cost near given ones, within the joints' limits, after `steps` at most. Only `free` (D,) degrees of freedom
+    change."""
     low, high = skeleton.limits
     low, high = np.minimum(low, poses), np.maximum(high, poses)
     which, damping = np.flatnonzero(free), FIRST_DAMPING
@@ -72,7 +74,7 @@ def likeliest_poses(skeleton: Skeleton, points: Points, poses: Array, cost: Path
         return poses
     at, J = derivatives(skeleton, points, poses, which)
     best = cost(at)
-    for _ in range(ROUNDS):
+    for _ in range(steps):
         downhill = (J @ cost.downhill(at)[..., None])[..., 0]
         J[at_limits(poses, downhill, which, low, high)] = 0
         new = poses.copy()

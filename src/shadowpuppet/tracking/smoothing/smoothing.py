@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
-from shadowpuppet.motion.motion import Motion
+from shadowpuppet.motion.motion import PER_FRAME, Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
-from shadowpuppet.tracking.smoothing.facing import turned_on
-from shadowpuppet.tracking.smoothing.fixed_interval import LEAST, ORDER, differences, smooth
+from shadowpuppet.tracking.smoothing.facing import Faced, turned_on
+from shadowpuppet.tracking.smoothing.fixed_interval import INDEPENDENT, LEAST, ORDER, Smoothed, differences, smooth
 from shadowpuppet.tracking.smoothing.gaps import bridged, stray
 from shadowpuppet.tracking.smoothing.method import Method
-from shadowpuppet.tracking.smoothing.pose_path import PathCost, likeliest_poses
+from shadowpuppet.tracking.smoothing.pose_path import STEPS, PathCost, likeliest_poses
 from shadowpuppet.tracking.smoothing.projection import Markers, Points, markers, nearest_poses
 
 BLOCK, OVERLAP = 1500, 4.0
@@ -41,6 +41,21 @@ class SmoothedMotion(NamedTuple):
     """Frames (T,) that were unknown and are `predicted` now."""
     mirrored: NDArray[np.bool_]
     """Frames (T,) in which the person has turned away from one camera, whose tracker took them for facing it."""
+    reversed: NDArray[np.bool_]
+    """Frames (T,) of profiles that one camera's tracker took for facing the other way."""
+
+
+class Tracked(NamedTuple):
+    """Tracked poses of some frames."""
+
+    times: Array
+    """Seconds, of shape (T,)."""
+    poses: Array
+    """Of shape (T, D), rad or m."""
+    pose_sd: Array
+    """Stated deviations, of shape (T, D); not a number where there are none."""
+    joint_sd: Array
+    """Stated deviations of the joints, of shape (T, N, 3), metres; likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +73,17 @@ class MotionSmoother:
     away: bool = False
     """Whether one camera first sees the person from behind."""
 
-    def __call__(self, motion: Motion) -> SmoothedMotion:
-        """A motion smoothed in runs of known frames. Raises `SettingsError` for a cut-off that the frame rate does not allow."""
-        motion, mirrored = self._faced(motion)
+    def __call__(self, motion: Motion, leans: Array | None = None) -> SmoothedMotion:
+        """A motion smoothed in runs of known frames; `leans` (T,): of the head in a profile (`head_lean`). Raises `SettingsError` for a
+        cut-off that the frame rate does not allow."""
+        motion, mirrored, wrong = self._faced(motion, leans)
         inside = bridged(motion.times, motion.joints, self.gaps)
         poses, known = motion.poses.copy(), motion.known
         free = np.asarray((poses[known] != poses[known][:1]).any(0))
         for begin, end in true_runs(known | inside):
             for block, kept in _blocks(motion.times, begin, end):
                 poses[kept] = self._poses(motion[block], free)[kept.start - block.start : kept.stop - block.start]
-        return SmoothedMotion(self._motion(motion, poses, inside), inside, mirrored)
+        return SmoothedMotion(self._motion(motion, poses, inside), inside, mirrored, wrong)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -76,15 +92,15 @@ class MotionSmoother:
             return {"method": self.method, "cutoff_hz": self.cutoff, "order": 2 * PASSES, "lag": 0, "gaps_s": self.gaps}
         return {"method": self.method, "gaps_s": self.gaps}
 
-    def _faced(self, motion: Motion) -> tuple[Motion, NDArray[np.bool_]]:
-        """The motion of a person who may turn right round, and the frames (T,) that are mirrored."""
+    def _faced(self, motion: Motion, leans: Array | None) -> Faced:
+        """The motion of a person who may turn right round."""
         if self.method == "off":
-            return motion, np.zeros(len(motion), bool)
-        turned, mirrored = turned_on(motion, self.away)
+            return Faced(motion, *np.zeros((2, len(motion)), bool))
+        turned = turned_on(motion, self.away, leans)
         joints = motion.joints.copy()
-        changed = mirrored & motion.known
-        joints[changed] = self.points(turned.poses[changed])
-        return replace(turned, joints=joints), mirrored
+        changed = (turned.mirrored | turned.reversed) & motion.known
+        joints[changed] = self.points(turned.motion.poses[changed])
+        return turned._replace(motion=replace(turned.motion, joints=joints))
 
     def _poses(self, motion: Motion, free: NDArray[np.bool_]) -> Array:
         """Poses (T, D) of a run of frames in which no gap is left."""
@@ -95,16 +111,40 @@ class MotionSmoother:
         if self.method == "butterworth":
             found = filtered(motion.times, both, self.cutoff)
             return self._nearest(start, found, number, free)
-        turns = np.repeat(self._turns(_stated(motion.pose_sd)), 3, axis=1)
-        sd = np.concatenate([_stated(motion.joint_sd), np.repeat(turns[..., None], 3, axis=2)], 1)
-        found = smooth(motion.times, both, sd, np.repeat([LEAST, LEAST / ARM], [number, turns.shape[1]]))
+        sd = self._marker_sd(motion.pose_sd, motion.joint_sd)
+        found = smooth(motion.times, both, sd, self._least(number))
         near = self._nearest(start, found.points, number, free)
-        if len(motion) <= ORDER:
-            return near
-        share = np.repeat([1.0, AXES_SHARE], [number, turns.shape[1]])
-        cost = PathCost(_in_a_row(filled(motion.times, both)), _in_a_row(found.precision * share[:, None]), differences(motion.times),
+        return near if len(motion) <= ORDER else self._path(near, filled(motion.times, both), found, motion.times, free)
+
+    def likeliest(self, tracked: Tracked, start: Array, free: NDArray[np.bool_], given: int, given_sd: float, rounds: int,
+                  steps: int) -> Array:
+        """Poses (T, D) from `start` (T, D) on, of frames of which the first `given` are known: their markers to `given_sd` (m, and 1 for
+        axes). Only `free` (D,) degrees of freedom change; `rounds` of estimating speeds and outliers, and Gauss-Newton `steps`. Up to
+        three frames stay as they are."""
+        if len(start) <= ORDER:
+            return start
+        measured = np.concatenate(markers(self.skeleton, self.points, tracked.poses), axis=1)
+        sd = self._marker_sd(tracked.pose_sd, tracked.joint_sd)
+        sd[:given] = given_sd / INDEPENDENT
+        found = smooth(tracked.times, measured, sd, self._least(tracked.joint_sd.shape[1]), rounds)
+        return self._path(_unwrapped(self.skeleton, start), measured, found, tracked.times, free, steps)
+
+    def _path(self, start: Array, measured: Array, found: Smoothed, times: Array, free: NDArray[np.bool_], steps: int = STEPS) -> Array:
+        """The likeliest poses (T, D) from `start` on, given measured markers (T, M, 3), and what they weigh by `found`."""
+        number = measured.shape[1] - 3 * len(self.skeleton.joints)
+        share = np.repeat([1.0, AXES_SHARE], [number, measured.shape[1] - number])
+        cost = PathCost(_in_a_row(measured), _in_a_row(found.precision * share[:, None]), differences(times),
                         np.repeat(found.variances / share, 3, axis=1))
-        return likeliest_poses(self.skeleton, self.points, near, cost, free)
+        return likeliest_poses(self.skeleton, self.points, start, cost, free, steps)
+
+    def _marker_sd(self, pose_sd: Array, joint_sd: Array) -> Array:
+        """Deviations (T, M, 3) of joints (m) and of the axes of the skeleton's joints, from those of poses (T, D) and joints (T, N, 3)."""
+        turns = np.repeat(self._turns(_stated(pose_sd)), 3, axis=1)
+        return np.concatenate([_stated(joint_sd), np.repeat(turns[..., None], 3, axis=2)], 1)
+
+    def _least(self, number: int) -> Array:
+        """Acceleration (M,) of a person who stands still, of `number` points (m/s^2) and of axes (1/s^2)."""
+        return np.repeat([LEAST, LEAST / ARM], [number, 3 * len(self.skeleton.joints)])
 
     def _nearest(self, start: Array, found: Array, number: int, free: NDArray[np.bool_]) -> Array:
         """Poses (T, D) near `start` whose markers are nearest to those found (T, M, 3), `number` points before the axes."""
@@ -134,6 +174,16 @@ class MotionSmoother:
         status, limbs = motion.status.copy(), motion.limb_status.copy()
         status[inside], limbs[inside] = "predicted", "predicted"
         return replace(motion, poses=poses, joints=joints, joint_sd=joint_sd, pose_sd=pose_sd, status=status, limb_status=limbs)
+
+
+def smoothed_parts(motion: Motion, parts: Sequence[tuple[int, MotionSmoother]], leans: Array) -> SmoothedMotion:
+    """A motion smoothed in parts, one after another: for each its first frame and smoother, at first frame 0; `leans` (T,) of the head.
+    Raises as they do."""
+    ends = [*(begin for begin, _ in parts[1:]), len(motion)]
+    found = [smoother(motion[begin:end], leans[begin:end]) for (begin, smoother), end in zip(parts, ends)]
+    whole = {name: np.concatenate([getattr(each.motion, name) for each in found]) for name in PER_FRAME}
+    return SmoothedMotion(replace(motion, **whole), np.concatenate([each.bridged for each in found]),
+                          np.concatenate([each.mirrored for each in found]), np.concatenate([each.reversed for each in found]))
 
 
 def _grown(motion: Motion, joints: Array, inside: NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -170,7 +170,8 @@ def words(view: View) -> str:
     figures = view.figures()
     said = [f"**{figures['chip']}**", figures["message"]]
     if figures["latency"] is not None:
-        said.append(f"{figures['latency']:.0f} ms from capture to pose")
+        lag = f" ({figures['lag']:.0f} ms of it the lag of smoothing)" if figures["lag"] else ""
+        said.append(f"{figures['latency']:.0f} ms from capture to pose{lag}")
     if figures["rate"] is not None:
         said.append(f"{figures['rate']:.0f} frames/s")
     if figures["overlap"] is not None:

@@ -1,49 +1,27 @@
-"""Calibrations: the command `check` tests one against silhouettes; and one explained or converted, for `info`."""
+"""A calibration explained in words, a table and a top view, or converted: for `info`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from shadowpuppet.cli.flags import AsJson, Config, LookFlags, options_from
 from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import RecordingError, SettingsError, choices
 
 if TYPE_CHECKING:
     from shadowpuppet.calibration.overview import CalibrationLook, CameraPlacement
-    from shadowpuppet.pipeline.check_calibration import CalibrationCheck
 
 ARROWS = "→↗↑↖←↙↓↘"
 """Arrows by viewing direction, in eighths of a turn counter-clockwise from +x."""
-UNREADABLE = (".abc", ".asf", ".blend", ".dae", ".fbx", ".glb", ".gltf", ".json", ".md", ".mot", ".osim", ".sto", ".tsv", ".usd", ".usda",
+UNREADABLE = (".abc", ".asf", ".blend", ".dae", ".fbx", ".glb", ".gltf", ".md", ".mot", ".osim", ".sto", ".tsv", ".usd", ".usda",
               ".usdc", ".usdz", ".vsk", ".xls", ".xlsx")
 """Endings of files about motion and cameras that are not read."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 """Names of cameras in the top view; + for any further."""
-
-
-def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a calibration, of two cameras or more.")], /, *,
-          config: Config = None, as_json: AsJson = False, flags: LookFlags = None) -> None:
-    """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
-    turned; and by how many frames each film is late."""
-    from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.check_calibration import check_calibration
-    from shadowpuppet.pipeline.rig import open_rig
-
-    if recording.is_file() and is_explained(recording):
-        raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
-    options = options_from(flags, config)
-    with terminal(quiet=as_json) as listener:
-        found = check_calibration(open_rig(recording, options), options, listener)
-    if as_json:
-        show_json(found)
-    else:
-        show(check_table(found))
 
 
 def is_explained(path: Path) -> bool:
@@ -171,28 +149,3 @@ def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
                          "letters are cameras with arrows the way they look, × the place they look at")
     yield "figures", (f"how many cameras see somebody of 1.80 m whole who stands there: {most} over {whole:.1f} m²" if most
                       else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
-
-
-def check_table(check: CalibrationCheck) -> RenderableType:
-    """How far each camera disagrees with the others, and the verdict."""
-    found = check.agreement
-    columns = ("camera", "disagrees by", "with", "late by", "sure to", "")
-    rows: list[tuple[str, str | None]] = [
-        ("recording", check.recording),
-        ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
-        ("limit", f"{found.limit:.1f} px; cameras that fit are apart by about one"),
-        ("height", None if found.height is None else f"{found.height:.2f} m from end to end, as the cameras see it"),
-    ]
-    verdict = "all cameras agree" if check.good else "\n".join(check.doubts)
-    return Group(pairs(rows), "", table("", columns, _agreement_rows(check), right=(1, 3, 4)), "", pairs([("verdict", verdict)]))
-
-
-def _agreement_rows(check: CalibrationCheck) -> Iterator[tuple[Any, ...]]:
-    found, late = check.agreement, check.lateness
-    for n, name in enumerate(found.names):
-        apart, others = found.apart[n], sum(pair is not None for pair in found.pairs[n])
-        frames, spread = (None, None) if late is None else (late.frames[n], late.spread[n])
-        wrong = [word for word, bad in (("place", name in found.wrong or name in check.turns), ("time", name in check.late)) if bad]
-        yield (name, "unknown" if apart is None else f"{apart:.1f} px", f"{others} others",
-               "unknown" if frames is None else f"{round(frames, 1) + 0.0:.1f} frames", "" if spread is None else f"{spread:.1f}",
-               f"wrong: {' and '.join(wrong)}" if wrong else "")

@@ -1,0 +1,1 @@
+"""Calibration boards: what they look like, printed and found in pictures."""

@@ -1,0 +1,131 @@
+"""Corners of a board in a picture."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.calibration.boards.board import Board
+from shadowpuppet.geometry import Array
+
+MIN_CORNERS = 8
+"""Least number of corners of a view."""
+MIN_SPREAD = 0.02
+"""Least ratio of a view's extent across its longest direction to that along it: corners in a line give no pose."""
+MAX_HOMOGRAPHY_ERROR = 0.25
+"""Corners are dropped that lie farther from the plane's homography than this share of a square: markers read wrongly."""
+
+
+class View(NamedTuple):
+    """A board as one picture shows it."""
+
+    time: float
+    """Seconds after the film's first frame."""
+    ids: NDArray[np.int64]
+    """Numbers of the corners seen, of shape (K,), as in `Board.points`."""
+    pixels: Array
+    """The corners, of shape (K, 2)."""
+    sharpness: float
+    """Steepness of its edges: share of the board's contrast that the steepest pixels change by, from one pixel to the next."""
+
+
+class BoardDetector:
+    """Finds a board in grey pictures; one for each thread."""
+
+    def __init__(self, board: Board) -> None:
+        """Of a board."""
+        import cv2
+
+        self.board = board
+        self._charuco = cv2.aruco.CharucoDetector(board.aruco_board) if board.kind == "charuco" else None
+
+    def find(self, grey: NDArray[np.uint8], time: float = 0.0) -> View | None:
+        """The view of the board in a picture (H, W); None if it shows fewer than `MIN_CORNERS`."""
+        found = self._charuco_corners(grey) if self._charuco is not None else self._checker_corners(grey)
+        if found is None:
+            return None
+        ids, pixels = _consistent(self.board, *found)
+        if len(ids) < MIN_CORNERS or not _spans_a_plane(self.board.points[ids]):
+            return None
+        return View(time, ids, pixels, _sharpness(grey, pixels))
+
+    def _charuco_corners(self, grey: NDArray[np.uint8]) -> tuple[NDArray[np.int64], Array] | None:
+        assert self._charuco is not None
+        corners, ids, _, _ = self._charuco.detectBoard(grey)
+        if ids is None or len(ids) < MIN_CORNERS:
+            return None
+        numbers = np.asarray(ids, np.int64).ravel()
+        order = np.argsort(numbers)
+        return numbers[order], np.asarray(corners, float).reshape(-1, 2)[order]
+
+    def _checker_corners(self, grey: NDArray[np.uint8]) -> tuple[NDArray[np.int64], Array] | None:
+        import cv2
+
+        across, down = self.board.inner
+        scale = max(1.0, max(grey.shape) / 960)  # a quick look in a small picture, as most show no whole board
+        small = cv2.resize(grey, None, fx=1 / scale, fy=1 / scale, interpolation=cv2.INTER_AREA) if scale > 1 else grey
+        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_FAST_CHECK | cv2.CALIB_CB_NORMALIZE_IMAGE
+        good, rough = cv2.findChessboardCorners(small, (across, down), flags=flags)
+        if not good or rough is None:
+            return None
+        start = (np.asarray(rough, np.float32).reshape(-1, 1, 2) + 0.5) * np.float32(scale) - np.float32(0.5)
+        grid = start.reshape(down, across, 2)
+        gap = min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min()) for axis in (0, 1))
+        half = int(np.clip(gap / 3, 2, 11))
+        stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
+        pixels = np.asarray(cv2.cornerSubPix(grey, np.ascontiguousarray(start), (half, half), (-1, -1), stop), float).reshape(-1, 2)
+        return np.arange(across * down), _in_order(self.board, grey, pixels)
+
+
+def _in_order(board: Board, grey: NDArray[np.uint8], pixels: Array) -> Array:
+    """A checkerboard's corners in the order of `Board.points`: not mirrored, and its first square, which is black, first."""
+    across, down = board.inner
+    grid = pixels.reshape(down, across, 2)
+    right, below = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    if right[0] * below[1] - right[1] * below[0] < 0:
+        grid = grid[:, ::-1]
+    if board.symmetric:
+        return grid.reshape(-1, 2)
+    first, last = 2 * grid[0, 0] - grid[0:2, 0:2].mean((0, 1)), 2 * grid[-1, -1] - grid[-2:, -2:].mean((0, 1))
+    if _grey_at(grey, first) > _grey_at(grey, last):  # the first square is black, the last one white
+        grid = grid[::-1, ::-1]
+    return grid.reshape(-1, 2)
+
+
+def _grey_at(grey: NDArray[np.uint8], pixel: Array) -> float:
+    x, y = np.clip(np.rint(pixel).astype(int), 0, np.array(grey.shape[::-1]) - 1)
+    return float(grey[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2].mean())
+
+
+def _consistent(board: Board, ids: NDArray[np.int64], pixels: Array) -> tuple[NDArray[np.int64], Array]:
+    """The corners without those that are far from where their neighbours would have them: the median of local affine predictions."""
+    place = board.points[ids, :2] / board.square
+    if len(ids) < MIN_CORNERS:
+        return ids, pixels
+    off = np.zeros(len(ids))
+    for k in range(len(ids)):
+        near = np.argsort(((place - place[k]) ** 2).sum(1), kind="stable")[1:8]
+        A = np.concatenate([place[near] - place[k], np.ones((len(near), 1))], axis=1)
+        if np.linalg.matrix_rank(A, tol=1e-6) < 3:
+            continue
+        fit = np.linalg.lstsq(A, pixels[near], rcond=None)[0]
+        off[k] = np.linalg.norm(fit[2] - pixels[k]) / max(float(np.linalg.norm(fit[:2], axis=1).max()), 1e-9)
+    keep = off <= MAX_HOMOGRAPHY_ERROR
+    return (ids[keep], pixels[keep]) if keep.sum() >= MIN_CORNERS else (ids[:0], pixels[:0])
+
+
+def _spans_a_plane(points: Array) -> bool:
+    extent = np.linalg.svd(points[:, :2] - points[:, :2].mean(0), compute_uv=False)
+    return bool(extent[1] > max(MIN_SPREAD * extent[0], 1e-9))
+
+
+def _sharpness(grey: NDArray[np.uint8], pixels: Array) -> float:
+    low, high = np.floor(pixels.min(0)).astype(int), np.ceil(pixels.max(0)).astype(int) + 1
+    part = grey[max(0, low[1]) : high[1], max(0, low[0]) : high[0]].astype(np.float32)
+    if min(part.shape) < 3:
+        return 0.0
+    steps = np.maximum(np.abs(part[1:, 1:] - part[:-1, 1:]), np.abs(part[1:, 1:] - part[1:, :-1]))
+    contrast = float(np.percentile(part, 95) - np.percentile(part, 5))
+    return float(np.percentile(steps, 98)) / max(contrast, 1.0)

@@ -1,0 +1,1 @@
+"""Lenses and places of cameras solved from views of a board."""

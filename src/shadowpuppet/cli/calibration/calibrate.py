@@ -1,0 +1,103 @@
+"""The command `calibrate`: lenses and places of cameras from films of a board."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from rich.console import Group, RenderableType
+
+from shadowpuppet.cli.flags import OTHER, Switch, flag, output
+from shadowpuppet.cli.tables import pairs, show, table
+from shadowpuppet.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from shadowpuppet.calibration.boards.board import Board
+    from shadowpuppet.calibration.session import Calibrated
+
+
+def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml and films of a board: intrinsics/CAMERA.mp4, "
+                                                         "extrinsics/CAMERA.mp4, floor/CAMERA.mp4 or .jpg.")] = None, /, *,
+              board: Annotated[str | None, flag("The board in place of board.toml: 'charuco 7x5' or 'checkerboard 9x6', squares.")] = None,
+              square: Annotated[float | None, flag("Side of the board's squares in metres, as measured on the print.")] = None,
+              dictionary: Annotated[str | None, flag("A ChArUco board's set of markers, such as 4X4_50 or 5X5_100.")] = None,
+              lenses: Annotated[Path | None, flag("A calibration whose lenses are kept; only places are solved.")] = None,
+              to: Annotated[Path | None, output("Calibration to write; LAB/calibration.toml if not given. An old one is kept "
+                                                "as calibration.before1.toml.")] = None,
+              print_board: Annotated[Path | None, flag("Write the board as a PDF of true size, and end.")] = None,
+              no_report: Annotated[Switch, Parameter(group=OTHER, help="Write no calibration.html.")] = False) -> int:
+    """Calibrate the cameras of a lab from films of a board: lenses from a board shown to each camera, places from one carried through the
+    room before several, the floor from one that lies on it.
+
+    Writes LAB/calibration.toml, and LAB/calibration.html with errors, coverage, places, and what to film again. Exit code 1 if something
+    should be filmed again.
+    """
+    if print_board is not None:
+        from shadowpuppet.calibration.boards.printing import write_board
+
+        made = _board(lab, board, square, dictionary)
+        sheet = write_board(print_board, made)
+        print(f"written: {print_board}, {made.text}, on {sheet}; print it at 100 %, and measure a square")
+        return 0
+    if lab is None:
+        raise CalibrationError("expected a folder with films of a board; or --print-board board.pdf --board 'charuco 7x5' --square 0.04")
+    from shadowpuppet.calibration.results import write_results
+    from shadowpuppet.calibration.session import calibrate as solve
+    from shadowpuppet.calibration.session import open_session
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.evaluation.report.calibration_page import calibration_page
+    from shadowpuppet.io.calibration.calibration_files import read_calibration
+
+    session = open_session(lab, None if board is None else _board(lab, board, square, dictionary))
+    known = {camera.name: camera for camera in read_calibration(lenses)} if lenses is not None else None
+    with terminal() as listener:
+        done = 0
+
+        def begin(what: str, count: int) -> None:
+            nonlocal done
+            done = 0
+            listener.begin(what, count or None)
+
+        def advance() -> None:
+            nonlocal done
+            done += 1
+            listener.advance(done)
+
+        found = solve(session, known, begin, advance)
+        written = write_results(found, to or lab / "calibration.toml", None if no_report else calibration_page)
+        listener.stop()
+        show(result_table(found), pairs([("written", "\n".join(map(str, written)))]))
+        for sentence in found.advice:
+            listener.warn(sentence)
+    return 1 if found.advice else 0
+
+
+def _board(lab: Path | None, board: str | None, square: float | None, dictionary: str | None) -> Board:
+    from shadowpuppet.calibration.boards.board import board_from, read_board
+
+    if board is not None:
+        return board_from(board, square, **({"dictionary": dictionary} if dictionary else {}))
+    if lab is not None and (lab / "board.toml").exists():
+        return read_board(lab / "board.toml")
+    raise CalibrationError("--board is missing, for example --board 'charuco 7x5' --square 0.04")
+
+
+def result_table(found: Calibrated) -> RenderableType:
+    """A row a camera: lens and place."""
+    columns = ("camera", "lens", "views", "error", "unseen views", "focal length", "at, m", "known to")
+    parts: list[RenderableType] = [pairs([("board", found.session.board.text)]), "",
+                                   table("", columns, _rows(found), right=(2, 3, 4, 5))]
+    parts += ["", pairs([("notes", "\n".join(found.notes))])] if found.notes else []
+    return Group(*parts)
+
+
+def _rows(found: Calibrated) -> Iterator[tuple[str, ...]]:
+    for n, (camera, fit) in enumerate(zip(found.cameras, found.lenses)):
+        lens = ("given", "", "", "") if fit is None else (fit.model, str(fit.views), f"{fit.rms:.2f} px", f"{fit.held_out:.2f} px")
+        doubt = "" if fit is None else f" ± {100 * fit.focal_sd:.1f} %"
+        place = " ".join(f"{value + 0.0:.2f}" for value in np.round(camera.centre, 2)) if found.placement is not None else "not told"
+        sure = "" if found.placement is None else f"{1000 * 3 * found.placement.solved.place_sd[n]:.1f} mm"
+        yield (camera.name, *lens, f"{camera.matrix[0, 0]:.1f}{doubt}", place, sure)

@@ -1,0 +1,95 @@
+"""Writes what `check` found for certain into a recording: delays of films and directions of cameras. Old files are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from shadowpuppet.calibration.agreement import compare_cameras
+from shadowpuppet.calibration.results import keep_old
+from shadowpuppet.errors import RecordingError, reason
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.files.text import read_toml, write_whole
+from shadowpuppet.pipeline.check_calibration import CalibrationCheck, SilhouetteSets, aligned_sets
+from shadowpuppet.pipeline.rig import Rig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fix:
+    """What was changed; plain values."""
+
+    done: tuple[str, ...]
+    """A sentence on each change; empty if nothing was certain enough."""
+    files: tuple[str, ...]
+    """Files written, and the old ones' copies."""
+    pixels: tuple[tuple[str, float | None, float | None], ...]
+    """Name and disagreement with the others, pixels, before and after, of each camera; None if unknown."""
+
+
+def fix_recording(rig: Rig, sets: SilhouetteSets, found: CalibrationCheck) -> Fix:
+    """Write certain delays into [start] of recording.toml, and certain rotations into a new calibration.toml. Changes nothing that leaves
+    the cameras more apart than before. Raises `RecordingError` if the recording is no folder or a file cannot be written."""
+    folder = rig.recording.path
+    shifts = _shifts(rig, sets, found)
+    if found.agreement.remedy is not None or not (found.starts or found.turns):
+        return Fix(done=(), files=(), pixels=())
+    if not folder.is_dir():
+        raise RecordingError(f"{folder}: expected a folder, as [start] and calibration.toml are written into it")
+    before = compare_cameras(rig.cameras, aligned_sets(sets.rows, [0.0] * len(rig.cameras)), remedies=False)
+    turned = tuple(found.turns[camera.name].turn.of(camera) if camera.name in found.turns else camera for camera in rig.cameras)
+    after = compare_cameras(turned, aligned_sets(sets.rows, shifts), remedies=False)
+    pixels = tuple(zip(rig.names, before.apart, after.apart))
+    if sum(apart or 0.0 for apart in after.apart) > sum(apart or 0.0 for apart in before.apart) + 0.1 * len(rig.cameras):
+        return Fix(done=(), files=(), pixels=pixels)
+    done, files = list[str](), list[Path]()
+    notes: dict[str, Any] = {}
+    if found.starts:
+        notes["start"] = found.starts
+        done.append("recording.toml: [start] " + ", ".join(f"{name} = {value:.4g}" for name, value in found.starts.items()))
+    if found.turns:
+        path = folder / "calibration.toml"
+        kept = keep_old(path)
+        write_calibration(path, [found.turns[view.camera.name].turn.of(view.camera) if view.camera.name in found.turns else view.camera
+                                 for view in rig.recording.views])
+        files += [path, *([kept] if kept is not None else [])]
+        done += [f"calibration.toml: {name} turned back by {fix.turn.degrees:.2f} degrees" for name, fix in found.turns.items()]
+        notes["calibration"] = None
+    files += _write_notes(folder / "recording.toml", notes)
+    return Fix(done=tuple(done), files=tuple(map(str, files)), pixels=pixels)
+
+
+def _shifts(rig: Rig, sets: SilhouetteSets, found: CalibrationCheck) -> list[float]:
+    """Sets by which each film is late, of those that are late for certain."""
+    frames = dict(zip(found.lateness.names, found.lateness.frames)) if found.lateness is not None else {}
+    return [(frames.get(name) or 0.0) / sets.every if name in found.late else 0.0 for name in rig.names]
+
+
+def _write_notes(path: Path, changes: Mapping[str, Any]) -> list[Path]:
+    """Change recording.toml; returns the files written. `calibration`: the recording's own calibration.toml counts from now on, which is in
+    metres with z up, so that what was said of another's unit and up direction goes."""
+    values = dict(read_toml(path, RecordingError)) if path.exists() else {}
+    old = dict(values)
+    if "start" in changes:
+        values["start"] = {**_table(values.get("start")), **changes["start"]}
+        for name in _table(old.get("start")):
+            if name not in changes["start"]:
+                del values["start"][name]
+    if "calibration" in changes:
+        for key in ("calibration", "unit", "up"):
+            values.pop(key, None)
+    if values == old:
+        return []
+    kept = keep_old(path)
+    try:
+        write_whole(path, tomli_w.dumps(values))
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written ({reason(error)})") from None
+    return [path, *([kept] if kept is not None else [])]
+
+
+def _table(value: object) -> dict[str, Any]:
+    return dict(value) if isinstance(value, dict) else {}

@@ -1,0 +1,100 @@
+"""Calibration sessions: folders of films or pictures in, a calibration, a page and sentences out."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import boards
+import numpy as np
+import pytest
+
+from shadowpuppet.calibration.boards.board import board_text
+from shadowpuppet.calibration.session import calibrate, open_session
+from shadowpuppet.cli.app import run
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.io.calibration.calibration_files import read_calibration
+
+SIZE = (960, 720)
+
+
+def rig():
+    """Two cameras without distortion that see one side of the board."""
+    made = boards.ring(2, spread=1.8)
+    matrix = np.array([[930.0, 0, 482], [0, 933.0, 357], [0, 0, 1]])
+    return [replace(camera, size=SIZE, matrix=matrix, distortion=np.zeros(4)) for camera in made]
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    return boards.pictured(tmp_path_factory.mktemp("session") / "lab", rig())
+
+
+@pytest.fixture
+def copy(lab, tmp_path):
+    return shutil.copytree(lab, tmp_path / "lab")
+
+
+def test_a_session_of_pictures(copy, capsys):
+    (copy / "calibration.toml").write_text("old")
+    assert run(["calibrate", str(copy)]) in (0, 1)
+    found = read_calibration(copy / "calibration.toml")
+    for true, camera in zip(rig(), found):
+        assert camera.name == true.name
+        assert abs(camera.matrix[0, 0] / true.matrix[0, 0] - 1) < 0.01
+        assert np.linalg.norm(camera.centre - true.centre) < 0.05
+    assert (copy / "calibration.before1.toml").read_text() == "old"
+    page = (copy / "calibration.html").read_text()
+    assert "What to film again" in page
+    assert "<svg" in page
+    assert "cam2" in capsys.readouterr().out
+
+
+def test_given_lenses_are_kept(copy):
+    lenses = {camera.name: camera for camera in rig()}
+    shutil.rmtree(copy / "intrinsics")
+    found = calibrate(open_session(copy), lenses)
+    for true, camera in zip(rig(), found.cameras):
+        np.testing.assert_array_equal(camera.matrix, true.matrix)
+        assert np.linalg.norm(camera.centre - true.centre) < 0.03
+
+
+def test_a_mirrored_film_is_told(copy):
+    shutil.rmtree(copy)
+    boards.pictured(copy, rig()[:1], 3, mirrored=True)
+    with pytest.raises(CalibrationError, match="the film is mirrored"):
+        calibrate(open_session(copy))
+
+
+def test_another_board_than_was_filmed(copy):
+    (copy / "board.toml").write_text(board_text(replace(boards.BOARD, dictionary="6X6_250", marker=0.0)))
+    with pytest.raises(CalibrationError, match=r"found 0 different views .*is it the board that the settings describe"):
+        calibrate(open_session(copy))
+
+
+def test_a_board_that_looks_the_same_after_half_a_turn(copy):
+    session = open_session(copy)
+    lenses = {camera.name: camera for camera in rig()}
+    board = replace(boards.BOARD, kind="checkerboard", dictionary="", marker=0.0)
+    with pytest.raises(CalibrationError, match="looks the same after half a turn"):
+        calibrate(replace(session, board=board), lenses)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda lab: (lab / "board.toml").unlink(), "board.toml is missing"),
+    (lambda lab: shutil.rmtree(lab / "extrinsics" / "cam2") or shutil.rmtree(lab / "floor" / "cam2"), "has no film of cam2"),
+    (lambda lab: (lab / "board.toml").write_text(board_text(boards.BOARD) + "[start]\ncam9 = 1.0"), "start: found 'cam9'"),
+    (lambda lab: (lab / "board.toml").write_text(board_text(boards.BOARD) + "[start]\ncam1 = 'x'"), "start.cam1: found 'x'"),
+    (lambda lab: [shutil.rmtree(lab / name) for name in ("intrinsics", "extrinsics", "floor")], "found no films"),
+], ids=["board", "films", "start", "seconds", "nothing"])  # fmt: skip
+def test_what_is_missing_is_named(copy, change, message):
+    change(copy)
+    with pytest.raises(CalibrationError, match=message):
+        calibrate(open_session(copy))
+
+
+def test_a_board_is_printed(tmp_path, capsys):
+    assert run(["calibrate", "--print-board", str(tmp_path / "b.pdf"), "--board", "charuco 7x5", "--square", "0.04"]) == 0
+    assert "A3" in capsys.readouterr().out
+    assert run(["calibrate", "--print-board", str(tmp_path / "b.pdf")]) == 2
+    assert run(["calibrate"]) == 2

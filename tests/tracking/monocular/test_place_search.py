@@ -1,0 +1,76 @@
+"""Where a person is: the place that fits most moments, silhouettes that leave nothing to explain, and the distance between tried ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from people import BODIES, camera
+
+from shadowpuppet.body.anthropometry import sizes_from_height
+from shadowpuppet.tracking.monocular.place_search import CLOTHED, RATIO, _peak, find_place
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate
+
+CAMERA = camera((160, 120))
+SIZES = sizes_from_height(1.75)
+ARMS = ((0.3, 0.4), (1.4, 0.6), (0.5, 2.0), (1.5, 1.5), (0.2, 1.0))
+
+
+def seen(arms: tuple[float, float], distance: float = 2.2, elevation: float = -0.35, spread: float = 8.0) -> np.ndarray:
+    """The mask of a person of average sizes with raised arms, and with legs."""
+    picture = PersonEstimate(SIZES, 1.75, distance, elevation).picture(CAMERA)
+    left, right = arms
+    pose = BODIES["rounded"](SIZES).skeleton.pose(left_shoulder_abduction=left, right_shoulder_abduction=right)
+    return picture.mask(pose) | picture.legs(pose, spread=np.radians(spread))
+
+
+def test_a_person_of_known_sizes_is_found_at_their_place():
+    found, fits = find_place(CAMERA, [seen(arms) for arms in ARMS[:3]], None, None, SIZES)
+    assert found.distance == pytest.approx(2.2, rel=0.07)
+    assert found.elevation == pytest.approx(-0.35, abs=0.1)
+    assert found.sizes is SIZES
+    assert fits == [True] * 3
+
+
+def test_the_clothes_of_a_person_of_unknown_sizes_are_allowed_for():
+    """Bodies without clothes, drawn by the model, are thus found too far away by the clothes; the fit never ends far off, where legs would
+    explain all of the silhouette."""
+    found, _ = find_place(CAMERA, [seen(arms) for arms in ARMS], 1.75, None, None)
+    assert found.distance == pytest.approx(2.2 / CLOTHED, rel=0.07)
+
+
+def test_a_small_body_far_away_does_not_win_by_explaining_nothing():
+    masks = [seen(arms, spread=24.0) for arms in ARMS]  # most of the silhouette is where legs may be
+    assert find_place(CAMERA, masks, 1.75, None, None)[0].distance < 3.2
+
+
+def test_the_place_of_most_moments_counts():
+    """Whoever stands first and then sits down is measured where they sit."""
+    standing = [seen(arms, elevation=0.1) for arms in ARMS[:2]]
+    sitting = [seen(arms) for arms in (*ARMS, *ARMS[:1])]
+    found, fits = find_place(CAMERA, [*standing, *sitting], None, None, SIZES)
+    assert found.distance == pytest.approx(2.2, rel=0.07)
+    assert fits == [False] * 2 + [True] * 6
+
+
+def test_given_distances_are_kept():
+    assert find_place(CAMERA, [seen(ARMS[0])], 1.75, 2.5, None)[0].distance == 2.5
+
+
+@given(st.floats(1.0, 5.0), st.floats(-0.5, 0.5), st.floats(0.1, 10.0))
+@settings(max_examples=30, deadline=None)
+def test_the_peak_of_a_parabola_is_found_between_the_tried_distances(middle, off, bend):
+    steps = np.arange(-3, 4)
+    peak = middle * RATIO**off
+    assert _peak(middle * RATIO**steps, -bend * (steps - off) ** 2) == pytest.approx(peak, rel=1e-6)
+
+
+@pytest.mark.parametrize("overlaps", [[3, 2, 1], [1, 2, 3], [1.0, 1.0, 1.0]])
+def test_a_peak_at_the_end_is_the_end(overlaps):
+    tried = 2.0 * RATIO ** np.arange(3)
+    assert _peak(tried, np.array(overlaps, float)) == tried[int(np.argmax(overlaps))]
+
+
+def test_a_peak_beside_a_gap_is_a_tried_distance():
+    assert _peak(np.array([1.0, 2.0, 2.1]), np.array([0.1, 0.9, 0.8])) == 2.0
