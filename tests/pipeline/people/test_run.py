@@ -51,7 +51,7 @@ def run(seen, tmp_path_factory):
     made, masks = seen
     folder = tmp_path_factory.mktemp("people")
     recording = made_rig.write(folder / "recording", made, masks)
-    options = make_options({"masks": True, "multiview": {"particles": 4}, "smooth": "off"})
+    options = make_options({"masks": True, "multiview": {"particles": 4}})
     return track_recording(recording, folder / "run", options)
 
 
