@@ -52,7 +52,7 @@ from shadowpuppet.video import write_frames
 
 SAME_PERSON = 0.5
 """Greatest median distance (m) of a tracked person from a truth that is theirs."""
-Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener, Sequence[float]], None]
+Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener], None]
 """Replaces the motion of a run by the smoothed one."""
 
 
@@ -91,7 +91,7 @@ class PeopleRun:
             for member in group.members:
                 if member.number in self.writers:
                     writer = self.writers[member.number]
-                    smooth(writer, [(0, member.subject)], self.options, self.listener, [np.nan] * len(writer.motion))
+                    smooth(writer, [(0, member.subject)], self.options, self.listener)
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
