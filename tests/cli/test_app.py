@@ -488,7 +488,7 @@ def test_control_c_before_the_first_frame(shell, recording, monkeypatch, tmp_pat
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", stop)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.look_around", stop)
     assert shell("track", recording, "-o", "run") == (130, "", "interrupted: nothing was written\n")
     assert not (tmp_path / "run").exists()
 
@@ -504,7 +504,7 @@ def test_a_closed_pipe_is_no_error(recording):
 
 
 def test_a_bug_is_not_hidden(shell, recording, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: 1 / 0)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.look_around", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         shell("track", recording, "-o", "run")
 

@@ -45,7 +45,7 @@ def test_a_prior_is_learnt_from_several_files(motions, tmp_path, capsys):
     assert "walk.c3d, mirrored" in shown
     assert "5 regions of 2 dimensions; 28 degrees of freedom, 50 frames/s" in shown
     assert "mm at the joints" in shown
-    assert f"--prior {file}" in " ".join(shown.split())
+    assert f"--prior{file}" in "".join(shown.split())  # long paths are broken
 
 
 def test_the_number_of_regions_can_be_chosen(motions, tmp_path, capsys):

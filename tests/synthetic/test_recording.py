@@ -160,7 +160,7 @@ def test_gestures_stay_in_their_time_and_are_smooth(name, rng):
     assert speed.max() < 5.0
     assert (np.abs(np.diff(speed, axis=0)) * 60).max() < 90.0
     if name != "stand":
-        assert speed[:, JOINTS.index("left_hand")].max() > 0.2
+        assert speed[:, JOINTS.index("right_hand" if name == "shake_hands" else "left_hand")].max() > 0.2
 
 
 def test_motion_does_not_depend_on_the_frame_rate():
@@ -494,7 +494,7 @@ def test_the_proving_ground_is_varied_and_fixed():
     assert len({spec.name for spec in specs}) == len(specs)
     assert specs == proving_ground()
     used = {gesture.motion for spec in specs for gesture in spec.motion}
-    assert used >= set(gestures.GESTURES) - {"stand"}
+    assert used >= set(gestures.GESTURES) - {"stand", "shake_hands"}  # which takes two people
     cameras = [spec.cameras[0] for spec in specs]
     assert min(c.distance for c in cameras) <= 1.8
     assert max(c.distance for c in cameras) >= 3.5

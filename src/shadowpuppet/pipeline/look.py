@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import Caution
-from shadowpuppet.pipeline.people.census import Census
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
+
+if TYPE_CHECKING:
+    from shadowpuppet.pipeline.people.census import Census  # whose kernels the command line does not need
 
 
 @dataclass(frozen=True, kw_only=True)

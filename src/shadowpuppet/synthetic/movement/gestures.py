@@ -129,7 +129,7 @@ def shake_hands(seconds: float, rng: np.random.Generator) -> Keys:
         for n, t in enumerate(np.arange(begin + 0.9, min(begin + 2.9, seconds - 0.4), 0.3)):
             up = (-1) ** n * rng.uniform(2, 4)
             keys.append((float(t), right(front=34 + up, side=4, roll=0, elbow=52 + up, supination=0, curl=30) | trunk(spine_bow=6)))
-        keys.append((float(min(begin + 3.5, seconds)), {}))
+        keys.append((float(min(begin + 3.5, seconds - 0.1)), {}))
     return keys
 
 
