@@ -141,7 +141,9 @@ def test_what_was_recorded_can_be_tracked_again_and_a_background_file_is_taken_i
 def test_a_film_with_nobody_in_it_leaves_nothing(pictures, tmp_path, capsys):
     made.write_film(tmp_path / "empty.mp4", pictures[0], RATE)
     assert cli.run(command(tmp_path / "empty.mp4", tmp_path / "run", "--speed", "2")) == 0
-    assert "nobody was tracked: nothing was written" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "nobody was tracked: nothing was written; a film that ends before" in err
+    assert f"`track {tmp_path / 'empty.mp4'}` follows the person in all of it" in err
     assert not (tmp_path / "run").exists()
 
 

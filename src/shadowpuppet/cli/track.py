@@ -103,6 +103,14 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     return PERSON_LOST
 
 
+def _after_a_film(camera: str) -> str:
+    """What to do after a film that was played as if live, in which nobody was tracked; empty for cameras."""
+    if not Path(camera).exists():
+        return ""
+    return ("; a film that ends before the empty scene is learnt and the person measured needs --background with the empty scene, and a "
+            f"slower --speed; `track {camera}` follows the person in all of it")
+
+
 def _check_earlier(folder: Path, force: bool) -> None:
     """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be."""
     from shadowpuppet.io.run import earlier_run
@@ -146,7 +154,7 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
             display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
         metrics = run_live(folder, options, chosen, listener, display, outlets=opened)
     if metrics is None:
-        print("nobody was tracked: nothing was written", file=sys.stderr)
+        print(f"nobody was tracked: nothing was written{_after_a_film(chosen.camera)}", file=sys.stderr)
     elif not quiet:
         show(metrics_table(metrics), pairs([*_live_rows(metrics["live"]), files_in(folder, "joints.csv", "angles.csv", "recording")]))
 
