@@ -30,12 +30,14 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_truth
+from shadowpuppet.io.people import person_folder
+from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR, joint_errors, overlap
 from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.pipeline.track import Summary, track_recording
 from shadowpuppet.pipeline.verdict.of_run import expected_error
 from shadowpuppet.synthetic import Spec, read_spec, synthesize
 from shadowpuppet.synthetic.faults.kinds import KINDS
@@ -103,7 +105,7 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
             warnings.simplefilter("ignore")
             cache, options = SilhouetteCache(), make_options({})
             run = track_recording(path, path / "run", options, cache=cache)
-            motion = run.motion
+            motion, metrics = _nearest(path / "run", run, truth)
     except ShadowPuppetError as error:
         count = len(truth.times)
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
@@ -120,7 +122,16 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
     shutil.rmtree(path / "run")
     vouched = (motion.limb_status == "tracked").any(1)
     return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(seen, alike, np.nan),
-                    verdict=run.metrics["verdict"]["word"], expected=expected_error(motion))
+                    verdict=metrics["verdict"]["word"], expected=expected_error(motion))
+
+
+def _nearest(folder: Path, run: Summary, truth: JointTable) -> tuple[Motion, dict[str, Any]]:
+    """Motion and metrics of a run; of several people those of the one who is nearest to the truth."""
+    if "people" not in run.metrics:
+        return run.motion, run.metrics
+    people = [read_run(person_folder(folder, number)) for number in run.metrics["people"]]
+    best = min(people, key=lambda each: float(np.nanmean(_errors(each.motion, truth)[0])))
+    return best.motion, best.metrics
 
 
 def _errors(motion: Motion, truth: JointTable) -> tuple[Array, Array, Array]:
