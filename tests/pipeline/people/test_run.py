@@ -97,6 +97,22 @@ def test_a_census_of_nothing():
     assert sampled_sets([], []) == []
 
 
+def test_a_picture_that_is_all_silhouette_shows_nobody(monkeypatch):
+    made = cameras()
+    alone = [seen_by(camera, standing(0.9, -0.2)) for camera in made]
+    used: list[list[bool]] = []
+
+    def spy(room, masks):
+        used.append([mask is not None for mask in masks])
+        return find_people(room, masks)
+
+    monkeypatch.setattr("shadowpuppet.pipeline.people.census.find_people", spy)
+    census = take_census(made, [[np.ones_like(alone[0]), np.zeros_like(alone[0]), *alone[2:]]])
+    assert census is not None
+    census.people([*alone[:3], np.ones_like(alone[0])])
+    assert used == [[False, True, True, True], [True, True, True, False]]
+
+
 def test_parts_of_a_picture_that_may_be_people():
     mask = np.zeros((40, 60), bool)
     assert people_in(mask) == 0

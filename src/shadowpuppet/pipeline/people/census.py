@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.pipeline.footage import CameraFrame, Sample
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
@@ -35,7 +35,7 @@ class Census:
 
     def people(self, masks: Sequence[Mask | None]) -> list[Column]:
         """The people in one frame's masks (H, W), one per camera."""
-        return find_people(self.room, masks)
+        return find_people(self.room, _telling(masks))
 
 
 def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) -> list[tuple[Mask | None, ...]]:
@@ -51,7 +51,7 @@ def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) 
 
 def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]]) -> Census | None:
     """The people in frame sets of masks (H, W), one per camera; None if nothing is seen by two cameras."""
-    hull = VisualHull(cameras)
+    hull, sets = VisualHull(cameras), [_telling(masks) for masks in sets]
     points = [hull.points(masks).points for masks in sets]
     everywhere = np.concatenate(points) if points else np.zeros((0, 3))
     if len(everywhere) < FEW_POINTS:
@@ -59,6 +59,11 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]]
     room = make_room(cameras, everywhere)
     numbers = tuple(len(find_people(room, masks)) for masks in sets)
     return Census(counted(numbers), room, numbers)
+
+
+def _telling(masks: Sequence[Mask | None]) -> list[Mask | None]:
+    """The masks without those that are nearly all of their picture, as of a camera that turned black: these show a person everywhere."""
+    return [mask if mask is None or may_be_person(mask) or not mask.any() else None for mask in masks]
 
 
 def count_in_picture(sample: Sample, silhouettes: Silhouettes) -> int:
