@@ -8,17 +8,15 @@ whole film. Latency is from a frame's capture to its smoothed pose; a lag is of 
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import smallest
 from proving_ground import HERE as GROUND
 from proving_ground import made as made_ground
-from smoothness import BUILD, made_turns, measured
+from smoothness import BUILD, arguments, made_turns, measured
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.io.motion.motion_files import read_truth
@@ -106,18 +104,9 @@ def markdown(found: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _smallest(folder: Path) -> list[object]:
-    recording = smallest.make(folder / "one")
-    return [recording, "--runs", folder / "runs", "--markdown", folder / "table.md"]
-
-
 def main() -> None:
     """Measure, print and write the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("recordings", nargs="*", type=Path)
-    parser.add_argument("--runs", type=Path, default=GROUND.parent / "smoothness")
-    parser.add_argument("--markdown", type=Path)
-    given = smallest.parse(parser, _smallest)
+    given = arguments(__doc__ or "")
     found = list[Row]()
     for recording in given.recordings or [each for each in (*made_ground(GROUND), *made_turns(BUILD)) if each.name in CHOSEN]:
         if not (given.runs / recording.name / "raw.csv").exists():

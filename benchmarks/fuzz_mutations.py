@@ -25,7 +25,7 @@ Change = Callable[[np.random.Generator, bytes, bytes], bytes]
 
 
 def mutated(rng: np.random.Generator, content: bytes, other: bytes) -> bytes:
-    """A file's content after one or more changes; `other`: of another file, parts of which may come into it."""
+    """A file's content after one or more changes; `other`: another file's content, parts of which may be inserted."""
     if content[:2] == b"PK" and rng.random() < 0.9:
         return in_archive(rng, content)
     is_text = b"\0" not in content[:2000]

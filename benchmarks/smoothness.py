@@ -157,6 +157,15 @@ def markdown(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def arguments(about: str) -> argparse.Namespace:
+    """What a script on recordings and their runs was given: `recordings`, `runs` and `markdown`; `about`: the script's docstring."""
+    parser = argparse.ArgumentParser(description=about.splitlines()[0])
+    parser.add_argument("recordings", nargs="*", type=Path)
+    parser.add_argument("--runs", type=Path, default=GROUND.parent / "smoothness")
+    parser.add_argument("--markdown", type=Path)
+    return smallest.parse(parser, _smallest)
+
+
 def _smallest(folder: Path) -> list[object]:
     recording = smallest.make(folder / "one")
     return [recording, "--runs", folder / "runs", "--markdown", folder / "table.md"]
@@ -164,11 +173,7 @@ def _smallest(folder: Path) -> list[object]:
 
 def main() -> None:
     """Measure, print and write the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("recordings", nargs="*", type=Path)
-    parser.add_argument("--runs", type=Path, default=GROUND.parent / "smoothness")
-    parser.add_argument("--markdown", type=Path)
-    given = smallest.parse(parser, _smallest)
+    given = arguments(__doc__ or "")
     recordings = given.recordings or [*made_ground(GROUND), *made_rings(RINGS), *made_turns(BUILD)]
     rows = []
     for recording in recordings:

@@ -134,6 +134,11 @@ def _singular(R: Array, axes: Sequence[int]) -> NDArray[np.bool_]:
     return np.hypot(R[:, axes[0], axes[0]], R[:, axes[0], axes[1]]) < GIMBAL_COSINE
 
 
+def evenly_spread(length: int, most: int) -> NDArray[np.int64]:
+    """Indices, at most `most`, spread evenly over a sequence from its first element to its last."""
+    return np.unique(np.linspace(0, length - 1, most).astype(np.int64))
+
+
 def continuous_angles(rotations: Array, order: str, limits: ArrayLike | None = None) -> Array:
     """Euler angles (T, 3), rad, in `order` that make rotations (T, 3, 3) and change least from frame to frame. Two triples of angles,
     and any whole turns, make each rotation. The path of least steps is taken, so angles may pass half a turn; of equal paths the one

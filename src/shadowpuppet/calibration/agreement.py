@@ -14,7 +14,7 @@ from shadowpuppet.calibration.silhouettes import Row, outlines_of, silhouettes_o
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import HARMFUL, RUINOUS, Caution
-from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.geometry import Array, evenly_spread, inverse
 
 MAX_DISAGREEMENT = 0.01
 """Disagreement from which on a camera is in doubt, over the picture's longer side (6 of 640 pixels); good cameras differ by one pixel."""
@@ -124,7 +124,7 @@ class _Scene:
 
     def spread(self, count: int) -> list[Row]:
         """`count` of the sets at most, evenly spread."""
-        return [self.rows[f] for f in np.unique(np.linspace(0, len(self.rows) - 1, count).astype(int)) if self.rows]
+        return [self.rows[f] for f in evenly_spread(len(self.rows), count) if self.rows]
 
     def tangents(self, count: int = SETS_COMPARED) -> Array:
         """Distances (C, C) between the tangents of every two cameras, pixels."""

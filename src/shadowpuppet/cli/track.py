@@ -104,7 +104,7 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
 
 
 def _after_a_film(camera: str) -> str:
-    """What to do after a film that was played as if live, in which nobody was tracked; empty for cameras."""
+    """Advice for a film, played as if live, in which no person was tracked; empty for cameras."""
     if not Path(camera).exists():
         return ""
     return ("; a film that ends before the empty scene is learnt and the person measured needs --background with the empty scene, and a "

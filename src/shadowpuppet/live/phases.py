@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.silhouette.background import FrameSampler, smoothed, to_planes
 from shadowpuppet.silhouette.quality import MIN_CONTACT, NEARLY_ALL
 from shadowpuppet.video import Image
@@ -48,7 +49,7 @@ class StandStillDetector:
         if now - self._since < self.seconds:
             return None
         still = [seen for time, seen in self._seen if time >= self._since]
-        return [still[k] for k in np.unique(np.linspace(0, len(still) - 1, MEASURED).astype(int))]
+        return [still[k] for k in evenly_spread(len(still), MEASURED)]
 
     def wait(self) -> None:
         """Start again, after a gap in the pictures."""

@@ -13,7 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
 from shadowpuppet.live.phases import NOBODY, BackgroundCollector
 from shadowpuppet.live.rig_capture import SnapshotSet
@@ -128,7 +128,7 @@ class RigSession(LiveSession):
 
     def _fitting(self) -> Callable[[], MultiviewSubject | TrackingError]:
         """A task that measures the person in the first seconds; it returns, rather than raises, the error if there is no person."""
-        chosen = np.unique(np.linspace(0, len(self._first) - 1, OPENED).astype(int)).tolist()
+        chosen = evenly_spread(len(self._first), OPENED).tolist()
         fit = partial(fit_in_views, self.rng.spawn(1)[0], self._worked, [self._first[n][1] for n in chosen], self.options,
                       1 / self.timing.interval, self.height)
 

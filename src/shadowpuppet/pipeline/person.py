@@ -16,7 +16,7 @@ from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError, SilhouetteError, TrackingError
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.motion.motion import MotionFrame
@@ -243,7 +243,7 @@ def _by_references(footage: Footage, silhouettes: Silhouettes, known: dict[str, 
 
 def _few(masks: list[Mask], most: int = LOOKED_FOR_IN) -> list[Mask]:
     """At most `most` of the masks, evenly spread."""
-    return [masks[k] for k in np.unique(np.linspace(0, len(masks) - 1, most).astype(int))]
+    return [masks[k] for k in evenly_spread(len(masks), most)]
 
 
 def _references(footage: Footage, silhouettes: Silhouettes) -> dict[str, Mask]:

@@ -16,8 +16,11 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.plain import for_json, plain
+from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import read_truth
+from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.look import Look, RigLook
@@ -126,6 +129,14 @@ def _box(mask: Mask, size: tuple[int, int]) -> list[int]:
     (height, width), (rows, columns) = mask.shape, bounding_window(mask.view(np.uint8), 0)
     (x0, x1), (y0, y1) = (columns.start, columns.stop), (rows.start, rows.stop)
     return [round(x0 * size[0] / width), round(y0 * size[1] / height), round(x1 * size[0] / width), round(y1 * size[1] / height)]
+
+
+def write_beside(folder: Path, look: Look | RigLook, rig: Rig, person: Person | None = None) -> None:
+    """Write what stands in a run folder beside its tables: look.json, calibration.toml and, of a measured person, person.toml."""
+    write_whole(folder / "look.json", json_text(look) + "\n")
+    write_calibration(folder / "calibration.toml", [footage.view.camera for footage in rig.footage])
+    if person is not None:
+        write_person(folder / "person.toml", person)
 
 
 def json_text(value: Any) -> str:

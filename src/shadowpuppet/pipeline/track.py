@@ -13,8 +13,6 @@ from warnings import warn
 import numpy as np
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
-from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import OWN_KEYS, RunWriter, read_run, write_metrics
@@ -43,6 +41,7 @@ from shadowpuppet.pipeline.progress import (
     warn_of_left_out,
     warn_of_losses,
     warn_of_set_aside,
+    write_beside,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
@@ -236,13 +235,6 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     return Summary(writer.folder, first.motion, people.metrics | {"people": found}, survey.look)
 
 
-def _write_beside(folder: Path, prepared: Prepared) -> None:
-    subject = prepared.check()
-    write_whole(folder / "look.json", json_text(prepared.look) + "\n")
-    write_person(folder / "person.toml", subject.person)
-    write_calibration(folder / "calibration.toml", [footage.view.camera for footage in prepared.survey.rig.footage])
-
-
 def _check_cutoff(options: Options, rate: float) -> None:
     """Raise `SettingsError` before tracking if the frame rate does not allow the filter's cut-off."""
     if options.smoothing[0] == "butterworth" and np.isfinite(rate):
@@ -314,7 +306,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
-    _write_beside(writer.folder, prepared)
+    write_beside(writer.folder, prepared.look, survey.rig, prepared.check().person)
     watch, count, due = RigWatch(len(survey.rig.footage)), len(earlier), 0.0
     leans = array("d")
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shadowpuppet.calibration.boards.board import Board
 from shadowpuppet.calibration.boards.detection import BoardDetector, View
 from shadowpuppet.errors import CalibrationError, choices
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video.film import opened
 from shadowpuppet.video.images import IMAGE_SUFFIXES, read_image
@@ -114,7 +114,7 @@ def _read_film(path: Path, facts: _Facts, board: Board, times: Array, start: flo
     detector = BoardDetector(board)
     pictures = _pictures(path)
     if pictures:
-        chosen = [pictures[k] for k in np.unique(np.linspace(0, len(pictures) - 1, SAMPLES).astype(int))]
+        chosen = [pictures[k] for k in evenly_spread(len(pictures), SAMPLES)]
         for file in chosen:
             found_size = read_image(file).shape[1::-1]
             if found_size != facts.size:

@@ -12,7 +12,7 @@ from shadowpuppet.calibration.boards.board import Board
 from shadowpuppet.calibration.boards.detection import View
 from shadowpuppet.calibration.solve.board_pose import Pose, board_poses
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.geometry import Array, evenly_spread, inverse
 
 MAX_ANGLE, MAX_SHIFT = np.radians(5.0), 0.06
 """Two estimates of one pair agree within this angle and this share of the cameras' distance from the board."""
@@ -58,7 +58,7 @@ def pairs_of(count: int, poses: Sequence[Mapping[int, Sequence[Pose]]]) -> list[
     for i, j in combinations(range(count), 2):
         both = [(each[i], each[j]) for each in poses if i in each and j in each]
         if both:
-            both = [both[k] for k in np.unique(np.linspace(0, len(both) - 1, MOST_MOMENTS).astype(int))]
+            both = [both[k] for k in evenly_spread(len(both), MOST_MOMENTS)]
             out.append(_compared(i, j, both))
     return out
 

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from importlib.resources import files
 
 import numpy as np
 
 from shadowpuppet.calibration.session import DOUBT_FACTOR, Calibrated
 from shadowpuppet.calibration.solve.lens import LensFit
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.evaluation.report.html import figure, plain, rows, table
-from shadowpuppet.geometry import Array
+from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
+from shadowpuppet.geometry import Array, evenly_spread
 
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
-"""Content security policy: the browser fetches nothing."""
 MOST_DOTS = 1500
 """Greatest number of corners drawn of a camera."""
 MAP_WIDTH, PICTURE_WIDTH = 520, 340
@@ -26,10 +23,7 @@ ARROW_SCALE = 40.0
 def calibration_page(found: Calibrated) -> str:
     """The page as HTML; it is complete in itself and makes no requests."""
     name = found.session.folder.resolve().name
-    css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
-    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-            f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{plain(name)}: calibration</title>\n'
-            f"<style>\n{css}</style></head>\n<body>\n" + "\n".join(_parts(found, name)) + "\n</body></html>\n")
+    return document(f"{name}: calibration", _parts(found, name))
 
 
 def _parts(found: Calibrated, name: str) -> Iterator[str]:
@@ -89,7 +83,7 @@ def _picture(fit: LensFit) -> str:
     """Corners and errors over the picture's frame, as SVG."""
     width, height = fit.camera.size
     k = PICTURE_WIDTH / width
-    chosen = np.unique(np.linspace(0, len(fit.corners) - 1, MOST_DOTS).astype(int))
+    chosen = evenly_spread(len(fit.corners), MOST_DOTS)
     ends = fit.corners + ARROW_SCALE * fit.residuals
     marks = "".join(f"M{k * a:.1f} {k * b:.1f}L{k * c:.1f} {k * d:.1f}" for (a, b), (c, d) in zip(fit.corners[chosen], ends[chosen]))
     dots = "".join(f'<circle cx="{k * a:.1f}" cy="{k * b:.1f}" r="1.1"/>' for a, b in fit.corners[chosen])

@@ -1,9 +1,21 @@
-"""Pieces of HTML; text from files and names is escaped."""
+"""Pages and pieces of HTML; text from files and names is escaped."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from importlib.resources import files
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+"""Content security policy: the browser fetches nothing."""
+
+
+def document(title: str, parts: Iterable[str]) -> str:
+    """A page that is complete in itself and makes no requests."""
+    css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
+    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+            f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{plain(title)}</title>\n'
+            f"<style>\n{css}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n")
 
 
 def plain(text: object) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import importlib.util
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from shadowpuppet.errors import ShadowPuppetError
@@ -13,7 +12,7 @@ from shadowpuppet.evaluation.error_metrics import aligned_distances
 from shadowpuppet.evaluation.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation.interval_coverage import LEVELS
 from shadowpuppet.evaluation.report import charts
-from shadowpuppet.evaluation.report.html import figure, plain, rows, table
+from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
 from shadowpuppet.evaluation.report.pictures import ReportFrame, pictures, report_frames
 from shadowpuppet.evaluation.report.sections import (
     alignments_table,
@@ -29,9 +28,6 @@ from shadowpuppet.evaluation.summary_text import coverage_text
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.table import dof_unit
 from shadowpuppet.motion.limbs import doubtful_limbs
-
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
-"""Content security policy: the browser fetches nothing."""
 
 
 def check_report(path: str | Path, folder: str | Path) -> None:
@@ -50,10 +46,7 @@ def write_report(path: str | Path, of: Evaluation) -> None:
 def page(of: Evaluation) -> str:
     """The page as HTML."""
     name = of.run.folder.resolve().name
-    css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
-    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-            f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{plain(name)}: evaluation</title>\n'
-            f"<style>\n{css}</style></head>\n<body>\n" + "\n".join(_parts(of, name)) + "\n</body></html>\n")
+    return document(f"{name}: evaluation", _parts(of, name))
 
 
 def _parts(of: Evaluation, name: str) -> Iterator[str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.pipeline.footage import CameraFrame, Sample
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
@@ -44,7 +45,7 @@ def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) 
         return []
     leader = samples[0]
     reach = 0.5 * leader.pace if np.isfinite(leader.pace) else 0.0
-    chosen = [leader.frames[n] for n in np.unique(np.linspace(0, len(leader.frames) - 1, SETS).astype(int))]
+    chosen = [leader.frames[n] for n in evenly_spread(len(leader.frames), SETS)]
     return [tuple(None if (near := _nearest(sample, frame.time, reach)) is None else each(near)
                   for sample, each in zip(samples, silhouettes, strict=True)) for frame in chosen]  # fmt: skip
 
@@ -71,7 +72,7 @@ def count_in_picture(sample: Sample, silhouettes: Silhouettes) -> int:
     if not sample.frames:
         return 0
     wide = silhouettes.of_several()
-    chosen = (sample.frames[n] for n in np.unique(np.linspace(0, len(sample.frames) - 1, SETS).astype(int)))
+    chosen = (sample.frames[n] for n in evenly_spread(len(sample.frames), SETS))
     return counted([people_in(wide(frame)) for frame in chosen])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_in_views
 from shadowpuppet.tracking.people.carving import Room
@@ -59,7 +60,7 @@ def fit_apart(rng: np.random.Generator, cameras: Sequence[Camera], room: Room, o
     apart = [view for view in apart if sum(mask is not None and bool(mask.any()) for mask in view) >= 2]
     if len(apart) < min(MIN_SETS, len(seen)):
         apart = [views_of(room, *each, strict=False) for each in seen]
-    chosen = [apart[n] for n in np.unique(np.linspace(0, len(apart) - 1, MOST_SETS).astype(int))]
+    chosen = [apart[n] for n in evenly_spread(len(apart), MOST_SETS)]
     # half a voxel less, as the lowest and the highest are filled in part
     tall = float(np.clip(np.median([column.height for column, *_ in seen]) - room.pitch / 2, *TALL))
     subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +22,7 @@ from shadowpuppet.tracking.people.tracker import Person, Share, explained, place
 LOOK_SECONDS = 0.2
 """Seconds from one look at the coarse hull to the next."""
 NEW_SECONDS, NEW_LOOKS = 0.5, 3
-"""Time for which, and number of looks in which, a column that nobody explains must be followed until it is a person."""
+"""Seconds and number of looks through which a column that no tracked body explains must last to count as a new person."""
 FORGET_SECONDS = 0.5
 """Time after which such a column is forgotten."""
 GONE_SECONDS = 1.0
@@ -30,10 +30,12 @@ GONE_SECONDS = 1.0
 SAME_PLACE = 0.6
 """Distance (m) from a person within which a column is theirs."""
 SAME_HEIGHT = 0.1
-"""Difference (m) of heights up to which somebody who comes may be one who has left."""
+"""Greatest difference (m) between the height of a person who enters and that of one who has left, if they may be the same."""
 
-Fit = Callable[[np.random.Generator, Sequence[tuple[Column, Sequence[Column], Sequence[Mask | None]]]], MultiviewSubject]
-"""Measures a person in frame sets: their column, the others' and the masks (H, W), and makes the tracker."""
+Sighting = tuple[Column, Sequence[Column], Sequence[Mask | None]]
+"""A person in a frame set: their column, the others', and the masks (H, W) by camera."""
+Fit = Callable[[np.random.Generator, Sequence[Sighting]], MultiviewSubject]
+"""Measures a person where they are seen, and makes the tracker."""
 
 
 @dataclass(eq=False)
@@ -73,7 +75,7 @@ class Group:
     members: list[Member] = field(default_factory=list)
     coming: list[Followed] = field(default_factory=list)
     seen: dict[int, tuple[list[Column], Sequence[Mask | None]]] = field(default_factory=dict)
-    """Columns and masks of the looks of which `coming` tells."""
+    """Columns and masks of the looks that `coming` refers to, by number."""
     looks: int = 0
     due: float = -np.inf
 
@@ -121,14 +123,12 @@ class Group:
         self.seen = {n: seen for n, seen in self.seen.items() if n >= oldest}
 
     def _enter(self, found: Followed, drawn: dict[int, Drawn], points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Begin to track somebody: one who was lost there, one who has left and is as tall, or a new person."""
-        height, column = max(each.height for each in found.columns), found.columns[-1]
-        member = self._known(column, height)
+        """Begin to track a person: one who was lost there, one who has left and is as tall, or a new one."""
+        column = found.columns[-1]
+        member = self._known(column, found.height)
         if member is None:
-            sets = [(each, [other for other in self.seen[n][0] if other is not each], self.seen[n][1])
-                    for n, each in zip(found.sets, found.columns)]  # fmt: skip
             try:
-                member = self.add(self.fit(self.rng, sets), height)
+                member = self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height)
             except TrackingError:
                 return
         self.begin(member, column, drawn, points, masks)
@@ -157,6 +157,11 @@ class Group:
         """The bodies of those who are there, as they are expected in the next frame."""
         return {member.number: draw_person(member.subject.tracker, predicted(member.subject.body, member.state))
                 for member in self.present if member.state is not None}  # fmt: skip
+
+
+def seen_in(found: Followed, looks: Mapping[int, tuple[Sequence[Column], Sequence[Mask | None]]]) -> list[Sighting]:
+    """Where a person is seen among others; `looks`: all columns and the masks (H, W) of each frame set, by number."""
+    return [(column, [other for other in looks[n][0] if other is not column], looks[n][1]) for n, column in zip(found.sets, found.columns)]
 
 
 def first_people(room: Room, times: Sequence[float], sets: Sequence[Sequence[Mask | None]]) -> tuple[list[Followed], list[list[Column]]]:

@@ -15,11 +15,8 @@ import numpy as np
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
-from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.people import PEOPLE, person_folder, write_header, write_place
-from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import RunWriter, read_run, write_metrics
 from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
 from shadowpuppet.motion.synchronization import at_common_times
@@ -28,7 +25,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_of_people
 from shadowpuppet.pipeline.people.census import Census
 from shadowpuppet.pipeline.people.fitting import fit_apart
-from shadowpuppet.pipeline.people.group import Group, Member, first_people
+from shadowpuppet.pipeline.people.group import Group, Member, first_people, seen_in
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
@@ -36,11 +33,11 @@ from shadowpuppet.pipeline.progress import (
     Listener,
     StageTimer,
     evaluated,
-    json_text,
     set_aside,
     timings,
     tracked,
     warn_of_set_aside,
+    write_beside,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.subject import joint_names, motion_frame
@@ -120,11 +117,10 @@ class PeopleRun:
 
         group = Group(room, VisualHull(self.rig.cameras, self.options.multiview.hull), fit, for_track)
         people, every = first_people(room, first.times, first.masks)
+        seen = dict(enumerate(zip(every, first.masks)))
         for found in people:
-            sets = [(column, [other for other in every[n] if other is not column], first.masks[n])
-                    for n, column in zip(found.sets, found.columns)]  # fmt: skip
             try:
-                group.add(fit(for_fit, sets), max(column.height for column in found.columns))
+                group.add(fit(for_fit, seen_in(found, seen)), found.height)
             except TrackingError:
                 continue  # may be found later
         return group
@@ -138,7 +134,7 @@ class PeopleRun:
         watch, count, begun = RigWatch(len(self.rig.footage)), 0, False
         self.listener.begin("tracking", tracked(look.frames, options.every))
         began = time.perf_counter()
-        self._write_beside(self.folder)
+        write_beside(self.folder, look, self.rig)
         places = stack.enter_context((self.folder / PEOPLE).open("wb"))
         write_header(places)
         overlay = stack.enter_context(write_frames(self.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
@@ -201,15 +197,9 @@ class PeopleRun:
             writer = RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), self.info | {"person": member.number})
             self.writers[member.number] = stack.enter_context(writer)
             writer.begin()
-            self._write_beside(folder, member.subject)
+            subject = member.subject
+            write_beside(folder, self.survey.look_with(subject.summary, subject.doubts), self.rig, subject.person)
         return self.writers[member.number]
-
-    def _write_beside(self, folder: Path, subject: MultiviewSubject | None = None) -> None:
-        look = self.survey.look if subject is None else self.survey.look_with(subject.summary, subject.doubts)
-        write_whole(folder / "look.json", json_text(look) + "\n")
-        write_calibration(folder / "calibration.toml", [footage.view.camera for footage in self.rig.footage])
-        if subject is not None:
-            write_person(folder / "person.toml", subject.person)
 
 
 def _together(drawn: Sequence[tuple[Bits, ...]]) -> tuple[Bits, ...]:

@@ -34,14 +34,13 @@ def fix_recording(rig: Rig, sets: SilhouetteSets, found: CalibrationCheck) -> Fi
     """Write certain delays into [start] of recording.toml, and certain rotations into a new calibration.toml. Changes nothing that leaves
     the cameras more apart than before. Raises `RecordingError` if the recording is no folder or a file cannot be written."""
     folder = rig.recording.path
-    shifts = _shifts(rig, sets, found)
     if found.agreement.remedy is not None or not (found.starts or found.turns):
         return Fix(done=(), files=(), pixels=())
     if not folder.is_dir():
         raise RecordingError(f"{folder}: expected a folder, as [start] and calibration.toml are written into it")
     before = compare_cameras(rig.cameras, aligned_sets(sets.rows, [0.0] * len(rig.cameras)), remedies=False)
     turned = tuple(found.turns[camera.name].turn.of(camera) if camera.name in found.turns else camera for camera in rig.cameras)
-    after = compare_cameras(turned, aligned_sets(sets.rows, shifts), remedies=False)
+    after = compare_cameras(turned, aligned_sets(sets.rows, _shifts(rig, sets, found)), remedies=False)
     pixels = tuple(zip(rig.names, before.apart, after.apart))
     if sum(apart or 0.0 for apart in after.apart) > sum(apart or 0.0 for apart in before.apart) + 0.1 * len(rig.cameras):
         return Fix(done=(), files=(), pixels=pixels)
@@ -74,10 +73,7 @@ def _write_notes(path: Path, changes: Mapping[str, Any]) -> list[Path]:
     values = dict(read_toml(path, RecordingError)) if path.exists() else {}
     old = dict(values)
     if "start" in changes:
-        values["start"] = {**_table(values.get("start")), **changes["start"]}
-        for name in _table(old.get("start")):
-            if name not in changes["start"]:
-                del values["start"][name]
+        values["start"] = dict(changes["start"])
     if "calibration" in changes:
         for key in ("calibration", "unit", "up"):
             values.pop(key, None)
@@ -89,7 +85,3 @@ def _write_notes(path: Path, changes: Mapping[str, Any]) -> list[Path]:
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written ({reason(error)})") from None
     return [path, *([kept] if kept is not None else [])]
-
-
-def _table(value: object) -> dict[str, Any]:
-    return dict(value) if isinstance(value, dict) else {}

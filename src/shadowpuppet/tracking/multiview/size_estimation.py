@@ -19,7 +19,7 @@ from shadowpuppet.body.sizes import HEIGHTS, BoneSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
@@ -89,7 +89,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
         found = _followed(rng, tracker, first)
         if len(found) < MIN_FRAMES:
             break
-        chosen = np.unique(np.linspace(0, len(found) - 1, MAX_FRAMES).astype(int))
+        chosen = evenly_spread(len(found), MAX_FRAMES)
         poses = np.array([found[i][1].pose for i in chosen])
         clouds = [MultiviewObservation(tracker.views, *first[found[i][0]]).cloud(POINT_STRIDE) for i in chosen]
         pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]

@@ -37,6 +37,11 @@ class Followed:
         self.sets.append(number)
 
     @property
+    def height(self) -> float:
+        """Greatest extent of the columns, metres."""
+        return max(column.height for column in self.columns)
+
+    @property
     def place(self) -> Array:
         """Last place on the floor plan, of shape (2,), metres."""
         return self.columns[-1].place

@@ -10,10 +10,10 @@ import numpy as np
 from shadowpuppet.body.anthropometry import stature_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.motion.opensim.coordinates import SIDES
 from shadowpuppet.io.motion.opensim.feet import foot_points
 from shadowpuppet.motion.animation import Animation
 
-SIDES = ("right", "left")
 BODY_MASS_INDEX = 23.0
 """Weight over height squared, kg/m2, where the weight is unknown: the middle of the World Health Organization's normal range."""
 

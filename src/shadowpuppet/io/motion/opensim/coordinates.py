@@ -92,6 +92,7 @@ class Model(NamedTuple):
 
 
 SIDES = ("right", "left")
+"""In the models' order."""
 MODELS: dict[str, Model] = {
     "rajagopal": Model((*_trunk(), *(part for side in SIDES for part in (*_leg(side), *_arm(side)))), (-0.0563, -0.0785, 0.0773), 90.0),
     "gait2392": Model((*_trunk(), *(part for side in SIDES for part in _leg(side, knee=-1))), (-0.0707, -0.0661, 0.0835), 90.0),

@@ -17,7 +17,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import euler_angles
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.opensim.body_masses import Mass, average_weight, body_masses
-from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, TO_MODEL, Ball, Hinge, Part
+from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, SIDES, TO_MODEL, Ball, Hinge, Part
 from shadowpuppet.io.motion.opensim.feet import FEET, foot_points
 from shadowpuppet.io.motion.opensim.markers import MARKERS
 from shadowpuppet.motion.animation import Animation
@@ -27,7 +27,7 @@ VERSION = "40000"
 """Of OpenSim's file format: read by OpenSim 4.0 and later."""
 BODIES = {
     "pelvis": ("pelvis", "ground_pelvis"), "chest": ("torso", "back"), "neck": ("head", "neck"),
-    **{f"{side}_{joint}": (f"{name}_{side[0]}", f"{own}_{side[0]}") for side in ("right", "left") for joint, name, own in (
+    **{f"{side}_{joint}": (f"{name}_{side[0]}", f"{own}_{side[0]}") for side in SIDES for joint, name, own in (
         ("hip", "femur", "hip"), ("knee", "tibia", "knee"), ("ankle", "calcn", "ankle"), ("shoulder", "humerus", "acromial"),
         ("elbow", "ulna", "elbow"))},
 }  # fmt: skip
